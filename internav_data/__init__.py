@@ -1,0 +1,1 @@
+"""internav: interactive-navigation data."""

@@ -1,0 +1,41 @@
+"""Poses, polyhedra, footprints and distances in the plane."""
+
+from internav_data.geometry.footprints import (
+    HIGHEST_M,
+    LOWEST_M,
+    Polygons,
+    clearance,
+    footprint,
+    house_footprints,
+    wall_footprints,
+)
+from internav_data.geometry.poses import (
+    multiply,
+    rotation_matrix,
+    round_m,
+    round_quaternion,
+    transform,
+    yaw_of,
+    yaw_quaternion,
+)
+from internav_data.geometry.solids import asset_bounds, asset_corners, part_corners
+
+__all__ = [
+    "HIGHEST_M",
+    "LOWEST_M",
+    "Polygons",
+    "asset_bounds",
+    "asset_corners",
+    "clearance",
+    "footprint",
+    "house_footprints",
+    "multiply",
+    "part_corners",
+    "rotation_matrix",
+    "round_m",
+    "round_quaternion",
+    "transform",
+    "wall_footprints",
+    "yaw_of",
+    "yaw_quaternion",
+]

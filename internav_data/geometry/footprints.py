@@ -1,0 +1,253 @@
+"""Footprints: what of a thing is in the agent's way, as convex polygons on the floor.
+
+Each part's polyhedron is clipped to z in [0.02, 1.8] m and projected; its convex hull is one
+polygon. Polygons that lie inside another of the same thing are dropped: the union is the same.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numba import njit
+
+from internav_data.geometry.planar import cross, inside, polygon_distance
+from internav_data.geometry.poses import rotation_matrix
+from internav_data.geometry.solids import asset_corners
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from internav_data.records import Asset, House, Pose, Vec2
+
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
+
+LOWEST_M = 0.02
+"""What is flatter than this is stepped over."""
+HIGHEST_M = 1.8
+"""The agent's height: what hangs above it is walked under."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Polygons:
+    """Convex, counter-clockwise polygons in one array.
+
+    Shapes: vertices (n, 2) float64, metres; offsets (polygons + 1,) int64: polygon k has the rows
+    offsets[k]:offsets[k + 1].
+    """
+
+    vertices: Floats
+    offsets: Ints
+
+    def __len__(self) -> int:
+        """Return how many polygons there are."""
+        return len(self.offsets) - 1
+
+    def __iter__(self) -> Iterator[Floats]:
+        """Yield each polygon's vertices, shape (n, 2)."""
+        for k in range(len(self)):
+            yield self.vertices[self.offsets[k] : self.offsets[k + 1]]
+
+    @staticmethod
+    def of(polygons: Iterable[Sequence[Vec2] | Floats]) -> Polygons:
+        """Gather convex, counter-clockwise polygons."""
+        arrays = [np.asarray(p, dtype=np.float64).reshape(-1, 2) for p in polygons]
+        offsets = np.cumsum([0, *(len(a) for a in arrays)]).astype(np.int64)
+        vertices = np.vstack(arrays) if arrays else np.empty((0, 2))
+        return Polygons(np.ascontiguousarray(vertices), offsets)
+
+    @staticmethod
+    def joined(groups: Iterable[Polygons]) -> Polygons:
+        """Put several groups behind each other, in order."""
+        return Polygons.of(polygon for group in groups for polygon in group)
+
+
+@njit(cache=True)
+def _convex_hull(points: Floats) -> Floats:
+    """Corners of the convex hull, counter-clockwise, collinear points dropped (monotone chain)."""
+    count = len(points)
+    order = np.argsort(points[:, 0])
+    # An insertion pass puts equal x in order of y: nearly nothing is left to move.
+    for a in range(1, count):
+        b = a
+        while b > 0:
+            p, q = points[order[b]], points[order[b - 1]]
+            if p[0] < q[0] or (p[0] == q[0] and p[1] < q[1]):
+                order[b], order[b - 1] = order[b - 1], order[b]
+                b -= 1
+            else:
+                break
+    hull = np.empty((2 * count + 1, 2))
+    size = 0
+    for sweep in range(2):
+        floor = size if sweep == 1 else 1
+        for step in range(count):
+            if sweep == 1 and step == 0:
+                continue
+            p = points[order[step if sweep == 0 else count - 1 - step]]
+            while size > floor and (
+                cross(
+                    hull[size - 1, 0] - hull[size - 2, 0],
+                    hull[size - 1, 1] - hull[size - 2, 1],
+                    p[0] - hull[size - 1, 0],
+                    p[1] - hull[size - 1, 1],
+                )
+                <= 1e-12  # noqa: PLR2004 - a millionth of a square millimetre
+            ):
+                size -= 1
+            hull[size, 0], hull[size, 1] = p[0], p[1]
+            size += 1
+    # The last point repeats the first.
+    return hull[: max(1, size - 1)].copy()
+
+
+@njit(cache=True)
+def _clipped(corners: Floats, low: float, high: float) -> Floats:
+    """Plan of a convex polyhedron's slice between two heights, as points (n, 2).
+
+    Every pair of corners spans a segment inside the polyhedron, and the slice's outline is the
+    hull of where such segments pierce the two planes: no list of edges is needed.
+    """
+    count = len(corners)
+    out = np.empty((count + 2 * count * count, 2))
+    size = 0
+    for a in range(count):
+        if low <= corners[a, 2] <= high:
+            out[size, 0], out[size, 1] = corners[a, 0], corners[a, 1]
+            size += 1
+    for level in (low, high):
+        for a in range(count):
+            if corners[a, 2] >= level:
+                continue
+            for b in range(count):
+                if corners[b, 2] <= level:
+                    continue
+                t = (level - corners[a, 2]) / (corners[b, 2] - corners[a, 2])
+                out[size, 0] = corners[a, 0] + t * (corners[b, 0] - corners[a, 0])
+                out[size, 1] = corners[a, 1] + t * (corners[b, 1] - corners[a, 1])
+                size += 1
+    # A nanometre grid makes corners above each other one point, whatever their last bits.
+    for k in range(size):
+        out[k, 0] = math.floor(out[k, 0] * 1e9 + 0.5) * 1e-9
+        out[k, 1] = math.floor(out[k, 1] * 1e9 + 0.5) * 1e-9
+    return out[:size]
+
+
+@njit(cache=True)
+def _contained(vertices: Floats, a0: int, a1: int, b0: int, b1: int) -> bool:
+    for k in range(a0, a1):
+        if not inside(vertices[k, 0], vertices[k, 1], vertices, b0, b1):
+            return False
+    return True
+
+
+@njit(cache=True)
+def _project(  # noqa: C901 - one kernel, three plain loops
+    corners: Floats, starts: Ints, matrix: Floats, shift: Floats, low: float, high: float
+) -> tuple[Floats, Ints]:
+    moved = np.empty_like(corners)
+    for k in range(len(corners)):
+        for axis in range(3):
+            moved[k, axis] = (
+                matrix[axis, 0] * corners[k, 0]
+                + matrix[axis, 1] * corners[k, 1]
+                + matrix[axis, 2] * corners[k, 2]
+                + shift[axis]
+            )
+    parts = len(starts) - 1
+    vertices = np.empty((0, 2))
+    offsets = np.zeros(parts + 1, dtype=np.int64)
+    count = 0
+    for part in range(parts):
+        plan = _clipped(moved[starts[part] : starts[part + 1]], low, high)
+        if len(plan) == 0:
+            continue
+        hull = _convex_hull(plan)
+        vertices = np.concatenate((vertices, hull))
+        count += 1
+        offsets[count] = len(vertices)
+    # Drop what lies inside an earlier kept or a later polygon of the same thing.
+    keep = np.ones(count, dtype=np.bool_)
+    for a in range(count):
+        for b in range(count):
+            if a != b and keep[a] and keep[b]:
+                keep[a] = not _contained(
+                    vertices, offsets[a], offsets[a + 1], offsets[b], offsets[b + 1]
+                )
+    out = np.empty_like(vertices)
+    out_offsets = np.zeros(count + 1, dtype=np.int64)
+    size = 0
+    kept = 0
+    for a in range(count):
+        if keep[a]:
+            for k in range(offsets[a], offsets[a + 1]):
+                out[size, 0], out[size, 1] = vertices[k, 0], vertices[k, 1]
+                size += 1
+            kept += 1
+            out_offsets[kept] = size
+    return out[:size].copy(), out_offsets[: kept + 1].copy()
+
+
+def footprint(asset: Asset, pose: Pose) -> Polygons:
+    """Return what an asset at a pose puts in the agent's way; empty for what does not block."""
+    if not asset.blocks:
+        return Polygons.of([])
+    corners, starts = asset_corners(asset)
+    shift = np.array([pose.x, pose.y, pose.z])
+    vertices, offsets = _project(
+        corners, starts, rotation_matrix(pose.quaternion), shift, LOWEST_M, HIGHEST_M
+    )
+    return Polygons(vertices, offsets)
+
+
+def wall_footprints(house: House) -> Polygons:
+    """Rectangles of the walls that stand in the agent's way (lintels hang above it)."""
+    return Polygons.of(
+        [(w.x_min, w.y_min), (w.x_max, w.y_min), (w.x_max, w.y_max), (w.x_min, w.y_max)]
+        for w in house.walls
+        if w.z_min < HIGHEST_M and w.z_max > LOWEST_M
+    )
+
+
+def house_footprints(house: House) -> Polygons:
+    """Walls, then every thing in order: all that stands in the agent's way without obstacles."""
+    things = (footprint(house.assets[t.asset_id], t.pose) for t in house.things)
+    return Polygons.joined([wall_footprints(house), *things])
+
+
+@njit(cache=True)
+def _clearance(first: Floats, starts: Ints, second: Floats, begins: Ints, stop_at: float) -> float:
+    best = np.inf
+    for a in range(len(starts) - 1):
+        low_x = first[starts[a] : starts[a + 1], 0].min()
+        high_x = first[starts[a] : starts[a + 1], 0].max()
+        low_y = first[starts[a] : starts[a + 1], 1].min()
+        high_y = first[starts[a] : starts[a + 1], 1].max()
+        for b in range(len(begins) - 1):
+            gap_x = max(
+                second[begins[b] : begins[b + 1], 0].min() - high_x,
+                low_x - second[begins[b] : begins[b + 1], 0].max(),
+            )
+            gap_y = max(
+                second[begins[b] : begins[b + 1], 1].min() - high_y,
+                low_y - second[begins[b] : begins[b + 1], 1].max(),
+            )
+            if max(gap_x, gap_y) >= min(best, stop_at):
+                continue
+            best = min(
+                best,
+                polygon_distance(first, starts[a], starts[a + 1], second, begins[b], begins[b + 1]),
+            )
+    return min(best, stop_at)
+
+
+def clearance(first: Polygons, second: Polygons, stop_at: float = 1e6) -> float:
+    """Return the distance between two groups of polygons, at most `stop_at`, metres."""
+    return float(
+        _clearance(first.vertices, first.offsets, second.vertices, second.offsets, stop_at)
+    )

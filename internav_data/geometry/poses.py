@@ -1,0 +1,81 @@
+"""Rounding and turning: scalar `math` only, so that every processor agrees to the last bit."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from internav_data.records import Pose, Quaternion
+
+METRE_DIGITS = 4
+"""Stored positions and distances are rounded to 0.1 mm."""
+QUATERNION_DIGITS = 6
+
+
+def round_m(value: float) -> float:
+    """Round a length to 0.1 mm, never to -0.0."""
+    return round(float(value), METRE_DIGITS) + 0.0
+
+
+def round_quaternion(quaternion: Quaternion) -> Quaternion:
+    """Normalise, round to 1e-6 and choose the sign with w >= 0 (x, y, z decide where w is 0)."""
+    length = math.sqrt(sum(q * q for q in quaternion))
+    rounded = [round(q / length, QUATERNION_DIGITS) for q in quaternion]
+    leading = next((q for q in (rounded[3], rounded[2], rounded[1], rounded[0]) if q != 0.0), 1.0)
+    sign = 1.0 if leading > 0.0 else -1.0
+    x, y, z, w = (sign * q + 0.0 for q in rounded)
+    return (x, y, z, w)
+
+
+def yaw_quaternion(yaw_deg: float) -> Quaternion:
+    """Quaternion (rounded) of a turn about z, degrees counter-clockwise."""
+    half = math.radians(yaw_deg) / 2.0
+    return round_quaternion((0.0, 0.0, math.sin(half), math.cos(half)))
+
+
+def yaw_of(quaternion: Quaternion) -> float:
+    """Yaw of a pose in degrees, in (-180, 180]: the heading of the turned x axis."""
+    x, y, z, w = quaternion
+    return math.degrees(math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+
+
+def multiply(first: Quaternion, second: Quaternion) -> Quaternion:
+    """Hamilton product: turns by `second`, then by `first`."""
+    ax, ay, az, aw = first
+    bx, by, bz, bw = second
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+
+
+def rotation_matrix(quaternion: Quaternion) -> NDArray[np.float64]:
+    """Rotation of the normalised quaternion, shape (3, 3)."""
+    x, y, z, w = quaternion
+    s = 2.0 / (x * x + y * y + z * z + w * w)
+    return np.array(
+        [
+            [1.0 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)],
+            [s * (x * y + z * w), 1.0 - s * (x * x + z * z), s * (y * z - x * w)],
+            [s * (x * z - y * w), s * (y * z + x * w), 1.0 - s * (x * x + y * y)],
+        ]
+    )
+
+
+def transform(points: NDArray[np.float64], pose: Pose) -> NDArray[np.float64]:
+    """Move points (n, 3) from an asset's frame into the house's, metres."""
+    matrix = rotation_matrix(pose.quaternion)
+    x, y, z = points[:, 0], points[:, 1], points[:, 2]
+    out = np.empty_like(points, dtype=np.float64)
+    # Written out: a BLAS product may differ in the last bit between processors.
+    for axis, offset in enumerate((pose.x, pose.y, pose.z)):
+        row = matrix[axis]
+        out[:, axis] = row[0] * x + row[1] * y + row[2] * z + offset
+    return out

@@ -1,0 +1,64 @@
+"""The shared words: frozen dataclasses that every other package speaks in."""
+
+from internav_data.records.assets import RGB, Asset, Part, Shape
+from internav_data.records.episodes import (
+    Episode,
+    Expert,
+    Goal,
+    Mode,
+    NodePath,
+    Obstacle,
+    Outcome,
+    Physics,
+    Start,
+)
+from internav_data.records.errors import InternavError
+from internav_data.records.houses import (
+    OUTSIDE,
+    Door,
+    DoorKind,
+    House,
+    Material,
+    Preset,
+    Room,
+    Split,
+    Thing,
+    Wall,
+    Window,
+)
+from internav_data.records.poses import Pose, Quaternion, Vec2, Vec3
+from internav_data.records.seeds import Purpose, generator
+
+__all__ = [
+    "OUTSIDE",
+    "RGB",
+    "Asset",
+    "Door",
+    "DoorKind",
+    "Episode",
+    "Expert",
+    "Goal",
+    "House",
+    "InternavError",
+    "Material",
+    "Mode",
+    "NodePath",
+    "Obstacle",
+    "Outcome",
+    "Part",
+    "Physics",
+    "Pose",
+    "Preset",
+    "Purpose",
+    "Quaternion",
+    "Room",
+    "Shape",
+    "Split",
+    "Start",
+    "Thing",
+    "Vec2",
+    "Vec3",
+    "Wall",
+    "Window",
+    "generator",
+]
