@@ -18,7 +18,7 @@ from internav_data.geometry.poses import (
     yaw_of,
     yaw_quaternion,
 )
-from internav_data.geometry.solids import asset_bounds, asset_corners, part_corners
+from internav_data.geometry.solids import asset_bounds, asset_corners, centre_of_mass, part_corners
 
 __all__ = [
     "HIGHEST_M",
@@ -26,6 +26,7 @@ __all__ = [
     "Polygons",
     "asset_bounds",
     "asset_corners",
+    "centre_of_mass",
     "clearance",
     "footprint",
     "house_footprints",

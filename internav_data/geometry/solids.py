@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from internav_data.geometry.poses import transform
+from internav_data.geometry.poses import round_m, transform
 from internav_data.records import Part, Pose
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from internav_data.records import Asset
+    from internav_data.records import Asset, Vec3
 
 CIRCLE_SIDES = 16
 
@@ -79,3 +79,38 @@ def asset_bounds(asset: Asset) -> tuple[NDArray[np.float64], NDArray[np.float64]
     """Lowest and highest corner of the asset's own bounding box, two (3,) arrays, metres."""
     corners, _ = asset_corners(asset)
     return corners.min(axis=0), corners.max(axis=0)
+
+
+def _hull_mass(points: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    """Volume and centroid of the hull of some points (n, 3)."""
+    from scipy.spatial import ConvexHull  # noqa: PLC0415 - only hulls of users' meshes need it
+
+    hull = ConvexHull(points)
+    middle = points.mean(axis=0)
+    triangles = points[hull.simplices] - middle
+    volumes = np.abs(np.linalg.det(triangles)) / 6.0
+    centroid = (volumes[:, None] * triangles.sum(axis=1) / 4.0).sum(axis=0) / volumes.sum()
+    return float(volumes.sum()), middle + centroid
+
+
+_FILLED = {"box": 1.0, "cylinder": math.pi / 4.0, "sphere": math.pi / 6.0}
+
+
+@lru_cache(maxsize=4096)
+def _centre_of_mass(parts: tuple[Part, ...]) -> Vec3:
+    total, moment = 0.0, np.zeros(3)
+    for part in parts:
+        if part.shape == "hull":
+            volume, centroid = _hull_mass(part_corners(part))
+        else:
+            volume = _FILLED[part.shape] * part.size[0] * part.size[1] * part.size[2]
+            centroid = np.array(part.centre)
+        total += volume
+        moment += volume * centroid
+    x, y, z = (round_m(c / total) for c in moment)
+    return (x, y, z)
+
+
+def centre_of_mass(asset: Asset) -> Vec3:
+    """Centre of mass in the asset's frame, as if all its parts were equally dense, metres."""
+    return _centre_of_mass(asset.parts)

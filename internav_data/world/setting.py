@@ -1,0 +1,89 @@
+"""Plain data that a physics engine is asked about, and what it answers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+from internav_data.records import Asset, Part, Pose
+
+if TYPE_CHECKING:
+    from internav_data.records import Quaternion, Wall
+
+UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """An asset at a pose; a body that does not move weighs nothing to the engine."""
+
+    asset: Asset
+    pose: Pose
+    moves: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A small scene: what can touch each other, everything else left out.
+
+    Bodies enter the engine in this order, on a floor at z = 0.
+    """
+
+    bodies: tuple[Body, ...]
+
+
+def wall_body(wall: Wall) -> Body:
+    """Turn a piece of wall into a fixed body."""
+    size = (wall.x_max - wall.x_min, wall.y_max - wall.y_min, wall.z_max - wall.z_min)
+    part = Part("box", (0.0, 0.0, size[2] / 2.0), size, UPRIGHT, (), (200, 200, 200), "stone")
+    solid = Asset(
+        asset_id="wall",
+        type="wall",
+        size=size,
+        mass_kg=1.0,
+        friction=1.0,
+        pushable=False,
+        pickable=False,
+        spawnable=False,
+        blocks=True,
+        parts=(part,),
+    )
+    middle = ((wall.x_min + wall.x_max) / 2.0, (wall.y_min + wall.y_max) / 2.0)
+    return Body(solid, Pose(*middle, wall.z_min, UPRIGHT), moves=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """How the first body of a setting came to rest."""
+
+    pose: Pose
+    """Not rounded: the caller moves it into place first."""
+    seconds: float
+    """Simulated time until at rest, or the time limit."""
+    at_rest: bool
+    penetration_m: float
+    """Deepest contact at the end."""
+    reach_m: float
+    """Farthest that any of its corners ever was from where it began, in the plane."""
+
+
+class Engine(Protocol):
+    """A physics engine: pure functions from settings to plain data.
+
+    Nothing lives in the engine between two calls: the same setting gives the same answer to the
+    last bit, in any process and after any history.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name of the engine, as stored in certificates."""
+
+    @property
+    def build(self) -> str:
+        """Version and build of the engine, as stored in certificates."""
+
+    def settle(self, setting: Setting) -> Rest:
+        """Let the first body of the setting fall until it rests; the others stay."""
+
+    def __hash__(self) -> int:
+        """Engines are keys of caches of what they answered."""
