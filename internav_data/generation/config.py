@@ -1,0 +1,137 @@
+"""Everything that decides what a dataset holds, save how many scenes of it are made."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from internav_data.episodes.config import EpisodeConfig
+from internav_data.generation.values import from_mapping, plain, updated
+from internav_data.houses.config import HouseConfig
+from internav_data.records.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from internav_data.records import Split
+
+TEST_SHARE = 10
+"""A test scene has one episode for every ten of other scenes, as in the paper (5 for 50)."""
+COMMAND_LINE_ONLY = ("scenes", "workers", "engine", "out")
+"""What belongs to a run and not to a dataset's config."""
+MAX_SEED = 2**63 - 1
+"""Seeds are stored as int64."""
+
+
+@dataclass(frozen=True, slots=True)
+class GenerationConfig:
+    """The identity of a dataset: equal configs give equal episodes, scene by scene."""
+
+    seed: int = 0
+    """Every random number derives from this and the scene's index; 0 or more."""
+    episodes_per_scene: int = 50
+    """Episodes of each train and val scene."""
+    test_episodes_per_scene: int = 0
+    """Episodes of each test scene; 0 for a tenth of episodes_per_scene, rounded up."""
+    assets: tuple[str, ...] = ()
+    """Folders of your own meshes that join the catalogue. What counts is their content."""
+    house: HouseConfig = field(default_factory=HouseConfig)
+    """How houses are built."""
+    episodes: EpisodeConfig = field(default_factory=EpisodeConfig)
+    """How episodes are made."""
+
+    def check(self) -> None:
+        """Raise UsageError for values that cannot be meant."""
+        if not 0 <= self.seed <= MAX_SEED:
+            raise UsageError(f"seed is {self.seed}: choose one from 0 to 2^63 - 1")
+        if self.episodes_per_scene < 1:
+            raise UsageError(
+                f"episodes_per_scene is {self.episodes_per_scene}: ask for 1 or more episodes"
+            )
+        if self.test_episodes_per_scene < 0:
+            raise UsageError(
+                f"test_episodes_per_scene is {self.test_episodes_per_scene}: ask for 1 or more "
+                "episodes, or 0 for a tenth of episodes_per_scene"
+            )
+        for folder in self.assets:
+            if not Path(folder).is_dir():
+                raise UsageError(f"assets: '{folder}' is no folder; name a folder with meshes")
+        self.house.check()
+        self.episodes.check()
+
+    def episodes_of(self, split: Split) -> int:
+        """Return how many episodes a scene of a split has."""
+        if split != "test":
+            return self.episodes_per_scene
+        return self.test_episodes_per_scene or -(-self.episodes_per_scene // TEST_SHARE)
+
+    def resolved(self) -> dict[str, Any]:
+        """Return all values as plain data, as they are saved in the dataset."""
+        values: dict[str, Any] = plain(self)
+        values["test_episodes_per_scene"] = self.episodes_of("test")
+        return values
+
+    def identity(self, catalogue_digest: str) -> dict[str, Any]:
+        """Return what must be equal for two runs to make the same scenes.
+
+        Paths are replaced by what they hold: the catalogue's digest stands for the asset folders,
+        the SHA-256 of its bytes for a floor plan.
+        """
+        values = self.resolved()
+        values["assets"] = catalogue_digest
+        plan = self.house.floor_plan
+        values["house"]["floor_plan"] = None if plan is None else _sha256_of(Path(plan))
+        return values
+
+
+def identity_digest(identity: dict[str, Any]) -> str:
+    """Return the SHA-256 of a config's identity."""
+    text = json.dumps(identity, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def load_config(path: Path | None = None, overrides: Iterable[str] = ()) -> GenerationConfig:
+    """Read a config from a TOML file and `a.b=c` overrides; what neither names is the default.
+
+    Paths inside the file are relative to the file.
+
+    Raises
+    ------
+    UsageError
+        An unreadable file, an unknown key, or a value of the wrong type; it names the place.
+
+    """
+    config = GenerationConfig()
+    if path is not None:
+        config = from_mapping(config, _read(path), str(path), COMMAND_LINE_ONLY)
+        config = _beside(config, path.parent)
+    for override in overrides:
+        config = updated(config, override, COMMAND_LINE_ONLY)
+    return config
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UsageError(f"cannot read config {path}: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UsageError(f"config {path} is not TOML: {error}") from error
+
+
+def _beside(config: GenerationConfig, folder: Path) -> GenerationConfig:
+    changes: dict[str, Any] = {"assets": [str(folder / entry) for entry in config.assets]}
+    if config.house.floor_plan is not None:
+        changes["house"] = {"floor_plan": str(folder / config.house.floor_plan)}
+    return from_mapping(config, changes, "paths")
+
+
+def _sha256_of(path: Path) -> str:
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise UsageError(f"cannot read floor plan {path}: {error.strerror}") from error

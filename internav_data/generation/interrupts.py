@@ -1,0 +1,60 @@
+"""Ctrl-C and SIGTERM end a run in order: what is under way is finished, what is done is kept."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from typing import TYPE_CHECKING, Self
+
+from internav_data.records.errors import InternavError
+
+if TYPE_CHECKING:
+    from types import FrameType, TracebackType
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class InterruptedRunError(InternavError):
+    """A run was ended by a signal; the same command continues it."""
+
+    def __init__(self, message: str, signum: int) -> None:
+        super().__init__(message)
+        self.signum = signum
+
+
+class Interrupts:
+    """While it is entered, the first signal raises a flag and the second ends the process.
+
+    Outside the main thread Python cannot catch signals; there the flag never rises.
+    """
+
+    def __init__(self) -> None:
+        self.signum = 0
+        self._before: dict[int, object] = {}
+
+    def __call__(self) -> bool:
+        """Return whether a signal came."""
+        return self.signum != 0
+
+    def __enter__(self) -> Self:
+        if threading.current_thread() is threading.main_thread():
+            for signum in SIGNALS:
+                self._before[signum] = signal.signal(signum, self._caught)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Give the signals back to whoever had them."""
+        for signum, handler in self._before.items():
+            signal.signal(signum, handler)  # type: ignore[arg-type] # what signal() returned
+        self._before.clear()
+
+    def _caught(self, signum: int, _frame: FrameType | None) -> None:
+        if self.signum:
+            os._exit(128 + signum)  # asked twice: workers see their pipes close and end
+        self.signum = signum

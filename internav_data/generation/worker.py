@@ -1,0 +1,71 @@
+"""What runs inside a worker process: set up once, then one task after the other."""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+import signal
+import time
+import traceback
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from internav_data.generation.messages import Done, Failed, Fatal, Ready
+from internav_data.records.errors import InternavError, QuarantineError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+def main(fd: int) -> None:
+    """Serve the socket `fd` until its other end closes."""
+    # The terminal's signals are for the parent. Once it is gone, so is the socket.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    faulthandler.enable()  # a crash in native code leaves its name on stderr
+    with Connection(fd) as pipe:
+        try:
+            _serve(pipe)
+        except (EOFError, BrokenPipeError, ConnectionResetError):
+            # The parent is gone or has closed the pipe: nothing is left to do. Skipping the
+            # interpreter's own shutdown ends the process without waiting for libraries' threads.
+            os._exit(0)
+
+
+def _serve(pipe: Connection[Any, Any]) -> None:
+    setup, payload = pipe.recv()
+    began = time.perf_counter()
+    try:
+        work = setup(payload)
+    except InternavError as error:
+        pipe.send(Fatal(type(error).__name__, str(error)))
+        return
+    except Exception as error:  # noqa: BLE001 - told to the parent, which raises it
+        pipe.send(Fatal("InternavError", f"a worker could not be set up: {_told(error)}"))
+        return
+    pipe.send(Ready(time.perf_counter() - began))
+    while True:
+        pipe.send(_answer(work, pipe.recv()))
+
+
+def _answer(work: Callable[[Any], Any], task: Any) -> Done | Failed | Fatal:  # noqa: ANN401
+    try:
+        return Done(task, work(task))
+    except QuarantineError as error:
+        return Failed(task, str(error))
+    except InternavError as error:
+        return Fatal(type(error).__name__, str(error))
+    except OSError as error:
+        where = f" ({error.filename})" if error.filename else ""
+        return Fatal("InternavError", f"cannot write: {error.strerror or error}{where}")
+    except MemoryError:
+        os._exit(1)  # a new process may have more luck: the parent tries again
+    except Exception as error:  # noqa: BLE001 - a bug in one scene must not end the run
+        return Failed(task, _told(error))
+
+
+def _told(error: Exception) -> str:
+    """Return what happened and where, without the paths of this machine: it may be stored."""
+    frames = traceback.extract_tb(error.__traceback__)
+    where = f" ({Path(frames[-1].filename).name}:{frames[-1].lineno})" if frames else ""
+    return f"{type(error).__name__}: {error}{where}"

@@ -1,0 +1,57 @@
+"""What the workers of these tests do; imported by name in their processes."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+from internav_data.records.errors import QuarantineError, UsageError
+
+
+def square(payload):
+    return lambda task: task * task + payload
+
+
+def troubled(folder):
+    """Tasks 3, 5, 7 and 11 each fail in a way of their own; the folder remembers deaths."""
+
+    def work(task):
+        with (Path(folder) / f"begun-{task}").open("a") as file:
+            file.write(f"{os.getpid()}\n")
+        deaths = len((Path(folder) / f"begun-{task}").read_text().split())
+        if task == 3 and deaths == 1:
+            os.kill(os.getpid(), signal.SIGKILL)
+        if task == 5:
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if task == 7:
+            raise QuarantineError("no way can be blocked here")
+        if task == 11:
+            raise ValueError("a bug")
+        return task
+
+    return work
+
+
+def refusing(payload):
+    raise UsageError(f"{payload} is no mesh")
+
+
+def stillborn(_payload):
+    os._exit(9)
+
+
+def full_disk(_payload):
+    def work(task):
+        raise OSError(28, "No space left on device", f"/data/{task}")
+
+    return work
+
+
+def slow(seconds):
+    def work(task):
+        time.sleep(seconds)
+        return task
+
+    return work
