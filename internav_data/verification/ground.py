@@ -1,0 +1,115 @@
+"""Where the agent can stand, derived again: shapely distances, breadth-first search by scipy.
+
+Every node and every edge of the 0.25 m lattice is compared with every polygon near it. What a
+house alone blocks is worked out once; obstacles only take nodes and edges away.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+    from shapely import Geometry, Polygon
+
+    Bools = NDArray[np.bool_]
+    Ints = NDArray[np.int64]
+
+SPACING_M = 0.25
+RADIUS_M = 0.2
+TOLERANCE_M = 1e-6
+"""Exact ties (a node row 0.2 m from a wall) are free."""
+KEEP_M = RADIUS_M - TOLERANCE_M
+"""A disc stands free at this distance or more."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Free:
+    """Free nodes (n,) and edges (m,) of a ground, as masks."""
+
+    nodes: Bools
+    edges: Bools
+
+
+class Ground:
+    """The lattice of one house: free nodes and edges without obstacles.
+
+    Nodes are numbered i * columns + j; node (i, j) lies at (i, j) * 0.25 m.
+    """
+
+    def __init__(self, blockers: Sequence[Geometry], outline: Polygon) -> None:
+        _, _, x_max, y_max = outline.bounds
+        self.shape = (math.floor(x_max / SPACING_M) + 1, math.floor(y_max / SPACING_M) + 1)
+        i, j = np.indices(self.shape)
+        self._xy = np.column_stack([i.ravel(), j.ravel()]) * SPACING_M
+        shapely.prepare(outline)
+        inside = shapely.intersects_xy(outline, self._xy[:, 0], self._xy[:, 1])
+        self._point_tree = shapely.STRtree(np.atleast_1d(shapely.points(self._xy)))
+        nodes = inside & ~self._near(self._point_tree, blockers, len(self._xy))
+        number = np.arange(len(self._xy)).reshape(self.shape)
+        pairs = np.vstack(
+            [
+                np.column_stack([number[:-1].ravel(), number[1:].ravel()]),
+                np.column_stack([number[:, :-1].ravel(), number[:, 1:].ravel()]),
+            ]
+        )
+        # A swept edge contains its ends: only edges between free nodes can be free.
+        self._pairs = pairs[nodes[pairs].all(axis=1)]
+        self._edge_tree = shapely.STRtree(np.atleast_1d(shapely.linestrings(self._xy[self._pairs])))
+        edges = ~self._near(self._edge_tree, blockers, len(self._pairs))
+        self.clear = Free(nodes, edges)
+        self._distances: dict[int, NDArray[np.float64]] = {}
+
+    @staticmethod
+    def _near(tree: shapely.STRtree, blockers: Sequence[Geometry], count: int) -> Bools:
+        """Which geometries of a tree come closer to a blocker than the disc allows."""
+        near = np.zeros(count, dtype=np.bool_)
+        if blockers and count:
+            hit = tree.query(np.array(blockers, dtype=object), "dwithin", KEEP_M)
+            near[hit[1]] = True
+        return near
+
+    def with_obstacles(self, obstacles: Sequence[Geometry]) -> Free:
+        """Return what stays free when obstacles lie in the house."""
+        nodes = self.clear.nodes & ~self._near(self._point_tree, obstacles, len(self._xy))
+        edges = self.clear.edges & ~self._near(self._edge_tree, obstacles, len(self._pairs))
+        return Free(nodes, edges)
+
+    def node(self, i: int, j: int) -> int:
+        """Return the number of a node, -1 off the lattice."""
+        inside = 0 <= i < self.shape[0] and 0 <= j < self.shape[1]
+        return i * self.shape[1] + j if inside else -1
+
+    def _graph(self, free: Free) -> csr_array:
+        pairs = self._pairs[free.edges]
+        ones = np.ones(len(pairs), dtype=np.int8)
+        count = len(self._xy)
+        return csr_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+
+    def distances(self, goal: int, free: Free) -> NDArray[np.float64]:
+        """Return the steps from every node to a goal, inf where cut off, shape (n,)."""
+        if free is self.clear and goal in self._distances:
+            return self._distances[goal]
+        steps = dijkstra(self._graph(free), directed=False, indices=[goal], unweighted=True)[0]
+        out = np.asarray(steps, dtype=np.float64)
+        if free is self.clear:
+            self._distances[goal] = out
+        return out
+
+    def components(self) -> Ints:
+        """Component of every node of the clear ground, -1 where not free, shape (n,)."""
+        _, labels = connected_components(self._graph(self.clear), directed=False)
+        return np.where(self.clear.nodes, labels, -1)
+
+    def points(self) -> NDArray[np.float64]:
+        """Positions of all nodes, shape (n, 2), metres."""
+        return np.asarray(self._xy, dtype=np.float64)

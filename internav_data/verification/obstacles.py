@@ -1,0 +1,138 @@
+"""Predicates of the obstacles of an episode: what they are, where they lie, how they settled."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Protocol
+
+import shapely
+
+from internav_data.verification.overlaps import DEPTH_M, overlapping_plans
+
+if TYPE_CHECKING:
+    from shapely import Geometry
+
+    from internav_data.records import Episode, Obstacle
+    from internav_data.verification.findings import Collector
+    from internav_data.verification.site import Site
+
+MAX_SETTLE_S = 1.0
+MAX_PENETRATION_M = 0.002
+MAX_TILT_DEG = 5.0
+FLOOR_M = (-0.0025, 0.005)
+"""Heights between which the lowest corner of a settled thing lies."""
+TILT_SLACK_DEG = 0.001
+"""Quaternions are rounded to 1e-6."""
+
+
+class Expect(Protocol):
+    """Judges one predicate of an episode."""
+
+    def __call__(self, holds: object, predicate: str, expected: object, got: object) -> bool:
+        """Keep a finding where it does not hold; return whether it holds."""
+
+
+def check_obstacles(site: Site, episode: Episode, report: Collector) -> list[Geometry] | None:
+    """Judge the obstacles; return their footprints, None where an asset is unknown."""
+    name = episode.episode_id
+
+    def expect(holds: object, predicate: str, expected: object, got: object) -> bool:
+        return report.expect(holds, predicate, expected, got, name)
+
+    count = len(episode.obstacles)
+    expect(episode.obstacle_count == count, "episode.obstacle-count", count, episode.obstacle_count)
+    expect(count > 0, "episode.obstacle-count", "at least one obstacle", count)
+    segments = max((len(path.points) - 1 for path in episode.node_paths), default=0)
+    prints: list[list[Geometry]] = []
+    for number, obstacle in enumerate(episode.obstacles):
+        what = f"obstacle {number} ({obstacle.asset_id})"
+        known = obstacle.asset_id in site.shapes.assets
+        if not expect(known, "obstacle.asset", f"{what} in assets.parquet", "no such asset"):
+            return None
+        _check_asset(site, obstacle, what, expect)
+        expect(
+            0 <= obstacle.segment < segments,
+            "obstacle.segment",
+            f"{what}: 0 … {segments - 1}",
+            obstacle.segment,
+        )
+        _check_rest(obstacle, what, expect)
+        low = min(slab.low for slab in site.shapes.slabs(obstacle.asset_id, obstacle.pose))
+        expect(
+            FLOOR_M[0] <= low <= FLOOR_M[1],
+            "obstacle.floor",
+            f"{what}: lowest corner between {FLOOR_M[0]} and {FLOOR_M[1]} m",
+            f"{low:.4f} m",
+        )
+        prints.append(site.shapes.footprint(obstacle.asset_id, obstacle.pose))
+        _check_place(site, prints, number, what, expect)
+    physics = episode.physics
+    if episode.obstacles:
+        slowest = max(o.settle_s for o in episode.obstacles)
+        deepest = max(o.settle_penetration_m for o in episode.obstacles)
+        expect(physics.settle_s == slowest, "physics.settle", slowest, physics.settle_s)
+        expect(
+            physics.penetration_m == deepest,
+            "physics.penetration",
+            deepest,
+            physics.penetration_m,
+        )
+    expect(bool(physics.engine and physics.build), "physics.engine", "a name and a build", physics)
+    return [plan for plans in prints for plan in plans]
+
+
+def _check_asset(site: Site, obstacle: Obstacle, what: str, expect: Expect) -> None:
+    asset = site.shapes.assets[obstacle.asset_id]
+    expect(asset.spawnable, "obstacle.spawnable", f"{what}: a spawnable asset", "another")
+    for name in ("type", "mass_kg", "friction", "pushable", "pickable"):
+        stated, true = getattr(obstacle, name), getattr(asset, name)
+        expect(stated == true, f"obstacle.{name}", f"{what}: {true}", stated)
+
+
+def _check_rest(obstacle: Obstacle, what: str, expect: Expect) -> None:
+    expect(
+        0.0 <= obstacle.settle_s <= MAX_SETTLE_S,
+        "obstacle.settle",
+        f"{what}: at most {MAX_SETTLE_S} s",
+        obstacle.settle_s,
+    )
+    expect(
+        obstacle.settle_penetration_m <= MAX_PENETRATION_M,
+        "obstacle.penetration",
+        f"{what}: at most {MAX_PENETRATION_M} m",
+        obstacle.settle_penetration_m,
+    )
+    x, y, _, _ = obstacle.quaternion
+    length = math.hypot(*obstacle.quaternion)
+    # The turned z axis has the height 1 - 2 (x² + y²).
+    lean = 1.0 - 2.0 * (x * x + y * y) / (length * length)
+    tilt = math.degrees(math.acos(max(-1.0, min(1.0, lean))))
+    expect(
+        tilt <= MAX_TILT_DEG + TILT_SLACK_DEG,
+        "obstacle.upright",
+        f"{what}: within {MAX_TILT_DEG}°",
+        f"{tilt:.3f}°",
+    )
+
+
+def _check_place(
+    site: Site, prints: list[list[Geometry]], number: int, what: str, expect: Expect
+) -> None:
+    own = prints[number]
+    for plan in own:
+        beyond = shapely.area(shapely.difference(plan, site.outline))
+        expect(
+            beyond < DEPTH_M**2, "obstacle.inside", f"{what} inside the house", f"{beyond:.6f} m²"
+        )
+    hits = overlapping_plans(own, site.blockers)
+    expect(
+        not hits, "obstacle.overlap-house", f"{what} clear of the house", f"{len(hits)} overlaps"
+    )
+    for other in range(number):
+        hits = overlapping_plans(own, prints[other])
+        expect(
+            not hits,
+            "obstacle.overlap",
+            f"{what} clear of obstacle {other}",
+            f"{len(hits)} overlaps",
+        )

@@ -1,0 +1,86 @@
+"""Whether convex solids overlap in space: slabs first, a linear programme for what remains."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull, QhullError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+    from shapely import Geometry
+
+    from internav_data.verification.shapes import Slab
+
+    Floats = NDArray[np.float64]
+
+DEPTH_M = 0.001
+"""What overlaps by less is contact: poses are rounded to 0.1 mm."""
+
+
+def plans_overlap(first: Geometry, second: Geometry, depth_m: float = DEPTH_M) -> bool:
+    """Whether two plans share a disc of diameter `depth_m` (or more)."""
+    shared = shapely.intersection(first, second)
+    if shapely.area(shared) < np.pi * (depth_m / 2.0) ** 2:
+        return False
+    return not shapely.is_empty(shapely.buffer(shared, -depth_m / 2.0))
+
+
+def overlapping_plans(
+    first: Sequence[Geometry], second: Sequence[Geometry], depth_m: float = DEPTH_M
+) -> list[tuple[int, int]]:
+    """Pairs (index in first, index in second) of plans that overlap deeper than `depth_m`."""
+    if not first or not second:
+        return []
+    tree = shapely.STRtree(np.array(second, dtype=object))
+    near = tree.query(np.array(first, dtype=object), predicate="intersects")
+    return [(int(a), int(b)) for a, b in near.T if plans_overlap(first[a], second[b], depth_m)]
+
+
+def _half_spaces(corners: Floats) -> Floats:
+    return np.asarray(ConvexHull(corners).equations)
+
+
+def hulls_overlap(first: Floats, second: Floats, depth_m: float = DEPTH_M) -> bool:
+    """Whether a ball of diameter `depth_m` fits into both hulls of corners (n, 3) at once."""
+    try:
+        planes = np.vstack([_half_spaces(first), _half_spaces(second)])
+    except (QhullError, ValueError):  # a flat part has no inside
+        return False
+    # Normals have length one, so the last column is the ball's radius.
+    limits = np.column_stack([planes[:, :3], np.ones(len(planes))])
+    answer = linprog(
+        [0.0, 0.0, 0.0, -1.0],
+        A_ub=limits,
+        b_ub=-planes[:, 3],
+        bounds=[(None, None)] * 3 + [(0.0, None)],
+    )
+    return answer.x is not None and bool(answer.x[3] > depth_m / 2.0)
+
+
+def overlapping_slabs(
+    slabs: Sequence[Slab], owners: Sequence[int], depth_m: float = DEPTH_M
+) -> list[tuple[int, int]]:
+    """Pairs of owners (ascending) whose slabs overlap in space deeper than `depth_m`."""
+    if not slabs:
+        return []
+    plans = np.array([slab.plan for slab in slabs], dtype=object)
+    left, right = shapely.STRtree(plans).query(plans, predicate="intersects")
+    found: set[tuple[int, int]] = set()
+    for a, b in zip(left.tolist(), right.tolist(), strict=True):
+        pair = (owners[a], owners[b])
+        if pair[0] >= pair[1] or pair in found:
+            continue
+        one, two = slabs[a], slabs[b]
+        if min(one.high, two.high) - max(one.low, two.low) <= depth_m:
+            continue
+        if plans_overlap(one.plan, two.plan, depth_m) and hulls_overlap(
+            one.corners, two.corners, depth_m
+        ):
+            found.add(pair)
+    return sorted(found)

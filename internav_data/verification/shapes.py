@@ -1,0 +1,164 @@
+"""What things cover, derived again: hull edges cut by planes, shapely hulls of what is left.
+
+Shares no code with `internav_data.geometry`: corners, quaternions and clipping are written anew.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import combinations, product
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+import shapely
+from scipy.spatial import ConvexHull, QhullError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+    from shapely import Geometry
+
+    from internav_data.records import Asset, Part, Pose, Quaternion
+
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
+
+STEP_OVER_M = 0.02
+"""An agent steps over what is flatter."""
+AGENT_HEIGHT_M = 1.8
+"""An agent walks under what is higher."""
+SIDES = 16
+"""Cylinders are prisms of so many sides; so are the rings of spheres."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solid:
+    """One convex part in its asset's frame: corners (n, 3) metres, hull edges (m, 2) indices."""
+
+    corners: Floats
+    edges: Ints
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Slab:
+    """What one part covers of the floor, between which heights, and its corners (n, 3); metres."""
+
+    corners: Floats
+    plan: Geometry
+    low: float
+    high: float
+
+
+def turned(points: Floats, quaternion: Quaternion) -> Floats:
+    """Turn points (n, 3) by a quaternion: v + 2 w (q x v) + 2 q x (q x v), q normalised."""
+    x, y, z, w = np.asarray(quaternion, dtype=np.float64) / math.hypot(*quaternion)
+    axis = np.array([x, y, z])
+    once = np.cross(axis, points)
+    return np.asarray(points + 2.0 * w * once + 2.0 * np.cross(axis, once), dtype=np.float64)
+
+
+def _circle(radius_x: float, radius_y: float, z: float) -> list[tuple[float, float, float]]:
+    turns = [k * 2.0 * math.pi / SIDES for k in range(SIDES)]
+    return [(radius_x * math.cos(t), radius_y * math.sin(t), z) for t in turns]
+
+
+def _local_corners(part: Part) -> Floats:
+    a, b, c = (extent / 2.0 for extent in part.size)
+    if part.shape == "box":
+        corners = list(product((-a, a), (-b, b), (-c, c)))
+    elif part.shape == "cylinder":
+        corners = _circle(a, b, -c) + _circle(a, b, c)
+    elif part.shape == "sphere":
+        slant = math.sqrt(0.5)
+        corners = [(0.0, 0.0, -c), (0.0, 0.0, c), *_circle(a, b, 0.0)]
+        for side in (-1.0, 1.0):
+            corners += _circle(slant * a, slant * b, side * slant * c)
+    else:
+        corners = list(part.corners)
+    return np.array(corners, dtype=np.float64).reshape(-1, 3)
+
+
+def _hull_edges(corners: Floats) -> Ints:
+    """Pairs of corners joined by an edge of the triangulated hull, shape (m, 2)."""
+    try:
+        faces = ConvexHull(corners).simplices
+    except (QhullError, ValueError):  # flat: every pair of corners lies in the part
+        pairs = list(combinations(range(len(corners)), 2))
+    else:
+        pairs = sorted(
+            {tuple(sorted((f[a], f[b]))) for f in faces for a, b in ((0, 1), (1, 2), (2, 0))}
+        )
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+
+def solid_of(part: Part) -> Solid:
+    """Return the polyhedron of a part, in its asset's frame."""
+    corners = turned(_local_corners(part), part.rotation) + np.array(part.centre)
+    return Solid(corners, _hull_edges(corners))
+
+
+def _hull(points: Floats) -> Geometry:
+    return cast("Geometry", shapely.convex_hull(shapely.multipoints(points)))
+
+
+def plan_of(corners: Floats, edges: Ints, low: float, high: float) -> Geometry | None:
+    """Plan of a polyhedron between two heights (convex hull), None where it has none."""
+    z = corners[:, 2]
+    pieces = [corners[(z >= low) & (z <= high), :2]]
+    if z.min() < low or z.max() > high:
+        first, second = corners[edges[:, 0]], corners[edges[:, 1]]
+        for level in (low, high):
+            cut = (first[:, 2] - level) * (second[:, 2] - level) < 0.0
+            a, b = first[cut], second[cut]
+            share = ((level - a[:, 2]) / (b[:, 2] - a[:, 2]))[:, None]
+            pieces.append(a[:, :2] + share * (b[:, :2] - a[:, :2]))
+    points = np.vstack(pieces)
+    if len(points) == 0:
+        return None
+    return _hull(points)
+
+
+class Shapes:
+    """Footprints and slabs of assets at poses; hulls are worked out once for each asset."""
+
+    def __init__(self, assets: Mapping[str, Asset]) -> None:
+        self.assets = assets
+        self._solids: dict[str, tuple[Solid, ...]] = {}
+
+    def solids(self, asset_id: str) -> tuple[Solid, ...]:
+        """Return the polyhedra of an asset's parts, in its own frame."""
+        if asset_id not in self._solids:
+            self._solids[asset_id] = tuple(solid_of(p) for p in self.assets[asset_id].parts)
+        return self._solids[asset_id]
+
+    def _placed(self, asset_id: str, pose: Pose) -> list[tuple[Floats, Ints]]:
+        solids = self.solids(asset_id)
+        ends = np.cumsum([0, *(len(s.corners) for s in solids)])
+        moved = turned(np.vstack([s.corners for s in solids]), pose.quaternion)
+        moved += (pose.x, pose.y, pose.z)
+        return [(moved[ends[k] : ends[k + 1]], s.edges) for k, s in enumerate(solids)]
+
+    def footprint(self, asset_id: str, pose: Pose) -> list[Geometry]:
+        """Return what an asset puts in the agent's way: one convex plan for each part."""
+        if not self.assets[asset_id].blocks:
+            return []
+        plans = [
+            plan_of(corners, edges, STEP_OVER_M, AGENT_HEIGHT_M)
+            for corners, edges in self._placed(asset_id, pose)
+        ]
+        return [plan for plan in plans if plan is not None]
+
+    def slabs(self, asset_id: str, pose: Pose) -> list[Slab]:
+        """Return every part's plan at its full height, and the heights it spans."""
+        placed = self._placed(asset_id, pose)
+        return [
+            Slab(
+                corners,
+                _hull(corners[:, :2]),
+                float(corners[:, 2].min()),
+                float(corners[:, 2].max()),
+            )
+            for corners, _ in placed
+        ]

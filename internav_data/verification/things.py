@@ -1,0 +1,139 @@
+"""Predicates of what stands in a house: furniture, supports, clear doors, reachable rooms."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from shapely import Polygon, box
+
+from internav_data.verification.overlaps import DEPTH_M, overlapping_slabs, plans_overlap
+from internav_data.verification.shapes import Slab
+
+if TYPE_CHECKING:
+    from shapely import Geometry
+
+    from internav_data.records import Door, House
+    from internav_data.verification.findings import Collector
+    from internav_data.verification.ground import Ground
+    from internav_data.verification.shapes import Shapes
+
+DOOR_CLEAR_M = 0.65
+"""Free depth before a door, from the wall's face."""
+HALF_WALL_M = 0.06
+WALL_ID = -1
+
+
+def wall_slabs(house: House) -> list[Slab]:
+    """Return the walls as slabs."""
+    slabs = []
+    for w in house.walls:
+        plan = box(w.x_min, w.y_min, w.x_max, w.y_max)
+        flat = shapely.get_coordinates(plan)[:-1]
+        corners = np.vstack([np.column_stack([flat, np.full(4, z)]) for z in (w.z_min, w.z_max)])
+        slabs.append(Slab(corners, plan, w.z_min, w.z_max))
+    return slabs
+
+
+def check_things(
+    house: House, rooms: dict[int, Polygon], shapes: Shapes, report: Collector
+) -> None:
+    """Judge furniture: inside its room, nothing through walls or other things, held up."""
+    slabs: list[Slab] = []
+    owners: list[int] = []
+    for slab in wall_slabs(house):
+        slabs.append(slab)
+        owners.append(WALL_ID)
+    groups = {thing.thing_id: thing.group for thing in house.things}
+    own = {t.thing_id: shapes.slabs(t.asset_id, t.pose) for t in house.things}
+    for thing in house.things:
+        name = f"thing {thing.thing_id} ({thing.asset_id})"
+        asset = shapes.assets[thing.asset_id]
+        report.expect(thing.type == asset.type, "thing.type", f"{name}: {asset.type}", thing.type)
+        slabs += own[thing.thing_id]
+        owners += [thing.thing_id] * len(own[thing.thing_id])
+        room = rooms.get(thing.room)
+        plan = shapely.union_all([slab.plan for slab in own[thing.thing_id]])
+        if room is not None:
+            beyond = shapely.area(shapely.difference(plan, shapely.buffer(room, DEPTH_M)))
+            report.expect(
+                beyond < DEPTH_M**2,
+                "thing.room",
+                f"{name} in room {thing.room}",
+                f"{beyond:.6f} m²",
+            )
+        _check_support(house, thing.thing_id, own, report)
+    for a, b in overlapping_slabs(slabs, owners):
+        if a == WALL_ID or groups[a] < 0 or groups[a] != groups[b]:
+            what = "a wall" if a == WALL_ID else f"thing {a}"
+            report.expect(False, "thing.overlap", f"thing {b} clear of {what}", "an overlap")  # noqa: FBT003
+        # Things of one group may interlock, as a chair does under its table.
+    report.counts["predicates"] += len(house.things)
+
+
+def _check_support(
+    house: House, thing_id: int, own: dict[int, list[Slab]], report: Collector
+) -> None:
+    thing = next(t for t in house.things if t.thing_id == thing_id)
+    low = min(slab.low for slab in own[thing_id])
+    if thing.support < 0:
+        report.expect(
+            low > -DEPTH_M, "thing.support", f"thing {thing_id} on or above the floor", low
+        )
+        return
+    plan = shapely.union_all([slab.plan for slab in own[thing_id]])
+    held = any(
+        abs(slab.high - low) < DEPTH_M and shapely.intersects(slab.plan, plan)
+        for slab in own.get(thing.support, [])
+    )
+    report.expect(
+        held, "thing.support", f"thing {thing_id} standing on thing {thing.support}", "in the air"
+    )
+
+
+def _before(door: Door) -> Geometry:
+    """Rectangle that must stay free on both sides of a door."""
+    turn = math.radians(door.yaw_deg)
+    ux, uy = math.cos(turn), math.sin(turn)
+    half, deep = door.width_m / 2.0, HALF_WALL_M + DOOR_CLEAR_M
+    return Polygon(
+        [
+            (door.x + a * half * ux - b * deep * uy, door.y + a * half * uy + b * deep * ux)
+            for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))
+        ]
+    )
+
+
+def check_ways_through(
+    house: House,
+    rooms: dict[int, Polygon],
+    prints: dict[int, list[Geometry]],
+    ground: Ground,
+    report: Collector,
+) -> None:
+    """Judge that doors are clear of furniture and every room can be walked to."""
+    for door in house.doors:
+        if not door.open:
+            continue
+        for thing_id, plans in prints.items():
+            blocked = any(plans_overlap(_before(door), plan) for plan in plans)
+            if blocked:
+                report.expect(
+                    False,  # noqa: FBT003 - reached only where it fails
+                    "house.door-clear",
+                    f"0.65 m free before door {door.door_id}",
+                    f"thing {thing_id}",
+                )
+        report.counts["predicates"] += 1
+    labels = ground.components()
+    points = ground.points()
+    main = np.bincount(labels[labels >= 0]).argmax() if (labels >= 0).any() else -1
+    joined = points[labels == main] if main >= 0 else points[:0]
+    for room_id, room in rooms.items():
+        shapely.prepare(room)
+        inside = shapely.intersects_xy(room, joined[:, 0], joined[:, 1])
+        report.expect(
+            inside.any(), "house.reachable", f"room {room_id} reachable by the agent", "cut off"
+        )
