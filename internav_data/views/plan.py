@@ -1,0 +1,245 @@
+"""Houses and episodes from above: what `internav-gen show` draws, after the paper's figure 4."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from internav_data.geometry import HIGHEST_M
+from internav_data.views.canvas import OVERSAMPLING, Canvas
+from internav_data.views.captions import with_caption
+from internav_data.views.floors import paint_floor
+from internav_data.views.silhouettes import outlines, paint
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Sequence
+
+    from numpy.typing import NDArray
+
+    from internav_data.records import RGB, Door, House, Room, Vec2, Wall, Window
+
+    Floats = NDArray[np.float64]
+    Image = NDArray[np.uint8]
+
+PAPER: RGB = (250, 249, 246)
+INK: RGB = (52, 54, 62)
+TINT: RGB = (58, 128, 246)
+_WALL: RGB = (66, 68, 78)
+_BREAST: RGB = (126, 130, 140)
+_THRESHOLD: RGB = (222, 205, 178)
+_PANE: RGB = (176, 216, 240)
+_ENTRANCE: RGB = (176, 62, 48)
+_LABEL: RGB = (70, 66, 62)
+_MARGIN_M = 0.75
+_WALL_M = 0.12
+_OVERHEAD_M = 1.95
+"""What hangs wholly above this is left out: it would hide what stands below."""
+
+
+def draw_house(house: House, *, pixels: int = 900, caption: bool = True) -> Image:
+    """Draw a house from above, north (y) up.
+
+    Parameters
+    ----------
+    house
+        What to draw; `house.assets` says what its things are made of.
+    pixels
+        Longer side of the plan; the caption is added below it.
+    caption
+        Whether to say below which house this is.
+
+    Returns
+    -------
+    (h, w, 3) uint8 RGB.
+    """
+    canvas = house_canvas(house, pixels)
+    paint_house(canvas, house)
+    paint_labels(canvas, house, taken=[])
+    if not caption:
+        return canvas.finished()
+    return with_caption(canvas.finished(), [house_line(house)], [])
+
+
+def house_line(house: House) -> str:
+    """Return one line about a house, as written below its picture."""
+    count = len(house.rooms)
+    rooms = "1 room" if count == 1 else f"{count} rooms"
+    parts = [house.scene_id, rooms, f"{house.area_m2:.0f} m2", f"{len(house.things)} things"]
+    return "   ".join([*parts, house.split, house.preset])
+
+
+def house_canvas(house: House, pixels: int) -> Canvas:
+    """Return an empty canvas around a house."""
+    xs, ys = [p[0] for p in house.outline], [p[1] for p in house.outline]
+    low = (min(xs) - _MARGIN_M, min(ys) - _MARGIN_M)
+    high = (max(xs) + _MARGIN_M, max(ys) + _MARGIN_M)
+    return Canvas(low, high, pixels, PAPER)
+
+
+def paint_house(canvas: Canvas, house: House, on_way: Collection[int] | None = None) -> None:
+    """Paint floors, shadows, things, walls, windows and doors, in this order.
+
+    Where rooms `on_way` are given these are tinted, and the other rooms' floors pale.
+    """
+    for room in house.rooms:
+        paint_floor(canvas, house, room)
+    for room in house.rooms:
+        if on_way is not None:
+            colour, strength = (TINT, 0.13) if room.room_id in on_way else (PAPER, 0.55)
+            canvas.blend(canvas.mask([room.polygon]), colour, strength)
+    seen = [
+        outline
+        for thing in house.things
+        for outline in outlines(house.assets[thing.asset_id], thing.pose)
+        if outline.low_m < _OVERHEAD_M
+    ]
+    solid = [_rectangle(w) for w in house.walls if w.z_min < HIGHEST_M and w.z_max > HIGHEST_M]
+    _shadow(canvas, solid, 0.09, 0.34)
+    _shadow(canvas, [o.plan for o in seen if o.top_m > 0.05], 0.05, 0.30)
+    paint(canvas, seen, line_px=1.0, colour=None)
+    for wall in house.walls:
+        if wall.z_min < HIGHEST_M and wall.z_max <= HIGHEST_M:
+            canvas.fill(_rectangle(wall), _BREAST)
+    for rectangle in solid:
+        canvas.fill(rectangle, _WALL)
+    for door in house.doors:
+        _paint_door(canvas, house, door)
+    for window in house.windows:
+        _paint_window(canvas, window)
+    _paint_scale(canvas, house)
+
+
+def _rectangle(wall: Wall) -> list[Vec2]:
+    return [
+        (wall.x_min, wall.y_min),
+        (wall.x_max, wall.y_min),
+        (wall.x_max, wall.y_max),
+        (wall.x_min, wall.y_max),
+    ]
+
+
+def _shadow(
+    canvas: Canvas, shapes: Sequence[Sequence[Vec2] | Floats], reach: float, strength: float
+) -> None:
+    """Darken the floor around shapes, softly, as light from the upper left would leave it."""
+    if not shapes:
+        return
+    moved = [np.asarray(s) + np.array([reach * 0.5, -reach * 0.5]) for s in shapes]
+    width = max(1.0, reach * canvas.scale * OVERSAMPLING)
+    mask = cv2.GaussianBlur(canvas.mask(moved), (0, 0), sigmaX=width * 0.8)
+    canvas.blend(np.asarray(mask, np.uint8), (40, 34, 30), strength)
+
+
+def _frame(x: float, y: float, yaw_deg: float) -> Floats:
+    """Along and across unit vectors of a wall and a point on it, shape (3, 2)."""
+    turn = math.radians(yaw_deg)
+    along = (math.cos(turn), math.sin(turn))
+    return np.array([along, (-along[1], along[0]), (x, y)])
+
+
+def _band(frame: Floats, width: float, depth: float, shift: float = 0.0) -> Floats:
+    """Rectangle (4, 2) along a wall, moved across it by `shift`."""
+    along, across, at = frame
+    a, d = along * width / 2.0, across * depth / 2.0
+    centre = at + across * shift
+    return np.array([centre - a - d, centre + a - d, centre + a + d, centre - a + d])
+
+
+def _paint_door(canvas: Canvas, house: House, door: Door) -> None:
+    frame = _frame(door.x, door.y, door.yaw_deg)
+    along, across, at = frame
+    half = along * door.width_m / 2.0
+    if door.open:
+        if door.kind != "opening":
+            canvas.fill(_band(frame, door.width_m, _WALL_M), _THRESHOLD)
+            for side in (-1.0, 1.0):
+                edge = at + across * side * _WALL_M / 2.0
+                canvas.line(np.array([edge - half, edge + half]), (176, 158, 132), 0.8)
+        return
+    canvas.fill(_band(frame, door.width_m, _WALL_M * 0.9), (150, 104, 70))
+    canvas.line(_band(frame, door.width_m, _WALL_M), _ENTRANCE, 1.4, closed=True)
+    inward = 1.0 if _in_some_room(house, at + across * 0.3) else -1.0
+    inwards, aside = across * inward, along * 0.16
+    tip = at - inwards * 0.14
+    canvas.fill(
+        np.array([tip, tip - inwards * 0.24 + aside, tip - inwards * 0.24 - aside]), _ENTRANCE
+    )
+    canvas.line(np.array([tip - inwards * 0.44, tip - inwards * 0.2]), _ENTRANCE, 2.0)
+
+
+def _in_some_room(house: House, point: Floats) -> bool:
+    polygon = np.asarray(house.outline, dtype=np.float32).reshape(-1, 1, 2)
+    place = (float(point[0]), float(point[1]))
+    return bool(cv2.pointPolygonTest(polygon, place, measureDist=False) >= 0)
+
+
+def _paint_window(canvas: Canvas, window: Window) -> None:
+    frame = _frame(window.x, window.y, window.yaw_deg)
+    canvas.fill(_band(frame, window.width_m, _WALL_M), (245, 248, 250))
+    canvas.fill(_band(frame, window.width_m, _WALL_M * 0.4), _PANE)
+    canvas.line(_band(frame, window.width_m, _WALL_M), _WALL, 0.8, closed=True)
+
+
+def _paint_scale(canvas: Canvas, house: House) -> None:
+    """Draw a bar of two metres below the house."""
+    x, y = min(p[0] for p in house.outline), min(p[1] for p in house.outline) - 0.45
+    for k, colour in ((0, INK), (1, PAPER)):
+        canvas.fill([(x + k, y), (x + k + 1, y), (x + k + 1, y + 0.09), (x + k, y + 0.09)], colour)
+    canvas.line([(x, y), (x + 2, y), (x + 2, y + 0.09), (x, y + 0.09)], INK, 1.0, closed=True)
+    canvas.text((x + 2.12, y + 0.045), "2 m", 8.0, INK, anchor="left")
+
+
+def paint_labels(canvas: Canvas, house: House, taken: Sequence[Floats]) -> None:
+    """Write each room's name and area where it hides least.
+
+    Parameters
+    ----------
+    canvas, house
+        A painted house.
+    taken
+        Further shapes (n, 2) to stay clear of.
+    """
+    busy = [
+        o.plan
+        for thing in house.things
+        for o in outlines(house.assets[thing.asset_id], thing.pose)
+        if o.top_m > 0.05
+    ]
+    blocked = canvas.mask([*busy, *taken])
+    for room in house.rooms:
+        _label_room(canvas, room, blocked)
+
+
+def _label_room(canvas: Canvas, room: Room, blocked: Image) -> None:
+    name, area = room.type.replace("_", " "), f"{room.area_m2:.1f} m2"
+    xs, ys = [p[0] for p in room.polygon], [p[1] for p in room.polygon]
+    window = canvas.window((min(xs), min(ys)), (max(xs), max(ys)))
+    free = (canvas.mask([room.polygon])[window] > 127) & (blocked[window] == 0)
+    x, y = canvas.metres(window)
+    height = 9.5
+    while height > 6.0 and canvas.text_width(name, height) > 0.8 * (max(xs) - min(xs)):
+        height -= 0.5
+    size = (
+        max(canvas.text_width(name, height), canvas.text_width(area, height * 0.8)),
+        3.2 * height / canvas.scale,
+    )
+    at = _quietest(free.astype(np.float32), x, y, size)
+    gap = 0.85 * height / canvas.scale
+    canvas.text((at[0], at[1] + gap), name, height, _LABEL, halo=PAPER)
+    canvas.text((at[0], at[1] - gap), area, height * 0.8, _LABEL, halo=PAPER)
+
+
+def _quietest(free: NDArray[np.float32], x: Floats, y: Floats, size: Vec2) -> Vec2:
+    """Return the centre of the box of a given size that covers most free floor."""
+    step = abs(float(x[1] - x[0]))
+    box = (max(1, round(size[0] / step)) | 1, max(1, round(size[1] / step)) | 1)
+    cover = cv2.boxFilter(free, -1, box, borderType=cv2.BORDER_CONSTANT)
+    # Among equals the spot nearest to the middle of the room is the natural one.
+    rows = np.linspace(-1.0, 1.0, len(y))[:, None]
+    columns = np.linspace(-1.0, 1.0, len(x))[None, :]
+    score = cover - 0.04 * (rows * rows + columns * columns)
+    row, column = np.unravel_index(int(np.argmax(score)), score.shape)
+    return float(x[column]), float(y[row])

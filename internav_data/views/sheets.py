@@ -1,0 +1,108 @@
+"""Pictures side by side, and pictures on disk."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from internav_data.records.errors import InternavError, UsageError
+from internav_data.views.canvas import Canvas
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from internav_data.records import RGB
+
+    Image = NDArray[np.uint8]
+
+_PAPER: RGB = (250, 249, 246)
+_INK: RGB = (52, 54, 62)
+_GAP_PX = 8
+_LABEL_PX = 20
+
+
+def contact_sheet(
+    images: Sequence[Image], columns: int, labels: Sequence[str] | None = None
+) -> Image:
+    """Lay pictures out in rows, each centred in a cell of the largest one's size.
+
+    Parameters
+    ----------
+    images
+        (h, w, 3) uint8 RGB each, of any sizes.
+    columns
+        Pictures a row.
+    labels
+        ASCII text below each picture.
+
+    Raises
+    ------
+    UsageError
+        Without pictures or columns, or with another number of labels than pictures.
+    """
+    if not images or columns < 1:
+        raise UsageError(
+            f"a contact sheet needs at least one picture and one column, got {len(images)} "
+            f"pictures and {columns} columns"
+        )
+    if labels is not None and len(labels) != len(images):
+        raise UsageError(f"{len(images)} pictures need as many labels, got {len(labels)}")
+    cell_h = max(image.shape[0] for image in images) + (_LABEL_PX if labels is not None else 0)
+    cell_w = max(image.shape[1] for image in images)
+    rows = -(-len(images) // columns)
+    columns = min(columns, len(images))
+    sheet: Image = np.empty(
+        (rows * (cell_h + _GAP_PX) + _GAP_PX, columns * (cell_w + _GAP_PX) + _GAP_PX, 3), np.uint8
+    )
+    sheet[:] = _PAPER
+    for k, image in enumerate(images):
+        height, width = image.shape[:2]
+        left = _GAP_PX + (k % columns) * (cell_w + _GAP_PX)
+        top = _GAP_PX + (k // columns) * (cell_h + _GAP_PX)
+        space = cell_h - (_LABEL_PX if labels is not None else 0) - height
+        row, column = top + space // 2, left + (cell_w - width) // 2
+        sheet[row : row + height, column : column + width] = image
+        if labels is not None:
+            below = top + cell_h - _LABEL_PX
+            sheet[below : below + _LABEL_PX, left : left + cell_w] = _label(labels[k], cell_w)
+    return sheet
+
+
+def _label(text: str, width: int) -> Image:
+    strip = Canvas((0.0, 0.0), (float(width), float(_LABEL_PX)), max(width, _LABEL_PX), _PAPER)
+    strip.text((width / 2.0, _LABEL_PX / 2.0), text, 8.0, _INK)
+    return strip.finished()[:_LABEL_PX, :width]
+
+
+def write_png(path: Path, image: Image) -> None:
+    """Write an RGB picture; the file appears whole or not at all.
+
+    Raises
+    ------
+    InternavError
+        If the file cannot be written.
+    """
+    path = Path(path)
+    good, data = cv2.imencode(".png", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
+    if not good:
+        raise InternavError(f"{path}: a picture of shape {image.shape} cannot be written as PNG")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, part = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    except OSError as error:
+        raise InternavError(f"{path}: cannot be written: {error.strerror}") from error
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data.tobytes())
+        Path(part).chmod(0o644)
+        Path(part).replace(path)
+    except OSError as error:
+        Path(part).unlink(missing_ok=True)
+        raise InternavError(f"{path}: cannot be written: {error.strerror}") from error

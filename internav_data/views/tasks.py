@@ -1,0 +1,211 @@
+"""One episode from above: obstacles in yellow, start, goal and the ways between them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from internav_data.records.errors import UsageError
+from internav_data.views.captions import with_caption
+from internav_data.views.plan import INK, PAPER, TINT, house_canvas, paint_house, paint_labels
+from internav_data.views.silhouettes import Outline, outlines, paint, shaded
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from internav_data.records import RGB, Asset, Episode, House, Obstacle, Vec2
+    from internav_data.views.canvas import Canvas
+
+    Floats = NDArray[np.float64]
+    Image = NDArray[np.uint8]
+
+PUSHABLE: RGB = (255, 211, 38)
+PICKABLE: RGB = (255, 238, 130)
+FIXED: RGB = (228, 150, 20)
+START: RGB = (40, 148, 84)
+GOAL: RGB = (36, 104, 214)
+_PATH: RGB = (150, 70, 150)
+_WAY: RGB = (36, 104, 214)
+_RADIUS_M = 0.2
+"""Of the agent's disc."""
+_SMALL_M = 0.3
+"""Obstacles smaller than this are ringed: an apple is three pixels wide."""
+
+
+def draw_episode(
+    house: House,
+    episode: Episode,
+    assets: Mapping[str, Asset] | None = None,
+    *,
+    pixels: int = 900,
+    way: Floats | None = None,
+) -> Image:
+    """Draw an episode from above, north (y) up, with a legend and a caption.
+
+    Parameters
+    ----------
+    house
+        The house that the episode plays in.
+    episode
+        What to draw.
+    assets
+        What the obstacles are made of, by asset_id; those of the house are known already.
+    pixels
+        Longer side of the plan; legend and caption are added below it.
+    way
+        Any-angle way to draw, shape (n, 2), metres.
+
+    Returns
+    -------
+    (h, w, 3) uint8 RGB.
+
+    Raises
+    ------
+    UsageError
+        If the episode belongs to another house, or an obstacle's asset is not known.
+    """
+    if episode.scene_id != house.scene_id:
+        raise UsageError(
+            f"episode {episode.episode_id} plays in {episode.scene_id}, not in {house.scene_id}; "
+            "pass the house that `dataset.scene(episode.scene_id)` returns"
+        )
+    known = {**house.assets, **(assets or {})}
+    shapes = [_outlines(obstacle, known) for obstacle in episode.obstacles]
+    canvas = house_canvas(house, pixels)
+    on_way = episode.room_paths[0] if episode.room_paths else ()
+    paint_house(canvas, house, on_way)
+    for k, path in enumerate(episode.node_paths):
+        if k == 0:
+            canvas.dashes(path.points, _PATH, 2.0, 0.14)
+    if way is not None and len(way) > 1:
+        canvas.line(way, _WAY, 1.6)
+    for obstacle, parts in zip(episode.obstacles, shapes, strict=True):
+        _paint_obstacle(canvas, obstacle, parts)
+    _paint_start(canvas, episode)
+    _paint_goal(canvas, episode)
+    taken = [p.plan for parts in shapes for p in parts]
+    taken += [canvas.arc(at, 0.45, 0.0, 360.0) for at in _ends(episode)]
+    paint_labels(canvas, house, taken)
+    for number, (obstacle, parts) in enumerate(zip(episode.obstacles, shapes, strict=True), 1):
+        _paint_number(canvas, number, obstacle, parts)
+    return with_caption(canvas.finished(), episode_lines(episode), _legend(episode))
+
+
+def episode_lines(episode: Episode) -> list[str]:
+    """Return what is written below an episode's picture: its figures, then its obstacles."""
+    mode = f"{episode.mode}, {'sealed' if episode.sealed else 'passable off the grid'}"
+    if episode.mode == "lengthened":
+        mode = episode.mode
+    steps = "no way" if episode.steps is None else f"{episode.steps} steps"
+    way = "no way" if episode.way_m is None else f"{episode.way_m:.2f} m"
+    first = [
+        episode.episode_id,
+        mode,
+        f"clear {episode.clear_steps} steps, {episode.clear_m:.2f} m",
+        f"with obstacles {steps}, {way}",
+    ]
+    things = [
+        f"{k} {o.type} {o.mass_kg:.1f} kg ({_kind(o)})" for k, o in enumerate(episode.obstacles, 1)
+    ]
+    return ["   ".join(first), "   ".join(things)] if things else ["   ".join(first)]
+
+
+def _ends(episode: Episode) -> tuple[Vec2, Vec2]:
+    return (episode.start.x, episode.start.y), (episode.goal.x, episode.goal.y)
+
+
+def _kind(obstacle: Obstacle) -> str:
+    if obstacle.pickable:
+        return "pick"
+    return "push" if obstacle.pushable else "fixed"
+
+
+def _colour(obstacle: Obstacle) -> RGB:
+    return {"pick": PICKABLE, "push": PUSHABLE, "fixed": FIXED}[_kind(obstacle)]
+
+
+def _legend(episode: Episode) -> list[tuple[RGB, str]]:
+    kinds = {_kind(o) for o in episode.obstacles}
+    entries = [(START, "start"), (GOAL, "goal"), (TINT, "shortest room path"), (_PATH, "node path")]
+    names = {"push": "pushable", "pick": "pickable", "fixed": "fixed"}
+    colours = {"push": PUSHABLE, "pick": PICKABLE, "fixed": FIXED}
+    return entries + [(colours[k], f"{names[k]} obstacle") for k in names if k in kinds]
+
+
+def _outlines(obstacle: Obstacle, assets: Mapping[str, Asset]) -> list[Outline]:
+    asset = assets.get(obstacle.asset_id)
+    if asset is None:
+        raise UsageError(
+            f"obstacle {obstacle.asset_id}: its asset is not known; pass the dataset's assets or "
+            "the catalogue that the episode was made with"
+        )
+    return outlines(asset, obstacle.pose)
+
+
+def _paint_obstacle(canvas: Canvas, obstacle: Obstacle, parts: list[Outline]) -> None:
+    colour = _colour(obstacle)
+    for part in parts:  # a dark rim around the whole thing
+        canvas.line(part.plan, (48, 36, 8), 3.4, closed=True)
+    paint(canvas, parts, line_px=0.8, colour=colour)
+    if _kind(obstacle) == "fixed":
+        _hatch(canvas, parts)
+    low, high = _extent(parts)
+    if float((high - low).max()) < _SMALL_M:
+        middle = (low + high) / 2.0
+        canvas.disc((float(middle[0]), float(middle[1])), 0.16, (48, 36, 8), 2.6)
+        canvas.disc((float(middle[0]), float(middle[1])), 0.16, colour, 1.2)
+
+
+def _hatch(canvas: Canvas, parts: list[Outline]) -> None:
+    """Diagonal lines over what cannot be moved."""
+    mask = canvas.mask([p.plan for p in parts])
+    low, high = _extent(parts)
+    window = canvas.window((float(low[0]), float(low[1])), (float(high[0]), float(high[1])))
+    x, y = canvas.metres(window)
+    lines = np.zeros_like(mask)
+    lines[window] = np.where((x[None, :] + y[:, None]) % 0.12 < 0.03, 255, 0)
+    canvas.blend(np.minimum(mask, lines), (70, 44, 0), 0.7)
+
+
+def _extent(parts: list[Outline]) -> tuple[Floats, Floats]:
+    corners = np.vstack([p.plan for p in parts])
+    return corners.min(axis=0), corners.max(axis=0)
+
+
+def _paint_number(canvas: Canvas, number: int, obstacle: Obstacle, parts: list[Outline]) -> None:
+    """Put a badge on the obstacle, or beside it where it would hide it."""
+    low, high = _extent(parts)
+    at = (low + high) / 2.0
+    radius = 6.5 / canvas.scale
+    if float((high - low).max()) < 4.0 * radius:
+        at = np.array([high[0] + 1.2 * radius, high[1] + 1.2 * radius])
+    centre = (float(at[0]), float(at[1]))
+    canvas.disc(centre, radius, INK)
+    canvas.disc(centre, radius, _colour(obstacle), 1.0)
+    canvas.text(centre, str(number), 6.5, PAPER)
+
+
+def _paint_start(canvas: Canvas, episode: Episode) -> None:
+    at = (episode.start.x, episode.start.y)
+    turn = math.radians(episode.start.yaw_deg)
+    ahead = np.array([math.cos(turn), math.sin(turn)])
+    left = np.array([-ahead[1], ahead[0]])
+    tip = np.array(at)
+    canvas.disc(at, _RADIUS_M, START)
+    canvas.disc(at, _RADIUS_M, shaded(START, 0.6), 1.4)
+    arrow = [tip + 0.34 * ahead, tip - 0.1 * ahead + 0.13 * left, tip - 0.04 * ahead]
+    arrow.append(tip - 0.1 * ahead - 0.13 * left)
+    canvas.fill(np.array(arrow), PAPER)
+    canvas.line(np.array(arrow), shaded(START, 0.5), 1.0, closed=True)
+
+
+def _paint_goal(canvas: Canvas, episode: Episode) -> None:
+    at = (episode.goal.x, episode.goal.y)
+    canvas.disc(at, _RADIUS_M, GOAL)
+    canvas.disc(at, _RADIUS_M * 0.62, PAPER, 1.4)
+    canvas.disc(at, _RADIUS_M * 0.3, PAPER)
+    canvas.disc(at, _RADIUS_M, shaded(GOAL, 0.6), 1.4)
