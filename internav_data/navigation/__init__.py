@@ -1,1 +1,17 @@
-"""navigation."""
+"""Where the agent can stand, and how far it is: lattice, any-angle ways, room and node paths."""
+
+from internav_data.navigation.agent import CLEARANCE_M, RADIUS_M, SPACING_M, TOLERANCE_M
+from internav_data.navigation.lattice import Lattice
+from internav_data.navigation.rooms import PATHS_AT_MOST, node_paths, room_of, room_paths
+
+__all__ = [
+    "CLEARANCE_M",
+    "PATHS_AT_MOST",
+    "RADIUS_M",
+    "SPACING_M",
+    "TOLERANCE_M",
+    "Lattice",
+    "node_paths",
+    "room_of",
+    "room_paths",
+]

@@ -1,0 +1,229 @@
+"""Numba kernels of the lattice: who blocks which node and edge, and steps between nodes.
+
+One array holds everything: blockers (3, nx, ny) int32 counts what stands in the way of node
+(i, j) [0], of its edge to (i + 1, j) [1] and of its edge to (i, j + 1) [2]. Edges that leave the
+lattice are blocked for good; that border is what lets the searches skip all bounds checks: an
+index before the first row wraps round to the last one, whose outgoing edges are closed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numba import njit
+
+from internav_data.geometry.planar import (
+    cross,
+    point_polygon_distance,
+    segment_polygon_distance,
+    segments_cross,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Counts = NDArray[np.int32]
+    Ints = NDArray[np.int64]
+
+NODE, EAST, NORTH = 0, 1, 2
+
+
+@njit(cache=True)
+def mark(  # noqa: C901, PLR0912 - one pass over a window, spelt out for speed
+    blockers: Counts,
+    vertices: Floats,
+    offsets: Ints,
+    spacing: float,
+    radius: float,
+    step: int,
+) -> None:
+    """Add `step` to the count of every node and edge on which a disc comes too near a polygon.
+
+    Each polygon costs only the window of nodes around its bounding box.
+    """
+    nx, ny = blockers.shape[1], blockers.shape[2]
+    for k in range(len(offsets) - 1):
+        start, stop = offsets[k], offsets[k + 1]
+        if stop == start:
+            continue
+        low_x = high_x = vertices[start, 0]
+        low_y = high_y = vertices[start, 1]
+        for v in range(start + 1, stop):
+            low_x, high_x = min(low_x, vertices[v, 0]), max(high_x, vertices[v, 0])
+            low_y, high_y = min(low_y, vertices[v, 1]), max(high_y, vertices[v, 1])
+        # One node more on each side: its edge may reach the window though it does not.
+        i0 = max(0, math.floor((low_x - radius) / spacing))
+        i1 = min(nx - 1, math.ceil((high_x + radius) / spacing))
+        j0 = max(0, math.floor((low_y - radius) / spacing))
+        j1 = min(ny - 1, math.ceil((high_y + radius) / spacing))
+        if i0 > i1 or j0 > j1:
+            continue
+        distance = np.empty((i1 - i0 + 1, j1 - j0 + 1))
+        for i in range(i0, i1 + 1):
+            for j in range(j0, j1 + 1):
+                d = point_polygon_distance(i * spacing, j * spacing, vertices, start, stop)
+                distance[i - i0, j - j0] = d
+                if d < radius:
+                    blockers[NODE, i, j] += step
+        for i in range(i0, i1 + 1):
+            for j in range(j0, j1 + 1):
+                here = distance[i - i0, j - j0]
+                for way in (EAST, NORTH):
+                    a, b = (i + 1, j) if way == EAST else (i, j + 1)
+                    if a > i1 or b > j1:
+                        continue
+                    there = distance[a - i0, b - j0]
+                    blocked = here < radius or there < radius
+                    # Distance changes by at most the way gone: far ends make a far edge.
+                    if not blocked and here + there < 2.0 * radius + spacing:
+                        x, y, e, f = i * spacing, j * spacing, a * spacing, b * spacing
+                        d = segment_polygon_distance(x, y, e, f, vertices, start, stop)
+                        blocked = d < radius
+                    if blocked:
+                        blockers[way, i, j] += step
+
+
+@njit(cache=True)
+def in_outline(x: float, y: float, outline: Floats) -> bool:
+    """Whether a point lies in or on a simple polygon (n, 2)."""
+    odd = False
+    previous = len(outline) - 1
+    for k in range(len(outline)):
+        ax, ay = outline[previous, 0], outline[previous, 1]
+        bx, by = outline[k, 0], outline[k, 1]
+        side = cross(bx - ax, by - ay, x - ax, y - ay)
+        if side == 0.0 and min(ax, bx) <= x <= max(ax, bx) and min(ay, by) <= y <= max(ay, by):
+            return True
+        if (ay > y) != (by > y) and (side > 0.0) == (by > ay):
+            odd = not odd
+        previous = k
+    return odd
+
+
+@njit(cache=True)
+def close_outside(  # noqa: C901 - nodes, then edges
+    blockers: Counts, outline: Floats, spacing: float
+) -> None:
+    """Block for good what lies outside the outline, crosses it or leaves the lattice."""
+    nx, ny = blockers.shape[1], blockers.shape[2]
+    blockers[EAST, nx - 1, :] += 1
+    blockers[NORTH, :, ny - 1] += 1
+    for i in range(nx):
+        for j in range(ny):
+            if not in_outline(i * spacing, j * spacing, outline):
+                blockers[:, i, j] += 1
+                if i > 0:
+                    blockers[EAST, i - 1, j] += 1
+                if j > 0:
+                    blockers[NORTH, i, j - 1] += 1
+    previous = len(outline) - 1
+    for k in range(len(outline)):
+        ax, ay = outline[previous, 0], outline[previous, 1]
+        bx, by = outline[k, 0], outline[k, 1]
+        i0 = max(0, math.floor(min(ax, bx) / spacing))
+        i1 = min(nx - 1, math.ceil(max(ax, bx) / spacing))
+        j0 = max(0, math.floor(min(ay, by) / spacing))
+        j1 = min(ny - 1, math.ceil(max(ay, by) / spacing))
+        for i in range(i0, i1 + 1):
+            for j in range(j0, j1 + 1):
+                x, y = i * spacing, j * spacing
+                if segments_cross(x, y, x + spacing, y, ax, ay, bx, by):
+                    blockers[EAST, i, j] += 1
+                if segments_cross(x, y, x, y + spacing, ax, ay, bx, by):
+                    blockers[NORTH, i, j] += 1
+        previous = k
+
+
+@njit(cache=True)
+def _spread(
+    blockers: Counts, steps: Counts, queue: Counts, first: int, value: int, stride: int
+) -> int:
+    """Flood from one node over open edges; each node gets its source's value + stride.
+
+    Returns how many nodes were reached; they are the head of `queue`, nearest first.
+    """
+    ny = blockers.shape[2]
+    east = blockers[EAST].ravel()
+    north = blockers[NORTH].ravel()
+    flat = steps.ravel()
+    flat[first] = value
+    queue[0] = first
+    head, tail = 0, 1
+    while head < tail:
+        k = queue[head]
+        head += 1
+        following = flat[k] + stride
+        # k - ny and k - 1 wrap round before the first node: see the module's docstring.
+        if east[k] == 0 and flat[k + ny] < 0:
+            flat[k + ny] = following
+            queue[tail] = k + ny
+            tail += 1
+        if east[k - ny] == 0 and flat[k - ny] < 0:
+            flat[k - ny] = following
+            queue[tail] = k - ny
+            tail += 1
+        if north[k] == 0 and flat[k + 1] < 0:
+            flat[k + 1] = following
+            queue[tail] = k + 1
+            tail += 1
+        if north[k - 1] == 0 and flat[k - 1] < 0:
+            flat[k - 1] = following
+            queue[tail] = k - 1
+            tail += 1
+    return tail
+
+
+@njit(cache=True)
+def steps_to(blockers: Counts, i: int, j: int) -> Counts:
+    """Count steps from every node to node (i, j), shape (nx, ny) int32; -1 where cut off."""
+    nx, ny = blockers.shape[1], blockers.shape[2]
+    steps = np.full((nx, ny), -1, dtype=np.int32)
+    if blockers[NODE, i, j] == 0:
+        _spread(blockers, steps, np.empty(nx * ny, dtype=np.int32), i * ny + j, 0, 1)
+    return steps
+
+
+@njit(cache=True)
+def components(blockers: Counts) -> Counts:
+    """Component of every node (nx, ny) int32, numbered by their first node; -1 where blocked."""
+    nx, ny = blockers.shape[1], blockers.shape[2]
+    labels = np.full((nx, ny), -1, dtype=np.int32)
+    queue = np.empty(nx * ny, dtype=np.int32)
+    count = 0
+    for k in range(nx * ny):
+        if blockers[NODE, k // ny, k % ny] == 0 and labels[k // ny, k % ny] < 0:
+            _spread(blockers, labels, queue, k, count, 0)
+            count += 1
+    return labels
+
+
+@njit(cache=True)
+def open_edge(blockers: Counts, i: int, j: int, way: int) -> bool:
+    """Whether a step can be made: way 0 to +x, 1 to +y, 2 to -x, 3 to -y."""
+    if way == 0:
+        return blockers[EAST, i, j] == 0
+    if way == 1:
+        return blockers[NORTH, i, j] == 0
+    if way == 2:  # noqa: PLR2004 - the third quarter turn
+        return i > 0 and blockers[EAST, i - 1, j] == 0
+    return j > 0 and blockers[NORTH, i, j - 1] == 0
+
+
+@njit(cache=True)
+def descend(blockers: Counts, steps: Counts, i: int, j: int) -> Ints:
+    """Nodes (n, 2) of a shortest path down a field of steps; straight on where it can."""
+    path = np.empty((steps[i, j] + 1, 2), dtype=np.int64)
+    way = 0
+    for k in range(len(path)):
+        path[k, 0], path[k, 1] = i, j
+        for turn in range(4):
+            candidate = (way + turn) % 4
+            a = i + (candidate == 0) - (candidate == 2)  # noqa: PLR2004
+            b = j + (candidate == 1) - (candidate == 3)  # noqa: PLR2004
+            if open_edge(blockers, i, j, candidate) and steps[a, b] == steps[i, j] - 1:
+                i, j, way = a, b, candidate
+                break
+    return path
