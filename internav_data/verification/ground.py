@@ -53,7 +53,7 @@ class Ground:
         self._xy = np.column_stack([i.ravel(), j.ravel()]) * SPACING_M
         shapely.prepare(outline)
         inside = shapely.intersects_xy(outline, self._xy[:, 0], self._xy[:, 1])
-        self._point_tree = shapely.STRtree(np.atleast_1d(shapely.points(self._xy)))
+        self._point_tree = shapely.STRtree(list(shapely.get_parts(shapely.multipoints(self._xy))))
         nodes = inside & ~self._near(self._point_tree, blockers, len(self._xy))
         number = np.arange(len(self._xy)).reshape(self.shape)
         pairs = np.vstack(
@@ -64,7 +64,9 @@ class Ground:
         )
         # A swept edge contains its ends: only edges between free nodes can be free.
         self._pairs = pairs[nodes[pairs].all(axis=1)]
-        self._edge_tree = shapely.STRtree(np.atleast_1d(shapely.linestrings(self._xy[self._pairs])))
+        self._edge_tree = shapely.STRtree(
+            list(shapely.get_parts(shapely.multilinestrings(self._xy[self._pairs])))
+        )
         edges = ~self._near(self._edge_tree, blockers, len(self._pairs))
         self.clear = Free(nodes, edges)
         self._distances: dict[int, NDArray[np.float64]] = {}
