@@ -1,1 +1,65 @@
-"""dataset."""
+"""Datasets on disk: schemas, shards, manifest, loader, statistics and dataset card."""
+
+from internav_data.dataset.commit import Identity, assemble, done_scenes, identity_of, open_work
+from internav_data.dataset.decode import from_table
+from internav_data.dataset.digest import logical_digest
+from internav_data.dataset.encode import to_table
+from internav_data.dataset.manifest import (
+    DataFile,
+    Manifest,
+    Quarantined,
+    has_manifest,
+    locate,
+    read_manifest,
+    write_manifest,
+)
+from internav_data.dataset.parquet import FileInfo, read_table, write_parquet
+from internav_data.dataset.tables import (
+    ASSETS,
+    EPISODES,
+    FORMAT_VERSION,
+    SCENES,
+    TABLES,
+    TableSpec,
+)
+from internav_data.dataset.work import (
+    SceneState,
+    finished_scenes,
+    read_scene_work,
+    work_dir,
+    write_quarantine,
+    write_scene_work,
+)
+
+__all__ = [
+    "ASSETS",
+    "EPISODES",
+    "FORMAT_VERSION",
+    "SCENES",
+    "TABLES",
+    "DataFile",
+    "FileInfo",
+    "Identity",
+    "Manifest",
+    "Quarantined",
+    "SceneState",
+    "TableSpec",
+    "assemble",
+    "done_scenes",
+    "finished_scenes",
+    "from_table",
+    "has_manifest",
+    "identity_of",
+    "locate",
+    "logical_digest",
+    "open_work",
+    "read_manifest",
+    "read_scene_work",
+    "read_table",
+    "to_table",
+    "work_dir",
+    "write_manifest",
+    "write_parquet",
+    "write_quarantine",
+    "write_scene_work",
+]

@@ -1,0 +1,222 @@
+"""The manifest: what a dataset is and which files it is made of. It is written last.
+
+A folder without `manifest.json` is no dataset; a reader opens exactly the files it names. It holds
+nothing of the machine, the clock or the number of workers, so the same configuration and seed
+give the same bytes.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any
+
+from internav_data.dataset.files import write_atomically
+from internav_data.dataset.tables import FORMAT_VERSION
+from internav_data.records.errors import CorruptDataError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from internav_data.records import Split
+
+MANIFEST = "manifest.json"
+_MAX_BYTES = 64 << 20
+_MAX_FILES = 100_000
+_MAX_FILE_BYTES = 1 << 40
+_MAX_ROWS = 1 << 40
+_AGAIN = "restore it from where the dataset came, or generate the dataset anew"
+
+
+@dataclass(frozen=True, slots=True)
+class DataFile:
+    """One Parquet file of a dataset."""
+
+    path: str
+    """Relative to the dataset's folder, with forward slashes."""
+    table: str
+    """episodes, scenes or assets."""
+    split: Split | None
+    """None for the assets, which all splits share."""
+    rows: int
+    bytes: int
+    sha256: str
+    """Of the file's bytes."""
+    logical_digest: str
+    """Of what the file says, whatever library wrote it (see the format's documentation)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quarantined:
+    """A scene that could not be built within the stated bounds."""
+
+    scene: int
+    scene_id: str
+    attempts: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """How much one split holds."""
+
+    scenes: int
+    episodes: int
+
+
+@dataclass(frozen=True, slots=True)
+class Manifest:
+    """Everything that says what a dataset is."""
+
+    format_version: int
+    generator: str
+    generator_version: str
+    seed: int
+    catalogue_version: int
+    catalogue_digest: str
+    config: Mapping[str, Any]
+    """The resolved configuration; the number of scenes and workers is no part of it."""
+    counts: Mapping[str, Counts]
+    """By split."""
+    scenes: int
+    """Scene numbers 0 … scenes - 1 were asked for; those not quarantined are in the files."""
+    redraws: Mapping[str, int]
+    """How often something was drawn again while generating, by reason."""
+    quarantined: tuple[Quarantined, ...]
+    files: tuple[DataFile, ...]
+
+    def of(self, table: str, split: str | None = None) -> tuple[DataFile, ...]:
+        """Return the files of one table (of one split, if given) in order."""
+        return tuple(
+            f for f in self.files if f.table == table and (split is None or f.split == split)
+        )
+
+    def to_json(self) -> str:
+        """Return the manifest as it stands in the file."""
+        return json.dumps(dataclasses.asdict(self), indent=1, ensure_ascii=False) + "\n"
+
+
+def write_manifest(root: Path, manifest: Manifest) -> None:
+    """Put a manifest in place: from here on the folder is (another) dataset."""
+    write_atomically(root / MANIFEST, manifest.to_json().encode())
+
+
+def has_manifest(root: Path) -> bool:
+    """Whether a folder holds a finished dataset."""
+    return (root / MANIFEST).is_file()
+
+
+def read_manifest(root: Path) -> Manifest:
+    """Return a dataset's manifest, checked: types, bounds, and paths inside the dataset.
+
+    Raises
+    ------
+    CorruptDataError
+        Missing, damaged, of a newer format, or naming files outside the dataset.
+
+    """
+    path = root / MANIFEST
+    try:
+        with path.open("rb") as stream:
+            text = stream.read(_MAX_BYTES + 1)
+    except FileNotFoundError:
+        raise CorruptDataError(_absence(root)) from None
+    except OSError as error:
+        raise CorruptDataError(f"{path}: cannot be read: {error.strerror}") from error
+    if len(text) > _MAX_BYTES:
+        raise CorruptDataError(f"{path}: larger than {_MAX_BYTES >> 20} MiB: {_AGAIN}")
+    try:
+        raw = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise CorruptDataError(f"{path}: no valid JSON ({error}): {_AGAIN}") from error
+    _check_version(path, raw)
+    manifest = _parse(path, raw)
+    for file in manifest.files:
+        _check_file(root, file)
+    return manifest
+
+
+def _absence(root: Path) -> str:
+    if (root / ".work").is_dir():
+        return (
+            f"{root}: the dataset is not finished (no {MANIFEST}, but .work/): "
+            "run `internav-gen generate` on it again to resume"
+        )
+    return f"{root}: no dataset here ({MANIFEST} is missing): give the folder that `generate` wrote"
+
+
+def _check_version(path: Path, raw: Any) -> None:  # noqa: ANN401 - JSON
+    version = raw.get("format_version") if isinstance(raw, dict) else None
+    if not isinstance(version, int) or isinstance(version, bool) or version < 1:
+        raise CorruptDataError(
+            f"{path}: format_version: expected a number, got {version!r}: {_AGAIN}"
+        )
+    if version > FORMAT_VERSION:
+        raise CorruptDataError(
+            f"{path}: written in format version {version}, this release reads up to "
+            f"{FORMAT_VERSION}: upgrade with `pip install --upgrade internav-data`"
+        )
+
+
+def _parse(path: Path, raw: dict[str, Any]) -> Manifest:
+    try:
+        expected = {f.name for f in dataclasses.fields(Manifest)}
+        if raw.keys() != expected:
+            difference = sorted(raw.keys() ^ expected)
+            raise ValueError(f"missing or unknown keys {difference}")  # noqa: TRY301
+        values = dict(raw)
+        values["counts"] = {str(k): Counts(**v) for k, v in raw["counts"].items()}
+        values["quarantined"] = tuple(Quarantined(**q) for q in raw["quarantined"])
+        values["files"] = tuple(DataFile(**f) for f in raw["files"])
+        return Manifest(**values)
+    except (TypeError, ValueError, AttributeError, KeyError) as error:
+        raise CorruptDataError(f"{path}: not a manifest ({error}): {_AGAIN}") from error
+
+
+def _check_file(root: Path, file: DataFile) -> None:
+    where = f"{root / MANIFEST}: file {file.path!r}"
+    pure = PurePosixPath(file.path) if isinstance(file.path, str) else None
+    if (
+        pure is None
+        or pure.is_absolute()
+        or "\\" in file.path
+        or "\0" in file.path
+        or not pure.parts
+        or pure.parts[0] != "data"
+        or ".." in pure.parts
+        or pure.suffix != ".parquet"
+    ):
+        raise CorruptDataError(f"{where}: expected a Parquet file below data/: {_AGAIN}")
+    for name, value, most in (
+        ("rows", file.rows, _MAX_ROWS),
+        ("bytes", file.bytes, _MAX_FILE_BYTES),
+    ):
+        if type(value) is not int or not 0 <= value <= most:
+            raise CorruptDataError(f"{where}: {name}: expected 0 … {most}, got {value!r}: {_AGAIN}")
+
+
+def locate(root: Path, file: DataFile) -> Path:
+    """Return where a file of the manifest lies, after looking that it is the one meant.
+
+    Raises
+    ------
+    CorruptDataError
+        Missing, of another size, or a link out of the dataset.
+
+    """
+    path = root / file.path
+    try:
+        size = path.stat().st_size
+    except OSError as error:
+        raise CorruptDataError(
+            f"{path}: the file is missing ({error.strerror}): {_AGAIN}"
+        ) from None
+    if not path.resolve().is_relative_to(root.resolve()):
+        raise CorruptDataError(f"{path}: a link out of the dataset: put the file itself there")
+    if size != file.bytes:
+        raise CorruptDataError(
+            f"{path}: expected {file.bytes} bytes, got {size} (truncated or edited): {_AGAIN}"
+        )
+    return path

@@ -1,0 +1,154 @@
+"""The shape of a row, read from a frozen dataclass: the one source of Arrow and JSON Schemas.
+
+A tree of nodes mirrors the type hints. `Leaf` holds numbers, strings and booleans, `Coordinates`
+a tuple of fixed length with a name for each member (a point, a quaternion, a colour), `Sequence`
+a tuple of any length and `Record` a dataclass. Everything else in this package (writing, reading,
+schemas, digests) walks this tree.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import types
+import typing
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+COORDINATES: dict[tuple[type, ...], tuple[str, ...]] = {
+    (float, float): ("x", "y"),
+    (float, float, float): ("x", "y", "z"),
+    (float, float, float, float): ("x", "y", "z", "w"),
+    (int, int, int): ("r", "g", "b"),
+}
+"""Names for the members of tuples of fixed length, stored as structs: a column each."""
+
+WIDTHS: dict[str, str] = {
+    "seed": "int64",
+    "actions": "int8",
+    "index": "int32",
+    "scene": "int32",
+    "clear_steps": "int32",
+    "steps": "int32",
+    "group": "int16",
+}
+"""Integers that are not ids or counts within one house; those are int16."""
+
+UNITS = {"m": "m", "m2": "m^2", "kg": "kg", "s": "s", "deg": "deg", "seconds": "s"}
+"""Unit by the last word of a field's name."""
+
+METRES = frozenset({"x", "y", "z", "centre", "size", "corners", "polygon", "outline", "points"})
+"""Fields in metres whose names don't say so."""
+
+Kind = Literal["string", "bool", "float64", "int8", "uint8", "int16", "int32", "int64"]
+
+
+@dataclass(frozen=True, slots=True)
+class Leaf:
+    """One value: `choices` are the strings it may be, () for any."""
+
+    kind: Kind
+    choices: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Coordinates:
+    """A tuple of fixed length whose members have names and one kind."""
+
+    names: tuple[str, ...]
+    leaf: Leaf
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    """A tuple of any length, or of `length` members."""
+
+    item: Node
+    length: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """A frozen dataclass."""
+
+    cls: type[Any]
+    fields: tuple[Field, ...]
+
+
+Node: TypeAlias = Leaf | Coordinates | Sequence | Record
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One named member of a record."""
+
+    name: str
+    node: Node
+    nullable: bool
+    unit: str | None
+
+
+@functools.cache
+def record_node(cls: type[Any]) -> Record:
+    """Return the shape of a dataclass; fields left out of comparison are not stored.
+
+    Raises
+    ------
+    TypeError
+        A type hint that has no place in a table.
+
+    """
+    hints = typing.get_type_hints(cls)
+    return Record(
+        cls, tuple(_field(f.name, hints[f.name]) for f in dataclasses.fields(cls) if f.compare)
+    )
+
+
+def _field(name: str, hint: object) -> Field:
+    nullable = False
+    if typing.get_origin(hint) in (types.UnionType, typing.Union):
+        members = [a for a in typing.get_args(hint) if a is not type(None)]
+        if len(members) != 1:
+            raise TypeError(f"field {name}: a union of several types has no column: {hint}")
+        nullable, hint = True, members[0]
+    return Field(name, _node(name, hint), nullable, _unit(name))
+
+
+def _node(name: str, hint: object) -> Node:
+    if dataclasses.is_dataclass(hint) and isinstance(hint, type):
+        return record_node(hint)
+    if typing.get_origin(hint) is tuple:
+        return _tuple_node(name, typing.get_args(hint))
+    return _leaf(name, hint)
+
+
+def _tuple_node(name: str, args: tuple[Any, ...]) -> Node:
+    if len(args) == 2 and args[1] is Ellipsis:  # noqa: PLR2004 - tuple[T, ...]
+        return Sequence(_node(name, args[0]))
+    if args in COORDINATES:
+        names = COORDINATES[args]
+        kind: Kind = "uint8" if args[0] is int else "float64"
+        return Coordinates(names, Leaf(kind))
+    if len(set(args)) == 1:
+        return Sequence(_node(name, args[0]), len(args))
+    raise TypeError(f"field {name}: no column for a tuple of {args}")
+
+
+def _leaf(name: str, hint: object) -> Leaf:
+    if typing.get_origin(hint) is Literal:
+        return Leaf("string", typing.get_args(hint))
+    if hint is str:
+        return Leaf("string")
+    if hint is bool:
+        return Leaf("bool")
+    if hint is float:
+        return Leaf("float64")
+    if hint is int:
+        return Leaf(typing.cast("Kind", WIDTHS.get(name, "int16")))
+    raise TypeError(f"field {name}: no column for {hint}")
+
+
+def _unit(name: str) -> str | None:
+    if name in METRES:
+        return "m"
+    return UNITS.get(name.rsplit("_", 1)[-1]) if "_" in name or name == "seconds" else None

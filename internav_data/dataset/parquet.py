@@ -1,0 +1,169 @@
+"""One Parquet file: written with page checksums, read with them verified."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from internav_data.dataset.decode import schema_difference
+from internav_data.dataset.digest import logical_digest
+from internav_data.dataset.encode import to_table
+from internav_data.dataset.files import file_sha256, write_with
+from internav_data.records.errors import CorruptDataError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from internav_data.dataset.tables import TableSpec
+
+R = TypeVar("R")
+
+SCENES_PER_GROUP = 10
+"""At least so many scenes lie in a row group ..."""
+ROWS_PER_GROUP = 400
+"""... and at least so many rows: a random record costs reading its group, a group its overhead."""
+_ZSTD_LEVEL = 3
+
+MENDING = "fetch the file again from where it came, or generate the dataset anew"
+
+
+@dataclass(frozen=True, slots=True)
+class FileInfo:
+    """What the manifest knows of one Parquet file."""
+
+    path: str
+    """Relative to the dataset's folder, with forward slashes."""
+    rows: int
+    bytes: int
+    sha256: str
+    logical_digest: str
+
+
+def write_parquet(path: Path, records: Sequence[R], spec: TableSpec[R]) -> FileInfo:
+    """Write records as one Parquet file; rows of episodes must be sorted by scene and index.
+
+    Raises
+    ------
+    ValidationError
+        A value that its column cannot hold.
+
+    """
+    return write_table(path, to_table(records, spec), spec)
+
+
+def write_table(path: Path, table: pa.Table, spec: TableSpec[Any]) -> FileInfo:
+    """Write a table of the spec's schema: atomically, and the same bytes for the same rows.
+
+    A row group ends only where a scene ends. The path in the result is the file's name.
+    """
+    table = table.combine_chunks()
+
+    def write(temporary: Path) -> None:
+        with pq.ParquetWriter(
+            temporary,
+            spec.schema,
+            compression="zstd",
+            compression_level=_ZSTD_LEVEL,
+            use_dictionary=True,
+            write_statistics=[*spec.filters],
+            write_page_checksum=True,
+        ) as writer:
+            for start, stop in group_bounds(table):
+                writer.write_table(table.slice(start, stop - start), row_group_size=stop - start)
+
+    write_with(path, write)
+    return FileInfo(
+        path.name, table.num_rows, path.stat().st_size, file_sha256(path), logical_digest(table)
+    )
+
+
+def group_bounds(table: pa.Table) -> list[tuple[int, int]]:
+    """Return the rows [start, stop) of each row group: whole scenes, at least the stated many."""
+    rows = table.num_rows
+    if "scene_id" not in table.column_names or not rows:
+        return [(0, rows)]
+    codes = table.column("scene_id").combine_chunks().dictionary_encode()
+    scenes = (codes.chunk(0) if isinstance(codes, pa.ChunkedArray) else codes).indices.to_numpy()
+    starts = [0, *(np.flatnonzero(np.diff(scenes)) + 1).tolist(), rows]
+    bounds, first = [], 0
+    per_row_scene = len(starts) - 1 == rows  # the table of scenes: a row each
+    least_rows = SCENES_PER_GROUP if per_row_scene else ROWS_PER_GROUP
+    for k, stop in enumerate(starts[1:], start=1):
+        if k - first >= SCENES_PER_GROUP and stop - starts[first] >= least_rows:
+            bounds.append((starts[first], stop))
+            first = k
+    if starts[first] < rows:
+        bounds.append((starts[first], rows))
+    return bounds
+
+
+def open_parquet(path: Path, spec: TableSpec[Any]) -> pq.ParquetFile:
+    """Open a Parquet file of the spec's columns.
+
+    Raises
+    ------
+    CorruptDataError
+        Missing, truncated, no Parquet, or of other columns.
+
+    """
+    try:
+        file = pq.ParquetFile(path, page_checksum_verification=True)
+        schema = file.schema_arrow
+    except FileNotFoundError:
+        raise CorruptDataError(f"{path}: the file is missing: {MENDING}") from None
+    except Exception as error:
+        raise damaged(path, error) from error
+    if not schema.equals(spec.schema):
+        difference = schema_difference(schema, spec.schema)
+        raise CorruptDataError(
+            f"{path}: the columns are not those of {spec.name}: {difference}: {MENDING}"
+        )
+    return file
+
+
+def read_group(
+    path: Path, file: pq.ParquetFile, group: int, columns: Sequence[str] | None = None
+) -> pa.Table:
+    """Return one row group, its page checksums verified.
+
+    Raises
+    ------
+    CorruptDataError
+        A page is damaged.
+
+    """
+    try:
+        names = None if columns is None else list(columns)
+        return file.read_row_group(group, columns=names, use_threads=False)
+    except Exception as error:
+        raise damaged(path, error) from error
+
+
+def read_table(path: Path, spec: TableSpec[Any], columns: Sequence[str] | None = None) -> pa.Table:
+    """Return the table in a file, all its page checksums verified.
+
+    Raises
+    ------
+    CorruptDataError
+        Missing, damaged or of other columns.
+
+    """
+    with open_parquet(path, spec) as file:
+        try:
+            names = None if columns is None else list(columns)
+            table = file.read(columns=names, use_threads=False)
+            table.validate(full=True)
+        except Exception as error:
+            raise damaged(path, error) from error
+    return table
+
+
+def damaged(path: Path, error: BaseException) -> CorruptDataError:
+    """Return the error to raise for a file that pyarrow cannot read."""
+    reason = (str(error).splitlines() or [type(error).__name__])[0]
+    return CorruptDataError(f"{path}: the file is damaged ({reason}): {MENDING}")

@@ -1,0 +1,79 @@
+"""The three tables of a dataset and their Arrow schemas.
+
+`EPISODES`, `SCENES` and `ASSETS` are all that other packages need: they go with
+`to_table(records, spec)`, `from_table(table, spec)` and `write_parquet(path, records, spec)`.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+import pyarrow as pa
+
+from internav_data.dataset.nodes import Coordinates, Field, Leaf, Node, Record, record_node
+from internav_data.records import Asset, Episode, House
+
+R = TypeVar("R")
+
+FORMAT_VERSION = 1
+"""Raised whenever a reader of the version before would misunderstand what is written."""
+
+
+@dataclass(frozen=True, slots=True)
+class TableSpec(Generic[R]):
+    """A table: its name, what one row is, and the columns that carry row group statistics."""
+
+    name: str
+    cls: type[R]
+    filters: tuple[str, ...]
+    """Top-level scalars that readers prune row groups by."""
+
+    @property
+    def node(self) -> Record:
+        """The shape of one row."""
+        return record_node(self.cls)
+
+    @property
+    def schema(self) -> pa.Schema:
+        """The Arrow schema of the table: every field that cannot be None is not nullable."""
+        return arrow_schema(self.cls)
+
+
+@functools.cache
+def arrow_schema(cls: type[Any]) -> pa.Schema:
+    """Return the Arrow schema of a dataclass."""
+    return pa.schema([arrow_field(f) for f in record_node(cls).fields])
+
+
+def arrow_field(field: Field) -> pa.Field:
+    """Return the Arrow field of a record's field."""
+    return pa.field(field.name, arrow_type(field.node), nullable=field.nullable)
+
+
+def arrow_type(node: Node) -> pa.DataType:
+    """Return the Arrow type of a node."""
+    if isinstance(node, Leaf):
+        return {"bool": pa.bool_, "string": pa.string}.get(
+            node.kind, getattr(pa, node.kind, None)
+        )()
+    if isinstance(node, Coordinates):
+        leaf = arrow_type(node.leaf)
+        return pa.struct([pa.field(name, leaf, nullable=False) for name in node.names])
+    if isinstance(node, Record):
+        return pa.struct([arrow_field(field) for field in node.fields])
+    return pa.list_(pa.field("element", arrow_type(node.item), nullable=False))
+
+
+EPISODES: TableSpec[Episode] = TableSpec(
+    "episodes",
+    Episode,
+    (
+        *("episode_id", "scene_id", "index", "room_count", "mode", "sealed", "rooms_on_way"),
+        *("obstacle_count", "clear_m", "clear_steps", "way_m", "steps"),
+    ),
+)
+SCENES: TableSpec[House] = TableSpec("scenes", House, ("scene_id", "scene", "area_m2"))
+ASSETS: TableSpec[Asset] = TableSpec("assets", Asset, ("asset_id",))
+TABLES: tuple[TableSpec[Any], ...] = (EPISODES, SCENES, ASSETS)
