@@ -1,0 +1,202 @@
+"""Which rooms can have a door between them, and which should."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from internav_data.houses.standards import (
+    DOOR_CLEAR_CM,
+    HALF_WALL_CM,
+    PRIVATE,
+    PUBLIC,
+    pair,
+)
+from internav_data.records import OUTSIDE
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.random import Generator
+
+    from internav_data.houses.plan import Plan, Segment
+
+JAMB_CM = 10
+"""Least distance of an opening from the centre line of a wall that meets its own."""
+DEPTH_CM = HALF_WALL_CM + DOOR_CLEAR_CM + HALF_WALL_CM
+"""Centre-line depth that a room needs behind a door."""
+
+_COST: Mapping[tuple[str, str], float] = {
+    ("bathroom", "bedroom"): 6.0,
+    ("bathroom", "dining"): 5.0,
+    ("bathroom", "hall"): 1.8,
+    ("bathroom", "kitchen"): 4.0,
+    ("bathroom", "laundry"): 8.0,
+    ("bathroom", "living"): 3.5,
+    ("bathroom", "studio"): 2.0,
+    ("bedroom", "dining"): 4.5,
+    ("bedroom", "hall"): 2.0,
+    ("bedroom", "kitchen"): 4.5,
+    ("bedroom", "living"): 3.0,
+    ("bedroom", "studio"): 3.0,
+    ("dining", "hall"): 1.0,
+    ("dining", "kitchen"): 0.5,
+    ("dining", "living"): 0.6,
+    ("hall", "kitchen"): 1.0,
+    ("hall", "living"): 0.5,
+    ("hall", "office"): 2.0,
+    ("hall", "storage"): 2.0,
+    ("hall", "laundry"): 2.2,
+    ("kitchen", "laundry"): 2.0,
+    ("kitchen", "living"): 0.8,
+    ("kitchen", "storage"): 2.4,
+    ("living", "office"): 2.6,
+    ("living", "storage"): 3.2,
+}
+"""How unusual a door between two types (sorted) is."""
+_UNKNOWN_PUBLIC, _UNKNOWN_MIXED, _UNKNOWN_PRIVATE = 1.2, 4.0, 14.0
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A stretch of wall in which an opening may lie; centimetres."""
+
+    along_x: bool
+    at: int
+    low: int
+    high: int
+
+    @property
+    def length(self) -> int:
+        """Centimetres."""
+        return self.high - self.low
+
+
+def door_cost(first: str, second: str) -> float:
+    """Return how unusual a door between two types of room is."""
+    key = pair(first, second)
+    if key in _COST:
+        return _COST[key]
+    private = (first in PRIVATE) + (second in PRIVATE)
+    return (_UNKNOWN_PUBLIC, _UNKNOWN_MIXED, _UNKNOWN_PRIVATE)[private]
+
+
+def _deep_enough(plan: Plan, segment: Segment, m: int, side: int) -> bool:
+    """Whether the room on one side of a wall is deep enough for a door beside grid cell m."""
+    lines = plan.ys if segment.along_x else plan.xs
+    room = segment.before if side < 0 else segment.after
+    if room == OUTSIDE:
+        return True
+    k = lines.index(segment.at)
+    step = -1 if side < 0 else 0
+    while 0 <= k + step < len(lines) - 1:
+        owner = plan.at(m, k + step) if segment.along_x else plan.at(k + step, m)
+        if owner != room:
+            return False
+        far = lines[k + step] if side < 0 else lines[k + step + 1]
+        if abs(far - segment.at) >= DEPTH_CM:
+            return True
+        step += side
+    return False
+
+
+def spans(plan: Plan, segment: Segment) -> list[Span]:
+    """Stretches of a wall where doors have their clear depth on both sides."""
+    stops = plan.xs if segment.along_x else plan.ys
+    out: list[Span] = []
+    start: int | None = None
+    for m in range(len(stops) - 1):
+        if stops[m] < segment.low or stops[m] >= segment.high:
+            continue
+        good = _deep_enough(plan, segment, m, -1) and _deep_enough(plan, segment, m, 1)
+        if good and start is None:
+            start = stops[m]
+        if start is not None and (not good or stops[m + 1] >= segment.high):
+            end = stops[m + 1] if good else stops[m]
+            if end - start > 2 * JAMB_CM:
+                out.append(Span(segment.along_x, segment.at, start + JAMB_CM, end - JAMB_CM))
+            start = None
+    return out
+
+
+def possible_doors(plan: Plan, width_cm: int) -> dict[tuple[int, int], list[Span]]:
+    """Where doors of at least a width can be, by pair of rooms (ascending), longest span first."""
+    out: dict[tuple[int, int], list[Span]] = {}
+    for segment in plan.segments:
+        if OUTSIDE in {segment.before, segment.after} or segment.length < width_cm:
+            continue
+        rooms = (min(segment.before, segment.after), max(segment.before, segment.after))
+        for span in spans(plan, segment):
+            if span.length >= width_cm:
+                out.setdefault(rooms, []).append(span)
+    for found in out.values():
+        found.sort(key=lambda s: (-s.length, s.along_x, s.at, s.low))
+    return out
+
+
+def _ensuite(
+    types: Sequence[str], edges: Sequence[tuple[int, int]], rng: Generator
+) -> tuple[int, int] | None:
+    """Of several bathrooms, one may belong to a bedroom: (bathroom, bedroom)."""
+    bathrooms = [k for k, name in enumerate(types) if name == "bathroom"]
+    if len(bathrooms) < 2 or float(rng.random()) < 0.3:  # noqa: PLR2004 - one bath is for all
+        return None
+    found = [
+        (a, b) if types[a] == "bathroom" else (b, a)
+        for a, b in edges
+        if {types[a], types[b]} == {"bathroom", "bedroom"}
+    ]
+    return found[int(float(rng.random()) * len(found))] if found else None
+
+
+def door_tree(
+    types: Sequence[str], edges: Sequence[tuple[int, int]], rng: Generator
+) -> tuple[list[tuple[int, int]], float] | None:
+    """Join all rooms by the least unusual doors (Kruskal); None where they cannot be joined.
+
+    Returns the doors and their summed cost.
+    """
+    ensuite = _ensuite(types, edges, rng)
+    weighted = []
+    for a, b in edges:
+        cost = door_cost(types[a], types[b]) + 0.6 * float(rng.random())
+        if ensuite is not None and ensuite[0] in {a, b} and set(ensuite) != {a, b}:
+            cost += 40.0
+        weighted.append((cost, a, b))
+    group = list(range(len(types)))
+    chosen: list[tuple[int, int]] = []
+    total = 0.0
+    for cost, a, b in sorted(weighted):
+        if group[a] != group[b]:
+            old, new = group[a], group[b]
+            group = [new if g == old else g for g in group]
+            chosen.append((a, b))
+            total += cost
+    if len(chosen) != len(types) - 1:
+        return None
+    return chosen, total
+
+
+def loop_doors(
+    types: Sequence[str],
+    edges: Sequence[tuple[int, int]],
+    tree: Sequence[tuple[int, int]],
+    share: float,
+    rng: Generator,
+) -> list[tuple[int, int]]:
+    """Further doors that make ways round: between public rooms, and from bedroom to bathroom."""
+    out: list[tuple[int, int]] = []
+    for a, b in sorted(set(edges) - set(tree)):
+        draw = float(rng.random())
+        names = {types[a], types[b]}
+        if names <= PUBLIC:
+            wish = 1.0
+        elif names in ({"bathroom", "bedroom"}, {"kitchen", "laundry"}, {"hall", "laundry"}):
+            wish = 0.5
+        elif names in ({"living", "office"}, {"hall", "office"}, {"bedroom", "living"}):
+            wish = 0.35
+        else:
+            continue
+        if draw < share * wish:
+            out.append((a, b))
+    return out

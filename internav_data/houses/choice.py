@@ -1,0 +1,170 @@
+"""The best of some candidates: how much a floor plan is like a home."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from internav_data.houses.access import door_tree, possible_doors
+from internav_data.houses.layouts import draw_layout, row
+from internav_data.houses.plan import Plan, clear_size_m
+from internav_data.houses.standards import (
+    HABITABLE,
+    HALF_WALL_CM,
+    PRIVATE,
+    PUBLIC,
+    WANTED,
+    pair,
+)
+from internav_data.records import OUTSIDE, Purpose, generator
+from internav_data.records.errors import QuarantineError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.random import Generator
+
+    from internav_data.houses.config import HouseConfig
+    from internav_data.houses.programme import RoomSpec
+
+LEAST_DOOR_CM = {"paper": 100, "realistic": 80}
+"""A wall between two rooms counts as shared when a door of this width fits."""
+PATIENCE = 8
+"""How many times `candidates` may be drawn while none of them keeps the standards."""
+DAYLIGHT_CM = 130
+"""Outer wall that a habitable room wants."""
+
+
+@dataclass(frozen=True, slots=True)
+class FloorPlan:
+    """Rooms on the grid and the doors that are certain.
+
+    A user's plan brings its own doors and windows (see `internav_data.houses.plan_file`).
+    """
+
+    types: tuple[str, ...]
+    plan: Plan
+    tree: tuple[tuple[int, int], ...]
+    """Pairs of rooms to be joined by a door, so that all rooms can be reached."""
+    score: float
+    """Lower is more like a home."""
+
+
+def clear_area_m2(plan: Plan, room: int) -> float:
+    """Area between the wall faces of a room, m²."""
+    around = sum(s.length for s in plan.segments if room in {s.before, s.after})
+    return (plan.area_cm2(room) - HALF_WALL_CM * around + 4 * HALF_WALL_CM**2) / 1e4
+
+
+def _room_score(plan: Plan, room: int, spec: RoomSpec) -> float | None:
+    """How far one room is from what it should be; None where it breaks its standard."""
+    main = plan.main_rectangle(room)
+    short, long = clear_size_m(main)
+    clear = clear_area_m2(plan, room)
+    standard = spec.standard
+    if short < standard.width_m or not standard.low_m2 <= clear <= standard.high_m2 * 1.3:
+        return None
+    area = plan.area_cm2(room) / 1e4
+    score = 3.0 * math.log(area / spec.area_m2) ** 2
+    score += 2.0 * max(0.0, long / short - standard.aspect) ** 2
+    score += 1.5 * max(0.0, clear / standard.high_m2 - 1.0)
+    # Nooks that are neither room nor corridor look wrong.
+    score += 1.5 * max(0.0, 0.62 - (main[2] - main[0]) * (main[3] - main[1]) / 1e4 / area)
+    if spec.type in HABITABLE:
+        outside = [s.length for s in plan.segments if _between(s.before, s.after, room, OUTSIDE)]
+        score += 0.0 if outside and max(outside) >= DAYLIGHT_CM else 3.0
+    return score
+
+
+def _between(before: int, after: int, one: int, other: int) -> bool:
+    return (before, after) in {(one, other), (other, one)}
+
+
+def _through_private(types: Sequence[str], tree: Sequence[tuple[int, int]]) -> float:
+    """Count doors that make a private room the way to another."""
+    score = 0.0
+    for a, b in tree:
+        names = (types[a], types[b])
+        if names[0] in PRIVATE and names[1] in PRIVATE:
+            score += 0.3 if set(names) == {"bathroom", "bedroom"} else 3.0
+    for room, name in enumerate(types):
+        if name in PRIVATE:
+            doors = sum(1 for a, b in tree if room in {a, b} and types[a + b - room] in PUBLIC)
+            score += 4.0 * max(0, doors - 1)
+    return score
+
+
+def judged(
+    layout_plan: Plan, specs: Sequence[RoomSpec], least_door_cm: int, rng: Generator
+) -> FloorPlan | None:
+    """Score a plan; None where a room breaks its standard or cannot be reached."""
+    plan = layout_plan
+    types = tuple(spec.type for spec in specs)
+    if len(plan.cells) != len(specs):
+        return None
+    score = 0.0
+    for room, spec in enumerate(specs):
+        room_score = _room_score(plan, room, spec)
+        if room_score is None:
+            return None
+        score += room_score
+    edges = sorted(possible_doors(plan, least_door_cm))
+    found = door_tree(types, edges, rng)
+    if found is None or not _drawable(plan, len(specs)):
+        return None
+    tree, cost = found
+    score += 0.25 * cost + _through_private(types, tree)
+    present = {pair(types[a], types[b]) for a, b in edges}
+    score += sum(
+        weight
+        for names, weight in WANTED.items()
+        if names[0] in types and names[1] in types and names not in present
+    )
+    halls = [k for k, name in enumerate(types) if name == "hall"]
+    for hall in halls:
+        share = plan.area_cm2(hall) / sum(plan.area_cm2(k) for k in range(len(types)))
+        score += 12.0 * max(0.0, share - 0.14)
+        score += max(0, 3 - sum(1 for door in tree if hall in door))
+    return FloorPlan(types, plan, tuple(tree), score)
+
+
+def _drawable(plan: Plan, rooms: int) -> bool:
+    """Whether the outline and every room are simple polygons."""
+    return bool(plan.polygon(frozenset(range(rooms)))) and all(
+        plan.polygon(frozenset({room})) for room in range(rooms)
+    )
+
+
+def choose_floor_plan(
+    seed: int, scene: int, config: HouseConfig, specs: Sequence[RoomSpec], attempt: int
+) -> FloorPlan:
+    """Draw `config.candidates` floor plans and return the most homelike; a plain row if all fail.
+
+    Raises
+    ------
+    QuarantineError
+        Never for programmes of 1 to 10 rooms; it guards against standards that exclude each other.
+
+    """
+    rng = generator(seed, Purpose.FLOOR_PLAN, scene, attempt)
+    least = LEAST_DOOR_CM[config.preset]
+    best: FloorPlan | None = None
+    # Tight programmes get more draws, but only until the first plan that holds.
+    for k in range(config.candidates * PATIENCE):
+        if best is not None and k >= config.candidates:
+            break
+        layout = draw_layout(specs, rng)
+        plan = Plan.of([layout[k] for k in range(len(specs))])
+        found = judged(plan, specs, least, rng)
+        if found is not None and (best is None or found.score < best.score):
+            best = found
+    if best is None:
+        layout = row(specs)
+        best = judged(Plan.of([layout[k] for k in range(len(specs))]), specs, least, rng)
+    if best is None:
+        raise QuarantineError(
+            f"scene {scene}: no floor plan keeps the {config.preset} standards for "
+            f"{', '.join(spec.type for spec in specs)}; try another seed or programme"
+        )
+    return best

@@ -1,0 +1,161 @@
+"""What a user may ask of a house."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+from internav_data.houses.standards import MAX_ROOMS, ROOM_TYPES
+from internav_data.records import Preset
+from internav_data.records.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+COUNT_HELP = "a count (4), a range (2-5) or a programme (kitchen,living,bedroom:2)"
+
+
+@dataclass(frozen=True, slots=True)
+class RoomsRequest:
+    """What `rooms` asks for: counts to choose from, or a programme; both empty for the quota."""
+
+    counts: tuple[int, ...] = ()
+    programme: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class HouseConfig:
+    """How houses are built. Every field is a lever a user may turn."""
+
+    preset: Preset = "paper"
+    """`paper`: generous rooms of about 24 m², calibrated to the paper's Table 2; `realistic`:
+    areas, widths and doors of real homes."""
+    rooms: str = ""
+    """Empty: the paper's mix of 1 to 10 rooms. Else a count (4), a range (2-5) or a programme
+    (kitchen,living,bedroom:2)."""
+    floor_plan: str | None = None
+    """Path of a floor plan of your own (TOML or JSON); its rooms are furnished anew each scene."""
+    scale: float = 1.0
+    """Lengths of rooms times this; 1.1 makes houses 21 % larger. `paper` only."""
+    scale_small: float = 1.0
+    """Further factor for houses of 1-2 rooms."""
+    scale_medium: float = 1.0
+    """Further factor for houses of 3-5 rooms."""
+    scale_large: float = 1.0
+    """Further factor for houses of 6-10 rooms."""
+    furnishing: float = 1.0
+    """How much stands in a room beside what it cannot do without: 0 bare, 1 lived in, 2 crowded."""
+    loops: float = 0.45
+    """Share of the sensible further doors that are built, so that there are ways round."""
+    wide_openings: float = 0.35
+    """Share of wide, double and open doorways where they make sense. `paper` only."""
+    hall_from: int = 5
+    """Houses of this many rooms and more have a hall."""
+    candidates: int = 24
+    """Floor plans drawn for each house; the most homelike one is taken."""
+    windows: bool = True
+    """Windows in outer walls."""
+
+    def check(self) -> RoomsRequest:
+        """Return what `rooms` asks for; raise UsageError where the configuration cannot be meant."""
+        if self.preset not in {"paper", "realistic"}:
+            raise UsageError(f"preset is '{self.preset}': use 'paper' or 'realistic'")
+        for name, (low, high) in _BANDS.items():
+            value = getattr(self, name)
+            if not math.isfinite(value) or not low <= value <= high:
+                raise UsageError(f"{name} is {value}: choose a number from {low:g} to {high:g}")
+        if self.floor_plan is not None and self.rooms:
+            raise UsageError("rooms and floor_plan exclude each other: leave one of them out")
+        return parse_rooms(self.rooms)
+
+    def scale_of(self, rooms: int) -> float:
+        """Return the factor on lengths for a house of so many rooms."""
+        if self.preset != "paper":
+            return 1.0
+        medium, large = 3, 6
+        by_size = self.scale_small
+        if rooms >= medium:
+            by_size = self.scale_medium
+        if rooms >= large:
+            by_size = self.scale_large
+        return self.scale * by_size
+
+
+_BANDS: Mapping[str, tuple[float, float]] = {
+    "scale": (0.7, 2.0),
+    "scale_small": (0.7, 2.0),
+    "scale_medium": (0.7, 2.0),
+    "scale_large": (0.7, 2.0),
+    "furnishing": (0.0, 2.0),
+    "loops": (0.0, 1.0),
+    "wide_openings": (0.0, 1.0),
+    "hall_from": (3, 11),
+    "candidates": (1, 200),
+}
+
+
+def parse_rooms(text: str) -> RoomsRequest:
+    """Read the `rooms` option.
+
+    Raises
+    ------
+    UsageError
+        For what is no count, range or programme, or one that no house of 1 to 10 rooms can be.
+
+    """
+    text = text.strip()
+    if not text:
+        return RoomsRequest()
+    low, dash, high = text.partition("-")
+    if _is_integer(text):
+        return RoomsRequest(counts=(_count(text, text),))
+    if dash and _is_integer(low) and _is_integer(high):
+        first, last = _count(low, text), _count(high, text)
+        if first > last:
+            raise UsageError(f"rooms '{text}': the range runs backwards, write {last}-{first}")
+        return RoomsRequest(counts=tuple(range(first, last + 1)))
+    return RoomsRequest(programme=_programme(text))
+
+
+def _is_integer(text: str) -> bool:
+    body = text.strip()
+    return body.removeprefix("-").removeprefix("+").isdecimal()
+
+
+def _count(text: str, whole: str) -> int:
+    value = int(text)
+    if not 1 <= value <= MAX_ROOMS:
+        raise UsageError(
+            f"rooms '{whole}': a house has 1 to {MAX_ROOMS} rooms, got {value}; give {COUNT_HELP}"
+        )
+    return value
+
+
+def _programme(text: str) -> tuple[str, ...]:
+    rooms: list[str] = []
+    for entry in text.split(","):
+        name, colon, number = (piece.strip() for piece in entry.partition(":"))
+        if name not in ROOM_TYPES:
+            near = get_close_matches(name, ROOM_TYPES, 1)
+            hint = f"did you mean '{near[0]}'?" if near else f"types: {', '.join(ROOM_TYPES)}"
+            raise UsageError(f"rooms '{text}': no room type '{name}'; {hint} Give {COUNT_HELP}")
+        count = 1
+        if colon:
+            if not number.isdecimal() or int(number) < 1:
+                raise UsageError(
+                    f"rooms '{text}': '{entry.strip()}' needs a count of 1 or more after the colon"
+                )
+            count = int(number)
+        if len(rooms) + count > MAX_ROOMS:
+            raise UsageError(
+                f"rooms '{text}': more than {MAX_ROOMS} rooms, ask for {MAX_ROOMS} at most"
+            )
+        rooms += [name] * count
+    return tuple(rooms)
+
+
+def field_names() -> tuple[str, ...]:
+    """Return the names of all levers."""
+    return tuple(field.name for field in fields(HouseConfig))

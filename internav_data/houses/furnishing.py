@@ -1,0 +1,310 @@
+"""One room while it is furnished: what stands in it, what must stay clear, where its walls are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from internav_data.geometry import round_m, yaw_quaternion
+from internav_data.houses.fitting import (
+    RADIUS_M,
+    SPACING_M,
+    TOLERANCE_M,
+    block,
+    first_fit,
+    turned,
+)
+from internav_data.houses.standards import DOOR_CLEAR_CM, HALF_WALL_CM
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.random import Generator
+    from numpy.typing import NDArray
+
+    from internav_data.houses.openings import Opening
+    from internav_data.houses.pieces import Group
+    from internav_data.houses.plan import Plan
+
+    Floats = NDArray[np.float64]
+
+CAPACITY = 160
+"""Most boxes in one room."""
+LEAST_FREE = 0.45
+"""Share of an empty room's nodes that furniture leaves to the agent."""
+JOINED = 0.93
+"""Share of the free nodes that are joined to the doors: pockets are small."""
+WINDOW_DEPTH_M = 0.45
+"""What stands nearer to a window than this must be lower than its sill."""
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """A wall face seen from inside a room: it runs along local x, the room lies at local y > 0."""
+
+    x: float
+    y: float
+    turn: int
+    """Quarter turns that carry local x onto the wall's direction."""
+    length: float
+    windows: int
+
+
+@dataclass(slots=True)
+class RoomState:
+    """A room while it is furnished (metres)."""
+
+    room: int
+    type: str
+    inner: Floats
+    area_m2: float
+    edges: tuple[Edge, ...]
+    solids: Floats
+    keeps: Floats
+    free: NDArray[np.bool_]
+    origin: NDArray[np.int64]
+    anchors: NDArray[np.int64]
+    least: int
+    solid_count: int = 0
+    keep_count: int = 0
+    placed: list[tuple[Group, float, float, int]] = field(default_factory=list)
+
+    def add_solid(self, box: Floats) -> None:
+        """Let a box stand in the room."""
+        self.solids[self.solid_count] = box
+        self.solid_count += 1
+
+    def add_keep(self, box: Floats) -> None:
+        """Keep a box clear of things."""
+        self.keeps[self.keep_count] = box
+        self.keep_count += 1
+
+    def place(self, group: Group, spots: Floats) -> bool:
+        """Put a group at the first spot (x, y, quarter turns) where it fits; tell whether one did."""
+        full = CAPACITY - 24
+        if len(spots) == 0 or self.solid_count > full or self.keep_count > full:
+            return False
+        items, blocking = group.boxes, group.blocking
+        m = first_fit(
+            spots,
+            items,
+            blocking,
+            group.fronts,
+            self.inner,
+            self.solids,
+            self.solid_count,
+            self.keeps,
+            self.keep_count,
+            self.free,
+            self.origin,
+            self.anchors,
+            self.least,
+            JOINED,
+        )
+        if m < 0:
+            return False
+        x, y, turn = float(spots[m, 0]), float(spots[m, 1]), int(spots[m, 2])
+        box = np.empty(6)
+        for k in range(len(items)):
+            turned(items[k], x, y, turn, box)
+            self.add_solid(box)
+            if blocking[k]:
+                block(self.free, self.origin, box)
+        for front in group.fronts:
+            turned(front, x, y, turn, box)
+            self.add_keep(box)
+        self.placed.append((group, x, y, turn))
+        return True
+
+    def along_walls(
+        self, group: Group, rng: Generator, prefer: str, *, step: float = 0.1
+    ) -> Floats:
+        """Spots with the group's back to a wall, the best liked first.
+
+        `prefer` is "corner", "centre", "far" (from doors), "sun" (near windows) or "any".
+        """
+        spots: list[Floats] = []
+        likes: list[Floats] = []
+        left, right = group.left, group.right
+        for edge in self.edges:
+            spare = edge.length - (right - left)
+            if spare < 0.0:
+                continue
+            count = max(1, int(spare / step) + 1)
+            along = -left + np.arange(count) * step
+            along[-1] = edge.length - right
+            ends = np.minimum(along + left, edge.length - along - right)
+            like = 0.6 * rng.random(count)
+            if prefer == "corner":
+                like += ends
+            elif prefer == "centre":
+                like += 1.2 * np.abs(along + 0.5 * (left + right) - edge.length / 2) - 0.15 * spare
+            elif prefer == "sun":
+                like += 0.3 * ends - 0.8 * min(edge.windows, 1)
+            like += 0.8 * float(rng.random())
+            spots.append(_on_edge(edge, along))
+            likes.append(like)
+        if not spots:
+            return np.empty((0, 3))
+        order = np.argsort(np.concatenate(likes), kind="stable")
+        found: Floats = np.concatenate(spots)[order]
+        return found
+
+    def in_the_open(self, group: Group, rng: Generator) -> Floats:
+        """Spots away from the walls, nearest to the middle of the room first."""
+        x0, y0, x1, y1 = (float(v) for v in self.inner)
+        xs = np.arange(round(x0 / SPACING_M), round(x1 / SPACING_M) + 1) * SPACING_M
+        ys = np.arange(round(y0 / SPACING_M), round(y1 / SPACING_M) + 1) * SPACING_M
+        x, y = (a.ravel() for a in np.meshgrid(xs, ys, indexing="ij"))
+        first = int(float(rng.random()) * 4)
+        grids = []
+        for turn in (first, (first + 1) % 4):
+            like = np.hypot(x - (x0 + x1) / 2, y - (y0 + y1) / 2) + 0.7 * rng.random(len(x))
+            # Long things lie along the room's longer side.
+            lengthwise = (turn % 2 == 0) == (x1 - x0 >= y1 - y0)
+            like += 0.0 if lengthwise == (group.right - group.left >= group.depth) else 0.8
+            grids.append(np.column_stack([x, y, np.full(len(x), float(turn)), like]))
+        every = np.concatenate(grids)
+        found: Floats = every[np.argsort(every[:, 3], kind="stable")][:, :3]
+        return np.ascontiguousarray(found)
+
+
+def _on_edge(edge: Edge, along: Floats) -> Floats:
+    dx, dy = ((1, 0), (0, 1), (-1, 0), (0, -1))[edge.turn]
+    out = np.empty((len(along), 3))
+    for k, p in enumerate(along):
+        out[k] = (round_m(edge.x + dx * p), round_m(edge.y + dy * p), edge.turn)
+    return out
+
+
+def _edges(
+    corners: Sequence[tuple[int, int]], openings: Sequence[Opening]
+) -> tuple[Edge, ...]:
+    """Wall faces of a room: its polygon moved inwards by half a wall."""
+    count = len(corners)
+    directions = []
+    for k in range(count):
+        (ax, ay), (bx, by) = corners[k], corners[(k + 1) % count]
+        directions.append(((bx > ax) - (bx < ax), (by > ay) - (by < ay)))
+    inner = []
+    for k in range(count):
+        (ux, uy), (vx, vy) = directions[k - 1], directions[k]
+        x, y = corners[k]
+        inner.append((x + HALF_WALL_CM * (-uy - vy), y + HALF_WALL_CM * (ux + vx)))
+    out: list[Edge] = []
+    for k in range(count):
+        (ax, ay), (bx, by) = inner[k], inner[(k + 1) % count]
+        (dx, dy), line = directions[k], corners[k]
+        windows = sum(
+            1
+            for o in openings
+            if o.kind is None
+            and o.along_x == (dy == 0)
+            and o.at == (line[1] if o.along_x else line[0])
+            and o.low <= (max(ax, bx) if o.along_x else max(ay, by))
+            and o.high >= (min(ax, bx) if o.along_x else min(ay, by))
+        )
+        turn = ((1, 0), (0, 1), (-1, 0), (0, -1)).index((dx, dy))
+        length = (abs(bx - ax) + abs(by - ay)) / 100.0
+        if length > 0.0:
+            out.append(Edge(ax / 100.0, ay / 100.0, turn, length, windows))
+    return tuple(out)
+
+
+def _sided(opening: Opening, side: int, depth_cm: float, bottom: float, top: float) -> Floats:
+    """Box beside an opening, on the side of lower (-1) or higher (+1) coordinates."""
+    face = opening.at + side * HALF_WALL_CM
+    near, far = sorted((face, face + side * depth_cm))
+    flat = (
+        (opening.low, near, opening.high, far)
+        if opening.along_x
+        else (near, opening.low, far, opening.high)
+    )
+    return np.array([*(v / 100.0 for v in flat), bottom, top])
+
+
+def _side_of(plan: Plan, room: int, opening: Opening) -> int:
+    """On which side of an opening a room lies."""
+    stops, lines = (plan.xs, plan.ys) if opening.along_x else (plan.ys, plan.xs)
+    m = next(k for k in range(len(stops) - 1) if stops[k + 1] > opening.low)
+    k = lines.index(opening.at)
+    above = plan.at(m, k) if opening.along_x else plan.at(k, m)
+    return 1 if above == room else -1
+
+
+def _anchor(opening: Opening, side: int, origin: NDArray[np.int64]) -> tuple[int, int]:
+    """Return the node of a door's channel that lies furthest in the room."""
+    along = round((opening.low + opening.high) / 2 / 25)
+    if not opening.low + 20 <= along * 25 <= opening.high - 20:
+        along += 1 if along * 25 < opening.low + 20 else -1
+    reach = (opening.at + side * (HALF_WALL_CM + DOOR_CLEAR_CM - 20)) / 25
+    across = int(np.floor(reach + 1e-9)) if side > 0 else int(np.ceil(reach - 1e-9))
+    i, j = (along, across) if opening.along_x else (across, along)
+    return i - int(origin[0]), j - int(origin[1])
+
+
+def room_state(
+    plan: Plan, room: int, name: str, openings: Sequence[Opening], ceiling_m: float
+) -> RoomState:
+    """Return an empty room with its doors' and windows' clear boxes."""
+    cells = plan.cells[room]
+    i0, i1 = min(i for i, _ in cells), max(i for i, _ in cells) + 1
+    j0, j1 = min(j for _, j in cells), max(j for _, j in cells) + 1
+    half = HALF_WALL_CM / 100.0
+    inner = np.array(
+        [
+            plan.xs[i0] / 100.0 + half,
+            plan.ys[j0] / 100.0 + half,
+            plan.xs[i1] / 100.0 - half,
+            plan.ys[j1] / 100.0 - half,
+        ]
+    )
+    origin = np.floor(inner[:2] / SPACING_M).astype(np.int64)
+    shape = np.ceil(inner[2:] / SPACING_M).astype(np.int64) - origin + 1
+    reach = RADIUS_M - TOLERANCE_M
+    xs = (origin[0] + np.arange(shape[0])) * SPACING_M
+    ys = (origin[1] + np.arange(shape[1])) * SPACING_M
+    free = ((xs >= inner[0] + reach) & (xs <= inner[2] - reach))[:, None] & (
+        (ys >= inner[1] + reach) & (ys <= inner[3] - reach)
+    )[None, :]
+    mine = [o for o in openings if room in o.rooms]
+    doors = [o for o in mine if o.kind is not None]
+    sides = [_side_of(plan, room, o) for o in doors]
+    anchors = [_anchor(o, side, origin) for o, side in zip(doors, sides, strict=True)]
+    state = RoomState(
+        room,
+        name,
+        inner,
+        plan.area_cm2(room) / 1e4,
+        _edges(plan.polygon(frozenset({room})), mine),
+        np.zeros((CAPACITY, 6)),
+        np.zeros((CAPACITY, 6)),
+        np.ascontiguousarray(free),
+        origin,
+        np.array(anchors, dtype=np.int64).reshape(-1, 2),
+        0,
+    )
+    for i in range(i0, i1):
+        for j in range(j0, j1):
+            if plan.owner[i][j] != room:
+                x0, x1 = plan.xs[i] / 100.0 - half, plan.xs[i + 1] / 100.0 + half
+                y0, y1 = plan.ys[j] / 100.0 - half, plan.ys[j + 1] / 100.0 + half
+                box = np.array([x0, y0, x1, y1, 0.0, ceiling_m])
+                state.add_solid(box)
+                block(state.free, origin, box)
+    for o, side in zip(doors, sides, strict=True):
+        state.add_keep(_sided(o, side, DOOR_CLEAR_CM, 0.0, o.top / 100.0))
+    for o in mine:
+        if o.kind is None:
+            depth = WINDOW_DEPTH_M * 100.0
+            side = _side_of(plan, room, o)
+            state.add_keep(_sided(o, side, depth, o.bottom / 100.0, o.top / 100.0))
+    state.least = int(LEAST_FREE * int(state.free.sum()))
+    return state
+
+
+def quarter_quaternion(turn: int) -> tuple[float, float, float, float]:
+    """Quaternion of a number of quarter turns."""
+    return yaw_quaternion(90.0 * (turn % 4))

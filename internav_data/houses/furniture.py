@@ -1,0 +1,120 @@
+"""Furnish a house: room by room, rule by rule, each group at the first spot where it fits."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from internav_data.geometry import round_m
+from internav_data.houses.furnishing import RoomState, quarter_quaternion, room_state
+from internav_data.houses.groups import Place
+from internav_data.houses.pieces import Picker
+from internav_data.houses.rules import RULES
+from internav_data.records import Purpose, Thing, generator
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from internav_data.catalog import Catalogue
+    from internav_data.houses.openings import Opening
+    from internav_data.houses.plan import Plan
+    from internav_data.houses.rules import Rule
+
+CERTAIN = 1.0
+"""Rules of this share are what a room cannot do without."""
+MOST = 4
+"""Most groups that one rule puts into one room."""
+
+
+def furnish(
+    plan: Plan,
+    types: Sequence[str],
+    openings: Sequence[Opening],
+    ceiling_m: float,
+    density: float,
+    catalogue: Catalogue,
+    seed: int,
+    scene: int,
+    attempt: int,
+) -> tuple[Thing, ...]:
+    """Return the things of a house, by room and group."""
+    things: list[Thing] = []
+    for room, name in enumerate(types):
+        state = room_state(plan, room, name, openings, ceiling_m)
+        # Each room has numbers of its own: another room's luck does not change it.
+        rng = generator(seed, Purpose.FURNITURE, scene, attempt, draw=room)
+        _furnish_room(state, frozenset(types), Picker(catalogue, rng), density)
+        things += _things(state, len(things), _groups(things))
+    return tuple(things)
+
+
+def _groups(things: Sequence[Thing]) -> int:
+    return 1 + max((thing.group for thing in things), default=-1)
+
+
+def _times(rule: Rule, picker: Picker, area_m2: float, density: float) -> int:
+    """How many groups of a rule to try."""
+    draw = float(picker.rng.random())
+    if area_m2 < rule.least_m2:
+        return 0
+    if rule.share >= CERTAIN and rule.per_m2 == 0.0:
+        return 1
+    expected = (rule.share + rule.per_m2 * area_m2) * density
+    if rule.share >= CERTAIN:
+        expected = max(1.0, expected)
+    whole = int(expected)
+    return min(MOST, whole + (draw < expected - whole))
+
+
+def _furnish_room(
+    state: RoomState, types: frozenset[str], picker: Picker, density: float
+) -> None:
+    width, depth = float(state.inner[2] - state.inner[0]), float(state.inner[3] - state.inner[1])
+    place = Place(state.area_m2, min(width, depth), max(width, depth), types)
+    found = True
+    for rule in RULES[state.type]:
+        times = _times(rule, picker, state.area_m2, density)
+        if rule.without in types or (rule.instead and found):
+            continue
+        found = False
+        for _ in range(times):
+            if not _try_rule(state, rule, place, picker):
+                break
+            found = True
+
+
+def _try_rule(state: RoomState, rule: Rule, place: Place, picker: Picker) -> bool:
+    for group in rule.make(picker, place):
+        spots = (
+            state.in_the_open(group, picker.rng)
+            if rule.prefer == "open"
+            else state.along_walls(group, picker.rng, rule.prefer)
+        )
+        if state.place(group, spots):
+            return True
+    return False
+
+
+def _things(state: RoomState, first: int, first_group: int) -> list[Thing]:
+    """Turn a room's groups into things with ids, in the order they were placed."""
+    out: list[Thing] = []
+    for number, (group, x, y, turn) in enumerate(state.placed):
+        base = first + len(out)
+        for item in group.items:
+            dx, dy = ((item.x, item.y), (-item.y, item.x), (-item.x, -item.y), (item.y, -item.x))[
+                turn
+            ]
+            out.append(
+                Thing(
+                    thing_id=first + len(out),
+                    asset_id=item.asset.asset_id,
+                    type=item.asset.type,
+                    room=state.room,
+                    x=round_m(x + dx),
+                    y=round_m(y + dy),
+                    z=round_m(item.z),
+                    quaternion=quarter_quaternion(item.turn + turn),
+                    group=first_group + number if len(group.items) > 1 else -1,
+                    support=base + item.support if item.support >= 0 else -1,
+                )
+            )
+    return out

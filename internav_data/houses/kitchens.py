@@ -1,0 +1,123 @@
+"""Kitchens: runs of counters with stove, sink and fridge, and islands."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from internav_data.houses.pieces import FACING_WALL, Group, Item, Picker, against, in_front
+
+if TYPE_CHECKING:
+    from internav_data.houses.groups import Place
+    from internav_data.records import Asset
+
+SEAM_M = 0.008
+"""Gap between the pieces of a run."""
+WORKING_M = 0.75
+"""Clear depth before a run."""
+_FOODS = ("Microwave", "Bread", "Apple", "Lettuce", "Tomato", "Pot")
+
+
+def _run(p: Picker, kinds: tuple[str, ...], longest: float) -> Group | None:
+    """Pieces side by side along a wall; counters as long as the wall allows."""
+    fixed: list[Asset | None] = [p.one(kind) if kind != "CounterTop" else None for kind in kinds]
+    counters = kinds.count("CounterTop")
+    spare = longest - sum(a.size[0] + SEAM_M for a in fixed if a is not None)
+    items: list[Item] = []
+    x = 0.0
+    for kind, asset in zip(kinds, fixed, strict=True):
+        piece = asset
+        if kind == "CounterTop":
+            limit = spare / counters - SEAM_M
+            piece = p.one(kind, lambda a, most=limit: a.size[0] <= most)
+        if piece is None:
+            continue
+        items.append(against(piece, x + piece.size[0] / 2.0))
+        x += piece.size[0] + SEAM_M
+    if not items or x > longest:
+        return None
+    return Group(tuple(items), tuple(in_front(item, WORKING_M) for item in items))
+
+
+def _laid(p: Picker, group: Group) -> Group:
+    """Put food and pots on the counters."""
+    out = group
+    for k, item in enumerate(group.items):
+        if item.asset.type == "Stove" and p.chance(0.6):
+            pot = p.one("Pot")
+            resting = p.resting(item, k, pot, -0.12, 0.05) if pot else None
+            out = out.with_items(resting) if resting is not None else out
+        if item.asset.type != "CounterTop":
+            continue
+        half = item.half[0]
+        for dx in (-half + 0.4, half - 0.4) if half > 0.8 else (0.0,):  # noqa: PLR2004 - room for two
+            kind = _FOODS[int(float(p.rng.random()) * len(_FOODS))]
+            thing = p.one(kind) if p.chance(0.65) else None
+            resting = p.resting(item, k, thing, dx, 0.0) if thing else None
+            out = out.with_items(resting) if resting is not None else out
+    return out
+
+
+_RUNS: tuple[tuple[str, ...], ...] = (
+    ("Fridge", "CounterTop", "Stove", "CounterTop", "Sink", "Dishwasher"),
+    ("Fridge", "CounterTop", "Stove", "CounterTop", "Sink"),
+    ("Fridge", "CounterTop", "Stove", "Sink"),
+    ("Fridge", "Stove", "CounterTop", "Sink"),
+)
+_SHORT_RUNS: tuple[tuple[str, ...], ...] = (
+    ("CounterTop", "Stove", "Sink"),
+    ("Stove", "Sink"),
+    ("Stove",),
+)
+
+
+def kitchen_run(p: Picker, place: Place) -> list[Group]:
+    """Everything one cooks with along one wall, as much as fits, then less."""
+    start = 0 if place.area_m2 > 12 else 1  # noqa: PLR2004 - m², a roomy kitchen
+    kinds = list(_RUNS[start:])
+    if p.chance(0.5):
+        kinds = [k[::-1] for k in kinds]
+    runs = [_run(p, k, length) for k in kinds for length in (place.long_m, place.short_m)]
+    return [_laid(p, run) for run in runs if run is not None]
+
+
+def short_run(p: Picker, place: Place) -> list[Group]:
+    """Stove and sink where no whole run found room."""
+    runs = [
+        _run(p, k, length)
+        for k in _SHORT_RUNS
+        for length in (0.7 * place.long_m, 0.7 * place.short_m)
+    ]
+    return [_laid(p, run) for run in runs if run is not None]
+
+
+def counter(p: Picker, place: Place) -> list[Group]:
+    """Another counter."""
+    run = _run(p, ("CounterTop",), 0.6 * place.long_m)
+    return [_laid(p, run)] if run is not None else []
+
+
+def sink_alone(p: Picker, place: Place) -> list[Group]:
+    """A sink by itself."""
+    del place
+    asset = p.one("Sink")
+    if asset is None:
+        return []
+    item = against(asset)
+    return [Group((item,), (in_front(item, 0.6),))]
+
+
+def island(p: Picker, place: Place) -> list[Group]:
+    """A free-standing counter with stools."""
+    asset = p.one("KitchenIsland", lambda a: a.size[0] < 0.45 * place.long_m)
+    if asset is None:
+        return []
+    block = Item(asset, 0.0, 0.0, FACING_WALL)
+    hx, hy = block.half
+    around = (-hx - 0.8, -hy - 0.8, hx + 0.8, hy + 0.8)
+    group = Group((block,), ())
+    stool = p.one("Stool")
+    if stool is not None:
+        seats = [p.tucked(block, stool, 0, a) for a in (-hx / 2.0, hx / 2.0)]
+        group = group.with_items(*seats)
+    # Room to walk on the working side.
+    return [_laid(p, group.keeping((around[0] + 0.8, around[1], around[2] - 0.8, -hy)))]

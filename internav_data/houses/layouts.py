@@ -1,0 +1,247 @@
+"""Kinds of floor plans: sliced blocks, halls as spines, notches and L-shapes, rows as a fallback."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from internav_data.houses.slicing import (
+    GRID_CM,
+    Layout,
+    at_origin,
+    carve,
+    least_width,
+    mirrored,
+    slice_rooms,
+    snapped,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.random import Generator
+
+    from internav_data.houses.plan import Rect
+    from internav_data.houses.programme import RoomSpec
+
+_ORDER = (
+    "laundry",
+    "kitchen",
+    "dining",
+    "living",
+    "studio",
+    "hall",
+    "office",
+    "storage",
+    "bathroom",
+    "bedroom",
+)
+"""Rooms near each other here want to be near each other in the house."""
+_SMALL = frozenset({"bathroom", "laundry", "storage"})
+_LIVING = ("living", "dining", "kitchen")
+
+
+def _uniform(rng: Generator, low: float, high: float) -> float:
+    return low + (high - low) * float(rng.random())
+
+
+def _shuffled(rng: Generator, items: Sequence[int]) -> list[int]:
+    keys = rng.random(len(items))
+    return [items[int(k)] for k in keys.argsort(kind="stable")]
+
+
+def sliced(specs: Sequence[RoomSpec], rng: Generator) -> Layout:
+    """One block cut by a slicing tree."""
+    order = sorted(range(len(specs)), key=lambda k: (_ORDER.index(specs[k].type), k))
+    if float(rng.random()) < 0.35:  # noqa: PLR2004 - other orders now and then
+        order = _shuffled(rng, order)
+    area = sum(spec.area_m2 for spec in specs) * 1e4
+    aspect = _uniform(rng, 1.0, 1.35 if len(specs) == 1 else 1.75)
+    width = max(snapped(math.sqrt(area * aspect)), max(map(least_width, specs)))
+    height = max(snapped(area / width), max(map(least_width, specs)))
+    layout: Layout = {}
+    slice_rooms((0, 0, width, height), specs, order, rng, layout)
+    return layout
+
+
+def _split_bands(
+    specs: Sequence[RoomSpec], rooms: Sequence[int], rng: Generator
+) -> tuple[list[int], list[int]]:
+    """Deal rooms to the two sides of a hall, about equally by area."""
+    sides: tuple[list[int], list[int]] = ([], [])
+    load = [0.0, _uniform(rng, -6.0, 6.0)]
+    # The largest first, then whichever side has less.
+    for k in sorted(_shuffled(rng, rooms), key=lambda k: -specs[k].area_m2):
+        side = 0 if load[0] <= load[1] else 1
+        sides[side].append(k)
+        load[side] += specs[k].area_m2
+    return _shuffled(rng, sides[0]), _shuffled(rng, sides[1])
+
+
+def _cells(specs: Sequence[RoomSpec], band: list[int], rng: Generator) -> list[tuple[int, ...]]:
+    """Group a band's rooms: a small room shares the cell of a large one that wraps around it."""
+    small = [k for k in band if specs[k].type in _SMALL]
+    large = [k for k in band if specs[k].type not in _SMALL]
+    cells: list[tuple[int, ...]] = [(k,) for k in large]
+    for k in small:
+        hosts = [
+            m
+            for m, cell in enumerate(cells)
+            if len(cell) == 1
+            and specs[cell[0]].type in {"bedroom", "living", "office"}
+            and specs[cell[0]].area_m2 > 1.5 * specs[k].area_m2
+        ]
+        if hosts and float(rng.random()) < 0.7:  # noqa: PLR2004 - mostly wrapped
+            m = hosts[int(float(rng.random()) * len(hosts))]
+            cells[m] = (cells[m][0], k)
+        else:
+            cells.insert(int(float(rng.random()) * (len(cells) + 1)), (k,))
+    return cells
+
+
+def _wrap(
+    rect: Rect, specs: Sequence[RoomSpec], cell: tuple[int, ...], *, hall_above: bool, rng: Generator
+) -> Layout:
+    """Put a small room into a corner of a large one's cell: beside the hall, or at its far end."""
+    x0, y0, x1, y1 = rect
+    host, guest = cell
+    area = specs[guest].area_m2 * 1e4
+    least = least_width(specs[guest])
+    if float(rng.random()) < 0.3:  # noqa: PLR2004 - ensuite: the whole far end
+        depth = max(least, snapped(area / (x1 - x0)))
+        far: Rect = (x0, y0, x1, y0 + depth) if hall_above else (x0, y1 - depth, x1, y1)
+        return {host: carve([rect], far), guest: [far]}
+    depth = max(least, snapped(math.sqrt(area) * _uniform(rng, 0.9, 1.25)))
+    depth = min(depth, y1 - y0)
+    width = max(least, snapped(area / depth))
+    left = float(rng.random()) < 0.5  # noqa: PLR2004 - a fair coin
+    gx0, gx1 = (x0, x0 + width) if left else (x1 - width, x1)
+    near: Rect = (gx0, y1 - depth, gx1, y1) if hall_above else (gx0, y0, gx1, y0 + depth)
+    return {host: carve([rect], near), guest: [near]}
+
+
+def _fill_band(
+    specs: Sequence[RoomSpec],
+    cells: list[tuple[int, ...]],
+    rect: Rect,
+    *,
+    hall_above: bool,
+    rng: Generator,
+) -> Layout:
+    x0, y0, x1, y1 = rect
+    areas = [sum(specs[k].area_m2 for k in cell) for cell in cells]
+    least = [max(least_width(specs[k]) for k in cell) for cell in cells]
+    spare = max(0.0, (x1 - x0) - sum(least))
+    # Widths follow areas, but never under the least.
+    wanted = [max(0.0, a / sum(areas) * (x1 - x0) - w) for a, w in zip(areas, least, strict=True)]
+    factor = spare / sum(wanted) if sum(wanted) > 0.0 else 0.0
+    layout: Layout = {}
+    left = x0
+    reach = float(x0)
+    for k, cell in enumerate(cells):
+        reach += least[k] + factor * wanted[k]
+        right = x1 if k == len(cells) - 1 else max(left + GRID_CM, snapped(reach))
+        piece: Rect = (left, y0, right, y1)
+        if len(cell) == 1:
+            layout[cell[0]] = [piece]
+        else:
+            layout.update(_wrap(piece, specs, cell, hall_above=hall_above, rng=rng))
+        left = right
+    return layout
+
+
+def spine(specs: Sequence[RoomSpec], rng: Generator) -> Layout:
+    """A hall with rooms on both sides; the living rooms often fill its end."""
+    hall = next(k for k, spec in enumerate(specs) if spec.type == "hall")
+    rest = [k for k in range(len(specs)) if k != hall]
+    end: list[int] = []
+    if len(rest) > 3 and float(rng.random()) < 0.7:  # noqa: PLR2004 - four rooms have an end to spare
+        reach = 1 + int(float(rng.random()) * 3)
+        end = [k for name in _LIVING for k in rest if specs[k].type == name][:reach]
+        if len(rest) - len(end) < 2:  # noqa: PLR2004 - a hall serves two rooms at least
+            end = []
+    rest = [k for k in rest if k not in end]
+    top, bottom = _split_bands(specs, rest, rng)
+    hall_width = snapped(least_width(specs[hall]) * _uniform(rng, 1.0, 1.35))
+    depth = 100 * math.sqrt(sum(specs[k].area_m2 for k in rest) / len(rest))
+    area = sum(specs[k].area_m2 for k in rest) * 1e4
+    sides = (1 if top else 0) + (1 if bottom else 0)
+    length = snapped(area / (sides * depth * _uniform(rng, 0.85, 1.2)))
+    layout: Layout = {hall: [(0, 0, length, hall_width)]}
+    heights = []
+    # One side may end a good step earlier, so that the entrance has a porch.
+    porch = int(float(rng.random()) * 5)
+    for band, above in ((top, True), (bottom, False)):
+        if not band:
+            heights.append(0)
+            continue
+        side = length
+        if sides == 2 and porch == int(above):  # noqa: PLR2004 - both sides of the hall
+            side = length - max(120, snapped(length * _uniform(rng, 0.12, 0.25)))
+        band_area = sum(specs[k].area_m2 for k in band) * 1e4
+        deep = max(snapped(band_area / side), max(least_width(specs[k]) for k in band))
+        heights.append(deep)
+        y0, y1 = (hall_width, hall_width + deep) if above else (-deep, 0)
+        cells = _cells(specs, band, rng)
+        layout.update(_fill_band(specs, cells, (0, y0, side, y1), hall_above=not above, rng=rng))
+    if end:
+        height = heights[0] + heights[1] + hall_width
+        width = snapped(sum(specs[k].area_m2 for k in end) * 1e4 / height)
+        width = max(width, max(least_width(specs[k]) for k in end))
+        order = end if float(rng.random()) < 0.5 else end[::-1]  # noqa: PLR2004 - a fair coin
+        rect = (-width, -heights[1], 0, heights[0] + hall_width)
+        slice_rooms(rect, specs, order, rng, layout)
+    return layout
+
+
+def row(specs: Sequence[RoomSpec]) -> Layout:
+    """Rooms in a row, along a hall where there is one: plain, and possible for any programme."""
+    halls = [k for k, spec in enumerate(specs) if spec.type == "hall"]
+    along = halls[0] if halls and len(specs) > 2 else None  # noqa: PLR2004 - two need no hall
+    # Public rooms in the middle, so that fewer private ones are passed through.
+    rest = sorted(
+        (k for k in range(len(specs)) if k != along), key=lambda k: _ORDER.index(specs[k].type)
+    )
+    deepest = max(max(least_width(specs[k]) for k in rest), 300)
+    largest = max(specs[k].area_m2 for k in rest) * 1e4
+    depth = max(deepest, snapped(math.sqrt(largest)))
+    layout: Layout = {}
+    left = 0
+    for k in rest:
+        width = max(least_width(specs[k]), snapped(specs[k].area_m2 * 1e4 / depth + GRID_CM))
+        layout[k] = [(left, 0, left + width, depth)]
+        left += width
+    if along is not None:
+        layout[along] = [(0, depth, left, depth + least_width(specs[along]))]
+    return at_origin(layout)
+
+
+def notch(layout: Layout, specs: Sequence[RoomSpec], rng: Generator) -> None:
+    """Cut a corner off the house where a large room has it."""
+    x0 = min(r[0] for rects in layout.values() for r in rects)
+    x1 = max(r[2] for rects in layout.values() for r in rects)
+    y0 = min(r[1] for rects in layout.values() for r in rects)
+    y1 = max(r[3] for rects in layout.values() for r in rects)
+    for room, rects in layout.items():
+        if len(rects) != 1 or specs[room].type in _SMALL or specs[room].type == "hall":
+            continue
+        rx0, ry0, rx1, ry1 = rects[0]
+        if not ((rx0 == x0 or rx1 == x1) and (ry0 == y0 or ry1 == y1)):
+            continue
+        width, height = rx1 - rx0, ry1 - ry0
+        dx = snapped(width * _uniform(rng, 0.2, 0.42))
+        dy = snapped(height * _uniform(rng, 0.2, 0.42))
+        cx = (rx0, rx0 + dx) if rx0 == x0 else (rx1 - dx, rx1)
+        cy = (ry0, ry0 + dy) if ry0 == y0 else (ry1 - dy, ry1)
+        layout[room] = carve(rects, (cx[0], cy[0], cx[1], cy[1]))
+        return
+
+
+def draw_layout(specs: Sequence[RoomSpec], rng: Generator) -> Layout:
+    """Draw one candidate for a floor plan."""
+    has_hall = any(spec.type == "hall" for spec in specs)
+    few = 3
+    layout = spine(specs, rng) if has_hall and len(specs) >= few else sliced(specs, rng)
+    if float(rng.random()) < 0.35:  # noqa: PLR2004 - a third of the outlines are notched
+        notch(layout, specs, rng)
+    return mirrored(layout, rng)

@@ -1,0 +1,181 @@
+"""Doors and windows: where the walls of a floor plan open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from internav_data.houses.access import JAMB_CM, Span, loop_doors, possible_doors, spans
+from internav_data.houses.choice import LEAST_DOOR_CM
+from internav_data.houses.standards import HABITABLE, PUBLIC
+from internav_data.records import OUTSIDE, Purpose, generator
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.random import Generator
+
+    from internav_data.houses.choice import FloorPlan
+    from internav_data.houses.config import HouseConfig
+    from internav_data.houses.plan import Plan
+    from internav_data.records import DoorKind
+
+DOOR_HEIGHT_CM = 210
+OPEN_PLAN = (
+    frozenset({"kitchen", "living"}),
+    frozenset({"dining", "kitchen"}),
+    frozenset({"dining", "living"}),
+)
+"""Pairs of types that may share one wide opening."""
+
+
+@dataclass(frozen=True, slots=True)
+class Opening:
+    """A door or window on the plan, centimetres."""
+
+    along_x: bool
+    at: int
+    low: int
+    high: int
+    rooms: tuple[int, int]
+    """Ascending; windows and entrances have OUTSIDE first."""
+    kind: DoorKind | None
+    """None for windows."""
+    bottom: int = 0
+    top: int = DOOR_HEIGHT_CM
+
+    @property
+    def open(self) -> bool:
+        """Whether people can walk through it."""
+        return self.kind is not None and self.kind != "entrance"
+
+
+def _kind(names: frozenset[str], config: HouseConfig, rng: Generator) -> tuple[DoorKind, int]:
+    """Choose a door's kind and width, centimetres."""
+    draw, size = float(rng.random()), float(rng.random())
+    open_kind: DoorKind = "doorway" if names <= PUBLIC and draw > 0.7 else "single"  # noqa: PLR2004
+    if config.preset == "realistic":
+        if names & {"bathroom", "laundry", "storage"}:
+            return "single", 78 + 2 * int(size * 3)
+        return open_kind, 80 + 2 * int(size * 9)
+    if not names <= PUBLIC or draw >= config.wide_openings:
+        return open_kind, 100
+    if names in OPEN_PLAN and size < 0.5:  # noqa: PLR2004 - half of them are open plan
+        return "opening", 240
+    return ("wide", 150) if size < 0.8 else ("double", 200)  # noqa: PLR2004
+
+
+def _placed(span: Span, width: int, rng: Generator) -> int:
+    """Low end of an opening: near one end of the wall, so that furniture keeps its length."""
+    spare = span.length - width
+    draw, where = float(rng.random()), float(rng.random())
+    offset = min(spare, 5 + int(20 * where))
+    if draw < 0.4:  # noqa: PLR2004 - near the low end
+        return span.low + offset
+    if draw < 0.8:  # noqa: PLR2004 - near the high end
+        return span.high - width - offset
+    return span.low + int(spare * where)
+
+
+def draw_doors(
+    floor_plan: FloorPlan, config: HouseConfig, seed: int, scene: int, attempt: int
+) -> list[Opening]:
+    """Doors of the tree and of the loops, and the entrance, in order of their rooms."""
+    rng = generator(seed, Purpose.DOORS, scene, attempt)
+    plan, types = floor_plan.plan, floor_plan.types
+    possible = possible_doors(plan, LEAST_DOOR_CM[config.preset])
+    loops = loop_doors(types, sorted(possible), floor_plan.tree, config.loops, rng)
+    out: list[Opening] = []
+    for a, b in sorted([*floor_plan.tree, *loops]):
+        kind, width = _kind(frozenset({types[a], types[b]}), config, rng)
+        span = possible[a, b][0]
+        if span.length < width:
+            kind, width = _fitting(span.length, config)
+        width = min(width, span.length // 2 * 2)
+        low = _placed(span, width, rng)
+        out.append(Opening(span.along_x, span.at, low, low + width, (a, b), kind))
+    entrance = _entrance(plan, types, config, rng)
+    return [entrance, *out] if entrance is not None else out
+
+
+def _fitting(length: int, config: HouseConfig) -> tuple[DoorKind, int]:
+    wide = 150
+    if config.preset == "paper" and length >= wide:
+        return "wide", wide
+    return "single", LEAST_DOOR_CM[config.preset]
+
+
+def _entrance(
+    plan: Plan, types: Sequence[str], config: HouseConfig, rng: Generator
+) -> Opening | None:
+    """One closed door to the outside: at a hall's end if there is one."""
+    width = 100 if config.preset == "paper" else 92
+    likely = ("hall", "living", "studio", "kitchen", "dining")
+    best: tuple[float, Span, int] | None = None
+    for segment in plan.segments:
+        if OUTSIDE not in {segment.before, segment.after}:
+            continue
+        room = max(segment.before, segment.after)
+        rank = likely.index(types[room]) if types[room] in likely else len(likely)
+        for span in spans(plan, segment):
+            if span.length < width:
+                continue
+            # A hall is entered at its end: the shorter the wall, the better.
+            end = span.length / 1000.0 if types[room] == "hall" else float(rng.random())
+            if best is None or rank + 0.9 * min(1.0, end) < best[0]:
+                best = (rank + 0.9 * min(1.0, end), span, room)
+    if best is None:
+        return None
+    _, span, room = best
+    low = _placed(span, width, rng)
+    return Opening(span.along_x, span.at, low, low + width, (OUTSIDE, room), "entrance")
+
+
+_WINDOWS: Mapping[str, tuple[int, int, int]] = {
+    "bathroom": (60, 140, 60),
+    "laundry": (60, 140, 60),
+    "storage": (60, 150, 50),
+    "hall": (90, 100, 110),
+    "kitchen": (120, 105, 110),
+    "living": (180, 60, 150),
+    "studio": (160, 80, 130),
+    "dining": (150, 80, 130),
+}
+"""Width, sill and height by type, centimetres."""
+_USUAL_WINDOW = (130, 90, 122)
+
+
+def draw_windows(
+    floor_plan: FloorPlan,
+    doors: Sequence[Opening],
+    ceiling_cm: int,
+    seed: int,
+    scene: int,
+    attempt: int,
+) -> list[Opening]:
+    """Windows in the outer walls, more of them where people stay."""
+    rng = generator(seed, Purpose.WINDOWS, scene, attempt)
+    plan, out = floor_plan.plan, []
+    for segment in plan.segments:
+        if OUTSIDE not in {segment.before, segment.after}:
+            continue
+        room = max(segment.before, segment.after)
+        name = floor_plan.types[room]
+        width, sill, height = _WINDOWS.get(name, _USUAL_WINDOW)
+        top = min(sill + height, ceiling_cm - 15)
+        room_for = (segment.length - 2 * JAMB_CM) // (width + 110)
+        if room_for == 0 and segment.length >= width + 6 * JAMB_CM:
+            room_for = 1
+        most = room_for if name in HABITABLE else min(1, room_for)
+        pitch = segment.length / max(1, most)
+        for k in range(most):
+            centre = segment.low + round((k + 0.5) * pitch + 10.0 * (float(rng.random()) - 0.5))
+            low, high = centre - width // 2, centre + width - width // 2
+            if float(rng.random()) < (0.85 if name in HABITABLE else 0.6) and not any(
+                d.along_x == segment.along_x and d.at == segment.at and low < d.high + 20 and d.low - 20 < high
+                for d in doors
+            ):
+                out.append(
+                    Opening(segment.along_x, segment.at, low, high, (OUTSIDE, room), None, sill, top)
+                )
+    return out

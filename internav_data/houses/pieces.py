@@ -1,0 +1,218 @@
+"""Pieces of furniture and the groups they form, before they stand in a room.
+
+A group's frame: the wall is y = 0 and runs along x, the room lies at y > 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from internav_data.geometry import asset_corners
+from internav_data.houses.fitting import turned
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.random import Generator
+    from numpy.typing import NDArray
+
+    from internav_data.catalog import Catalogue
+    from internav_data.records import Asset
+
+    Floats = NDArray[np.float64]
+
+BACK_GAP_M = 0.01
+"""Furniture stands this far from the wall."""
+FACING_ROOM, FACING_WALL, FACING_RIGHT, FACING_LEFT = 2, 0, 1, 3
+"""Quarter turns of an asset (its front looks along -y) in a group's frame."""
+
+_BOXES: dict[tuple[str, str], Floats] = {}
+"""Boxes around the parts of assets by (catalogue digest, asset id): a cache, never cleared."""
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """An asset in a group's frame."""
+
+    asset: Asset
+    x: float
+    y: float
+    turn: int
+    z: float = 0.0
+    support: int = -1
+    """Index in the group of what it stands on."""
+
+    @property
+    def half(self) -> tuple[float, float]:
+        """Half extents along the group's x and y."""
+        w, d = self.asset.size[0] / 2.0, self.asset.size[1] / 2.0
+        return (w, d) if self.turn % 2 == 0 else (d, w)
+
+
+@dataclass(frozen=True)
+class Group:
+    """Things that belong together, and the boxes (n, 6) in front of them that stay clear."""
+
+    items: tuple[Item, ...]
+    clear: tuple[tuple[float, float, float, float], ...] = ()
+    related: bool = field(default=True)
+
+    @cached_property
+    def boxes(self) -> Floats:
+        """Bounding boxes of the items, (n, 6): x0, y0, x1, y1, z0, z1."""
+        out = np.empty((len(self.items), 6))
+        for k, item in enumerate(self.items):
+            hx, hy = item.half
+            top = item.z + item.asset.size[2]
+            out[k] = (item.x - hx, item.y - hy, item.x + hx, item.y + hy, item.z, top)
+        return out
+
+    @cached_property
+    def blocking(self) -> NDArray[np.bool_]:
+        """Which items stand in the agent's way."""
+        return np.array([item.asset.blocks for item in self.items])
+
+    @cached_property
+    def fronts(self) -> Floats:
+        """Boxes to keep clear, (n, 6)."""
+        return np.array([(*c, 0.03, 1.8) for c in self.clear]).reshape(-1, 6)
+
+    @property
+    def left(self) -> float:
+        """Least x."""
+        return float(self.boxes[:, 0].min())
+
+    @property
+    def right(self) -> float:
+        """Largest x."""
+        return float(self.boxes[:, 2].max())
+
+    @property
+    def depth(self) -> float:
+        """Extent along y."""
+        return float(self.boxes[:, 3].max() - self.boxes[:, 1].min())
+
+    def with_items(self, *items: Item) -> Group:
+        """Return the group with further items."""
+        return Group((*self.items, *items), self.clear, self.related)
+
+    def keeping(self, *clear: tuple[float, float, float, float]) -> Group:
+        """Return the group with further boxes (x0, y0, x1, y1) to keep clear."""
+        return Group(self.items, (*self.clear, *clear), self.related)
+
+
+def against(asset: Asset, x: float = 0.0, z: float = 0.0) -> Item:
+    """Stand an asset with its back to the wall."""
+    return Item(asset, x, BACK_GAP_M + asset.size[1] / 2.0, FACING_ROOM, z)
+
+
+def in_front(item: Item, depth: float, share: float = 1.0) -> tuple[float, float, float, float]:
+    """Box of some depth before an item that faces the room."""
+    hx, hy = item.half
+    return (item.x - hx * share, item.y + hy, item.x + hx * share, item.y + hy + depth)
+
+
+@dataclass(frozen=True, slots=True)
+class Picker:
+    """Chooses assets by type and size."""
+
+    catalogue: Catalogue
+    rng: Generator
+
+    def chance(self, share: float) -> bool:
+        """Toss a coin that shows heads with a share."""
+        return float(self.rng.random()) < share
+
+    def one(
+        self, kind: str, fits: Callable[[Asset], bool] | None = None, *, any_size: bool = False
+    ) -> Asset | None:
+        """Return an asset of a type; None where the catalogue has none (of that size)."""
+        found: Sequence[Asset] = self.catalogue.of_type(kind)
+        if fits is not None:
+            fitting = [asset for asset in found if fits(asset)]
+            found = fitting if fitting or not any_size else found
+        draw = float(self.rng.random())
+        return found[int(draw * len(found))] if found else None
+
+    def parts(self, item: Item) -> Floats:
+        """Boxes around the parts of an item, (n, 6), in the group's frame."""
+        key = (self.catalogue.digest, item.asset.asset_id)
+        if key not in _BOXES:
+            corners, starts = asset_corners(item.asset)
+            low = np.minimum.reduceat(corners, starts[:-1])
+            high = np.maximum.reduceat(corners, starts[:-1])
+            _BOXES[key] = np.column_stack([low[:, :2], high[:, :2], low[:, 2], high[:, 2]])
+        local = _BOXES[key]
+        out = np.empty_like(local)
+        for k in range(len(local)):
+            turned(local[k], item.x, item.y, item.turn % 4, out[k])
+        out[:, 4:] += item.z
+        return out
+
+    def resting(
+        self, below: Item, index: int, asset: Asset, dx: float, dy: float, turn: int = FACING_ROOM
+    ) -> Item | None:
+        """Stand an asset on an item, (dx, dy) from its middle; None where it finds no flat top."""
+        item = Item(asset, below.x + dx, below.y + dy, turn, support=index)
+        hx, hy = item.half
+        parts = self.parts(below)
+        over = (
+            (parts[:, 0] < item.x + hx)
+            & (parts[:, 2] > item.x - hx)
+            & (parts[:, 1] < item.y + hy)
+            & (parts[:, 3] > item.y - hy)
+        )
+        if not over.any():
+            return None
+        top = float(parts[over, 5].max())
+        slack = 0.02
+        carries = (
+            over
+            & (parts[:, 5] > top - 1e-3)
+            & (parts[:, 0] <= item.x - hx + slack)
+            & (parts[:, 2] >= item.x + hx - slack)
+            & (parts[:, 1] <= item.y - hy + slack)
+            & (parts[:, 3] >= item.y + hy - slack)
+        )
+        return replace(item, z=top) if carries.any() else None
+
+    def tucked(self, table: Item, chair: Asset, side: int, along: float) -> Item:
+        """Push a chair under a table from a side (quarter turns from +y) as far as it goes.
+
+        `along` is the offset from the table's middle along that side.
+        """
+        hx, hy = table.half
+        dx, dy = ((0, 1), (-1, 0), (0, -1), (1, 0))[side]
+        turn = side % 4
+        reach = (hy if dx == 0 else hx) + chair.size[1] / 2.0 + 0.03
+        solid = self.parts(table)
+        best = Item(chair, 0.0, 0.0, turn)
+        # In steps of 4 cm, but the back of the chair stays outside.
+        deepest = max(0.0, min(0.28, chair.size[1] - 0.22))
+        for step in range(1 + int(deepest / 0.04)):
+            offset = reach - 0.04 * step
+            x = table.x + dx * offset + (along if dx == 0 else 0.0)
+            y = table.y + dy * offset + (along if dy == 0 else 0.0)
+            trial = Item(chair, x, y, turn)
+            if step > 0 and overlap(self.parts(trial), solid):
+                break
+            best = trial
+        return best
+
+
+def overlap(first: Floats, second: Floats, gap: float = 0.005) -> bool:
+    """Whether boxes (n, 6) of one thing come nearer than a gap to those of another."""
+    a, b = first[:, None, :], second[None, :, :]
+    apart = (
+        (a[..., 0] >= b[..., 2] + gap)
+        | (b[..., 0] >= a[..., 2] + gap)
+        | (a[..., 1] >= b[..., 3] + gap)
+        | (b[..., 1] >= a[..., 3] + gap)
+        | (a[..., 4] >= b[..., 5] + gap)
+        | (b[..., 4] >= a[..., 5] + gap)
+    )
+    return not bool(apart.all())

@@ -1,0 +1,173 @@
+"""Floor plans on whole centimetres: rooms as cells of a grid, with their walls and neighbours.
+
+The grid's lines are where walls may stand; each cell belongs to one room or to OUTSIDE. That makes
+rooms tile their outline by construction: there are no overlaps and no gaps to check afterwards.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from internav_data.houses.standards import WALL_CM
+from internav_data.records import OUTSIDE
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+Rect = tuple[int, int, int, int]
+"""x_min, y_min, x_max, y_max in centimetres, centre line to centre line."""
+Corner = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A straight piece of wall between two rooms (or a room and OUTSIDE)."""
+
+    along_x: bool
+    at: int
+    """y of a wall along x, x of one along y."""
+    low: int
+    high: int
+    before: int
+    """Room below (wall along x) or left of it (wall along y)."""
+    after: int
+
+    @property
+    def length(self) -> int:
+        """Centimetres."""
+        return self.high - self.low
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A grid of cells: `owner[i][j]` is the room between xs[i], xs[i + 1] and ys[j], ys[j + 1]."""
+
+    xs: tuple[int, ...]
+    ys: tuple[int, ...]
+    owner: tuple[tuple[int, ...], ...]
+
+    @staticmethod
+    def of(rooms: Sequence[Iterable[Rect]]) -> Plan:
+        """Lay rooms, given as rectangles, on their common grid; later rooms win overlaps."""
+        rooms = [list(rects) for rects in rooms]
+        xs = sorted({x for rects in rooms for r in rects for x in (r[0], r[2])})
+        ys = sorted({y for rects in rooms for r in rects for y in (r[1], r[3])})
+        column = {x: i for i, x in enumerate(xs)}
+        row = {y: j for j, y in enumerate(ys)}
+        owner = [[OUTSIDE] * (len(ys) - 1) for _ in range(len(xs) - 1)]
+        for room, rects in enumerate(rooms):
+            for x0, y0, x1, y1 in rects:
+                below, above = row[y0], row[y1]
+                for i in range(column[x0], column[x1]):
+                    owner[i][below:above] = [room] * (above - below)
+        return Plan(tuple(xs), tuple(ys), tuple(tuple(cells) for cells in owner))
+
+    def at(self, i: int, j: int) -> int:
+        """Owner of a cell; OUTSIDE beyond the grid."""
+        inside = 0 <= i < len(self.xs) - 1 and 0 <= j < len(self.ys) - 1
+        return self.owner[i][j] if inside else OUTSIDE
+
+    @cached_property
+    def cells(self) -> Mapping[int, list[tuple[int, int]]]:
+        """Cells of each room, column by column."""
+        out: dict[int, list[tuple[int, int]]] = {}
+        for i, column in enumerate(self.owner):
+            for j, room in enumerate(column):
+                if room != OUTSIDE:
+                    out.setdefault(room, []).append((i, j))
+        return out
+
+    def area_cm2(self, room: int) -> int:
+        """Area of a room, centre line to centre line."""
+        return sum(
+            (self.xs[i + 1] - self.xs[i]) * (self.ys[j + 1] - self.ys[j])
+            for i, j in self.cells[room]
+        )
+
+    @cached_property
+    def segments(self) -> tuple[Segment, ...]:
+        """All walls, as long straight pieces that have the same room on either side."""
+        return tuple(self._walls(along_x=False) + self._walls(along_x=True))
+
+    def _walls(self, *, along_x: bool) -> list[Segment]:
+        lines, stops = (self.ys, self.xs) if along_x else (self.xs, self.ys)
+        out: list[Segment] = []
+        for k, at in enumerate(lines):
+            low, pair = 0, (OUTSIDE, OUTSIDE)
+            for m in range(len(stops)):
+                here = (OUTSIDE, OUTSIDE)
+                if m < len(stops) - 1:
+                    here = (
+                        (self.at(m, k - 1), self.at(m, k))
+                        if along_x
+                        else (self.at(k - 1, m), self.at(k, m))
+                    )
+                if here != pair:
+                    if pair[0] != pair[1]:
+                        out.append(Segment(along_x, at, low, stops[m], *pair))
+                    low, pair = stops[m], here
+        return out
+
+    def polygon(self, inside: frozenset[int]) -> tuple[Corner, ...]:
+        """Corners of the union of some rooms, counter-clockwise; () where it is in pieces."""
+        step: dict[Corner, list[Corner]] = {}
+        for i in range(len(self.xs) - 1):
+            for j in range(len(self.ys) - 1):
+                if self.owner[i][j] not in inside:
+                    continue
+                x0, x1, y0, y1 = self.xs[i], self.xs[i + 1], self.ys[j], self.ys[j + 1]
+                for (di, dj), a, b in (
+                    ((0, -1), (x0, y0), (x1, y0)),
+                    ((1, 0), (x1, y0), (x1, y1)),
+                    ((0, 1), (x1, y1), (x0, y1)),
+                    ((-1, 0), (x0, y1), (x0, y0)),
+                ):
+                    if self.at(i + di, j + dj) not in inside:
+                        step.setdefault(a, []).append(b)
+        if not step or any(len(ends) > 1 for ends in step.values()):
+            return ()
+        start = min(step)
+        path = [start]
+        for _ in range(len(step) - 1):
+            path.append(step[path[-1]][0])
+        if step[path[-1]][0] != start or len(set(path)) != len(path):
+            return ()
+        return _without_straight(path)
+
+    def main_rectangle(self, room: int) -> Rect:
+        """Return the largest rectangle of whole cells inside a room."""
+        cells = set(self.cells[room])
+        best, best_area = (0, 0, 0, 0), 0
+        for i0, j0 in cells:
+            top = min(self.ys.__len__(), 1000)
+            i1 = i0
+            while (i1, j0) in cells:
+                j1 = j0
+                while j1 < top and (i1, j1) in cells:
+                    j1 += 1
+                top = j1
+                rect = (self.xs[i0], self.ys[j0], self.xs[i1 + 1], self.ys[top])
+                area = (rect[2] - rect[0]) * (rect[3] - rect[1])
+                if (area, rect) > (best_area, best):
+                    best, best_area = rect, area
+                i1 += 1
+        return best
+
+
+def _without_straight(path: list[Corner]) -> tuple[Corner, ...]:
+    """Drop corners in the middle of straight lines."""
+    count = len(path)
+    kept: list[Corner] = []
+    for k in range(count):
+        (ax, ay), (bx, by), (cx, cy) = path[k - 1], path[k], path[(k + 1) % count]
+        if (bx - ax) * (cy - by) != (by - ay) * (cx - bx):
+            kept.append((bx, by))
+    return tuple(kept)
+
+
+def clear_size_m(rect: Rect) -> tuple[float, float]:
+    """Shorter and longer side between the wall faces of a rectangle of centre lines, metres."""
+    sides = sorted((rect[2] - rect[0] - WALL_CM, rect[3] - rect[1] - WALL_CM))
+    return sides[0] / 100.0, sides[1] / 100.0

@@ -1,0 +1,149 @@
+"""Which rooms a house has and how large each wants to be."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from internav_data.houses.quota import SHARES, room_count
+from internav_data.houses.standards import (
+    DOUBLE_BEDROOM,
+    SINGLE_BEDROOM,
+    STANDARDS,
+    Standard,
+)
+from internav_data.records import Purpose, generator
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.random import Generator
+
+    from internav_data.houses.config import HouseConfig
+
+PAPER_AREA_M2 = 25.0
+"""Area a room in the paper preset, measured on ProcTHOR's houses: 26, 47, 67, 103 … m²."""
+
+
+@dataclass(frozen=True, slots=True)
+class RoomSpec:
+    """One room of the programme: its type, the area it wants and the standard it must keep."""
+
+    type: str
+    area_m2: float
+    standard: Standard
+
+
+_HOMES: Mapping[int, tuple[tuple[float, str], ...]] = {
+    1: ((1.0, "studio"),),
+    2: (
+        (0.40, "living bedroom"),
+        (0.25, "studio bathroom"),
+        (0.20, "kitchen living"),
+        (0.15, "kitchen bedroom"),
+    ),
+    3: (
+        (0.40, "living bedroom bathroom"),
+        (0.30, "living kitchen bedroom"),
+        (0.15, "living kitchen bathroom"),
+        (0.15, "kitchen bedroom bathroom"),
+    ),
+    4: (
+        (0.60, "living kitchen bedroom bathroom"),
+        (0.20, "living bedroom bedroom bathroom"),
+        (0.10, "living kitchen dining bedroom"),
+        (0.10, "living kitchen bedroom office"),
+    ),
+}
+"""Small homes: (share, rooms)."""
+_CORE = "living kitchen bedroom bathroom"
+_FURTHER: tuple[tuple[str, float, int], ...] = (
+    ("bedroom", 3.0, 4),
+    ("bathroom", 1.3, 3),
+    ("dining", 1.4, 1),
+    ("office", 1.0, 1),
+    ("laundry", 0.9, 1),
+    ("storage", 0.7, 1),
+)
+"""What larger homes have beside the core: (type, weight, most of them)."""
+
+
+def _choose(rng: Generator, weighted: list[tuple[float, str]]) -> str:
+    position = float(rng.random()) * sum(weight for weight, _ in weighted)
+    for weight, value in weighted:
+        position -= weight
+        if position < 0.0:
+            return value
+    return weighted[-1][1]
+
+
+def _room_types(rng: Generator, count: int, hall_from: int) -> list[str]:
+    if count in _HOMES:
+        types = _choose(rng, list(_HOMES[count])).split()
+        if count >= hall_from:
+            types[-1] = "hall"
+        return types
+    types = _CORE.split()
+    if count >= hall_from:
+        types.insert(0, "hall")
+    while len(types) < count:
+        # A second bathroom before the third bedroom has somewhere to go looks wrong.
+        bedrooms = types.count("bedroom")
+        open_types = [
+            (weight, name)
+            for name, weight, most in _FURTHER
+            if types.count(name) < most and (name != "bathroom" or types.count(name) < bedrooms)
+        ]
+        types.append(_choose(rng, open_types))
+    return types
+
+
+def _standards(types: list[str], config: HouseConfig, rng: Generator) -> list[Standard]:
+    table = STANDARDS[config.preset]
+    out: list[Standard] = []
+    bedrooms = 0
+    for name in types:
+        if config.preset == "realistic" and name == "bedroom":
+            bedrooms += 1
+            single = bedrooms > 1 and float(rng.random()) < 0.6  # noqa: PLR2004 - most second ones
+            out.append(SINGLE_BEDROOM if single else DOUBLE_BEDROOM)
+        else:
+            out.append(table[name])
+    return out
+
+
+def _areas(standards: list[Standard], config: HouseConfig, rng: Generator) -> list[float]:
+    """Areas wanted, centre line to centre line, m²."""
+    spread = 0.14 if config.preset == "paper" else 0.10
+    areas = [s.area_m2 * math.exp(spread * float(rng.standard_normal())) for s in standards]
+    areas = [min(s.high_m2, max(s.low_m2, a)) for s, a in zip(standards, areas, strict=True)]
+    if config.preset == "paper":
+        count = len(areas)
+        whole = PAPER_AREA_M2 * count * math.exp(0.12 * float(rng.standard_normal()))
+        factor = whole / sum(areas) * config.scale_of(count) ** 2
+        areas = [max(s.low_m2, a * factor) for s, a in zip(standards, areas, strict=True)]
+    # Walls take about a tenth of a real room and a twentieth of a generous one.
+    return [a + 0.24 * math.sqrt(a) + 0.02 for a in areas]
+
+
+def programme(seed: int, scene: int, config: HouseConfig, attempt: int) -> tuple[RoomSpec, ...]:
+    """Return the rooms of one house.
+
+    The number of rooms is the same in every attempt: the quota must not depend on what failed.
+    """
+    request = config.check()
+    rng = generator(seed, Purpose.PROGRAMME, scene, attempt, episode=1)
+    if request.programme:
+        types = list(request.programme)
+    else:
+        shares = SHARES
+        if request.counts:
+            shares = {count: SHARES[count] for count in request.counts}
+        types = _room_types(rng, room_count(seed, scene, shares), config.hall_from)
+    standards = _standards(types, config, rng)
+    areas = _areas(standards, config, rng)
+    return tuple(
+        RoomSpec(name, area, standard)
+        for name, area, standard in zip(types, areas, standards, strict=True)
+    )
