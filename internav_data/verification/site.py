@@ -93,10 +93,10 @@ class Site:
         return self._room_paths[key]
 
     def door_paths(self, first: int, second: int) -> tuple[tuple[tuple[int, ...], ...], bool]:
-        """Every choice of doors along every room path, in order; whether more than are listed."""
-        paths, cut = self.room_paths(first, second)
+        """Every choice of doors along the listed room paths; whether more than are listed."""
+        paths, _ = self.room_paths(first, second)
         out: list[tuple[int, ...]] = []
         for path in paths:
             steps = [self.open_doors[min(a, b), max(a, b)] for a, b in pairwise(path)]
             out += product(*steps)
-        return tuple(out[:MOST_PATHS]), cut or len(out) > MOST_PATHS
+        return tuple(out[:MOST_PATHS]), len(out) > MOST_PATHS

@@ -1,0 +1,197 @@
+"""Ranges of single values, column by column: what a JSON Schema says, vectorised."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow as pa
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from internav_data.verification.findings import Collector
+
+METRES = 4
+"""Positions and lengths are rounded to 0.1 mm."""
+TURNS = 6
+"""Quaternions are rounded to 1e-6."""
+UNIT = 3e-6
+"""How far from 1 the length of a rounded quaternion may be."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """What every value of one leaf column obeys (missing values are judged by the schema)."""
+
+    low: float = -math.inf
+    high: float = math.inf
+    choices: tuple[Any, ...] = ()
+    digits: int | None = None
+    """Decimals that a stored float has at most."""
+    pattern: str = ""
+
+
+COORDINATE = Rule(-1e4, 1e4, digits=METRES)
+ID = Rule(0, 32767)
+ID_OR_NONE = Rule(-1, 32767)
+SIZE = Rule(1e-4, 1e4, digits=METRES)
+SCENE = Rule(pattern=r"scene-\d{6,}")
+NAME = Rule(pattern=r"\S+")
+MASS = Rule(1e-4, 1e5)
+FRICTION = Rule(0.0, 2.0)
+SPLIT = Rule(choices=("train", "val", "test"))
+TURN = Rule(-1.0, 1.0, digits=TURNS)
+FROM_ZERO = Rule(0.0, 1.0)
+
+EPISODE_RULES: Mapping[str, Rule] = {
+    "episode_id": Rule(pattern=r"scene-\d{6,}/\d{4,}"),
+    "scene_id": SCENE,
+    "split": SPLIT,
+    "index": Rule(0),
+    "seed": Rule(0),
+    "room_count": Rule(1),
+    "mode": Rule(choices=("blocked", "lengthened")),
+    "rooms_on_way": Rule(1),
+    "obstacle_count": Rule(1),
+    "clear_m": Rule(0.0, 1e4, digits=METRES),
+    "clear_steps": Rule(1),
+    "way_m": Rule(0.0, 1e4, digits=METRES),
+    "steps": Rule(1),
+    "start.yaw_deg": Rule(choices=(0, 90, 180, 270)),
+    **{f"{end}.{axis}": Rule(0) for end in ("start", "goal") for axis in "ij"},
+    **{f"{end}.{axis}": Rule(0.0, 1e4, digits=2) for end in ("start", "goal") for axis in "xy"},
+    **{f"{end}.room": ID for end in ("start", "goal")},
+    "room_paths.element.element": ID,
+    "node_paths.element.doors.element": ID,
+    **{f"node_paths.element.points.element.{axis}": COORDINATE for axis in "xy"},
+    "obstacles.element.asset_id": NAME,
+    "obstacles.element.type": NAME,
+    **{f"obstacles.element.{axis}": COORDINATE for axis in "xyz"},
+    **{f"obstacles.element.quaternion.{axis}": TURN for axis in "xyz"},
+    "obstacles.element.quaternion.w": Rule(0.0, 1.0, digits=TURNS),
+    "obstacles.element.mass_kg": MASS,
+    "obstacles.element.friction": FRICTION,
+    "obstacles.element.segment": Rule(0),
+    "obstacles.element.settle_s": FROM_ZERO,
+    "obstacles.element.settle_penetration_m": FROM_ZERO,
+    "physics.engine": NAME,
+    "physics.build": NAME,
+    "physics.settle_s": FROM_ZERO,
+    "physics.penetration_m": FROM_ZERO,
+}
+SCENE_RULES: Mapping[str, Rule] = {
+    "scene_id": SCENE,
+    "scene": Rule(0),
+    "seed": Rule(0),
+    "split": SPLIT,
+    **{f"outline.element.{axis}": COORDINATE for axis in "xy"},
+    "rooms.element.room_id": ID,
+    "rooms.element.type": NAME,
+    **{f"rooms.element.polygon.element.{axis}": COORDINATE for axis in "xy"},
+    "rooms.element.area_m2": Rule(1e-4, 1e6),
+    "rooms.element.ceiling_m": Rule(1.8, 20.0),
+    "doors.element.door_id": ID,
+    "doors.element.rooms.element": ID_OR_NONE,
+    **{f"doors.element.{axis}": COORDINATE for axis in "xy"},
+    "doors.element.width_m": SIZE,
+    "doors.element.height_m": SIZE,
+    "doors.element.kind": Rule(
+        choices=("opening", "doorway", "single", "wide", "double", "entrance")
+    ),
+    "windows.element.window_id": ID,
+    "windows.element.room": ID,
+    "windows.element.width_m": SIZE,
+    "windows.element.height_m": SIZE,
+    "windows.element.sill_m": Rule(0.0, 20.0, digits=METRES),
+    **{f"walls.element.{axis}_{end}": COORDINATE for axis in "xyz" for end in ("min", "max")},
+    "things.element.thing_id": ID,
+    "things.element.asset_id": NAME,
+    "things.element.room": ID,
+    **{f"things.element.{axis}": COORDINATE for axis in "xyz"},
+    **{f"things.element.quaternion.{axis}": TURN for axis in "xyz"},
+    "things.element.quaternion.w": Rule(0.0, 1.0, digits=TURNS),
+    "things.element.group": ID_OR_NONE,
+    "things.element.support": ID_OR_NONE,
+    "room_graph.element.element": ID,
+    "area_m2": Rule(1e-4, 1e6),
+}
+ASSET_RULES: Mapping[str, Rule] = {
+    "asset_id": NAME,
+    "type": NAME,
+    **{f"size.{axis}": Rule(0.0, 100.0) for axis in "xyz"},
+    "mass_kg": MASS,
+    "friction": FRICTION,
+    "parts.element.shape": Rule(choices=("box", "cylinder", "sphere", "hull")),
+    **{f"parts.element.size.{axis}": Rule(0.0, 100.0) for axis in "xyz"},
+}
+RULES = {"episodes": EPISODE_RULES, "scenes": SCENE_RULES, "assets": ASSET_RULES}
+
+
+def leaves(table: pa.Table) -> Iterator[tuple[str, pa.Array]]:
+    """Yield every leaf column: its dotted path and its values, missing ones left out."""
+    for name in table.column_names:
+        for chunk in table.column(name).chunks:
+            yield from _leaves(name, chunk)
+
+
+def _leaves(path: str, array: pa.Array) -> Iterator[tuple[str, pa.Array]]:
+    array = array.drop_null() if array.null_count else array
+    if pa.types.is_struct(array.type):
+        for field, child in zip(array.type, array.flatten(), strict=True):
+            yield from _leaves(f"{path}.{field.name}", child)
+    elif pa.types.is_list(array.type):
+        yield from _leaves(f"{path}.element", array.flatten())
+    else:
+        yield path, array
+
+
+def check_ranges(table: pa.Table, name: str, report: Collector) -> None:
+    """Judge every value of a table by the rule of its column."""
+    rules = RULES[name]
+    turns: dict[str, list[np.ndarray[Any, Any]]] = {}
+    for path, array in leaves(table):
+        if pa.types.is_floating(array.type):
+            values = array.to_numpy(zero_copy_only=False)
+            _none(report, f"schema.{name}.{path}", "finite numbers", values[~np.isfinite(values)])
+            stem, _, last = path.rpartition(".")
+            if stem.endswith(("quaternion", "rotation")) and last in "xyzw":
+                turns.setdefault(stem, []).append(values)
+        if path in rules:
+            _check_leaf(array, rules[path], f"schema.{name}.{path}", report)
+    for stem, parts in turns.items():
+        # One chunk gives x, y, z and w in a row.
+        for k in range(0, len(parts), 4):
+            length = np.sqrt(sum(part * part for part in parts[k : k + 4]))
+            wrong = length[np.abs(length - 1.0) > UNIT]
+            _none(report, f"schema.{name}.{stem}", "a unit quaternion", wrong)
+
+
+def _check_leaf(array: pa.Array, rule: Rule, predicate: str, report: Collector) -> None:
+    if pa.types.is_string(array.type):
+        words = array.unique().to_pylist()
+        if rule.choices:
+            wrong = [word for word in words if word not in rule.choices]
+            _none(report, predicate, f"one of {rule.choices}", wrong)
+        if rule.pattern:
+            wrong = [word for word in words if not re.fullmatch(rule.pattern, word)]
+            _none(report, predicate, f"{rule.pattern}", wrong)
+        return
+    values = array.to_numpy(zero_copy_only=False)
+    outside = values[(values < rule.low) | (values > rule.high)]
+    _none(report, predicate, f"{rule.low:g} … {rule.high:g}", outside)
+    if rule.choices:
+        wrong = values[~np.isin(values, rule.choices)]
+        _none(report, predicate, f"one of {rule.choices}", wrong)
+    if rule.digits is not None:
+        # What was rounded is the float nearest to its decimals.
+        wrong = values[np.abs(np.round(values, rule.digits) - values) > 1e-9]  # noqa: PLR2004
+        _none(report, predicate, f"{rule.digits} decimals", wrong)
+
+
+def _none(report: Collector, predicate: str, expected: str, wrong: Any) -> None:  # noqa: ANN401 - values of any column
+    got = "" if len(wrong) == 0 else f"{wrong[0]} ({len(wrong)} such values)"
+    report.expect(len(wrong) == 0, predicate, expected, got)

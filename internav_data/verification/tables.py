@@ -1,0 +1,264 @@
+"""Level `schema`: columns, ranges, order, ids and the links between the tables."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from internav_data.dataset import ASSETS, EPISODES, SCENES, TABLES, from_table, read_table
+from internav_data.records import OUTSIDE
+from internav_data.records.errors import InternavError
+from internav_data.verification.findings import Collector
+from internav_data.verification.ranges import check_ranges
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    import pyarrow as pa
+
+    from internav_data.dataset import DataFile, Manifest
+    from internav_data.records import House
+
+SPLIT_PERIOD = 120
+"""Scenes by number: 0 of every 120 is val, 1 is test, the others train."""
+
+
+@dataclass(frozen=True, slots=True)
+class SceneKeys:
+    """What episodes of a scene may refer to."""
+
+    split: str
+    room_ids: frozenset[int]
+    door_ids: frozenset[int]
+
+
+@dataclass(slots=True)
+class Keys:
+    """What the tables of a dataset may refer to in each other, and what they hold."""
+
+    assets: frozenset[str] = frozenset()
+    scenes: dict[str, SceneKeys] = field(default_factory=dict)
+    episodes: Counter[str] = field(default_factory=Counter)
+
+
+def split_of(scene: int) -> str:
+    """Return the split that a scene's number says."""
+    return {0: "val", 1: "test"}.get(scene % SPLIT_PERIOD, "train")
+
+
+def number_of(scene_id: str) -> int:
+    """Return a scene's number, -1 where the id has none."""
+    digits = scene_id.rpartition("-")[2]
+    return int(digits) if digits.isdecimal() else -1
+
+
+def check_tables(root: Path, manifest: Manifest, damaged: frozenset[str]) -> Collector:
+    """Judge all tables of a dataset; files that `files` found damaged are left out."""
+    whole = Collector()
+    keys = Keys()
+    for name in ("assets", "scenes", "episodes"):
+        for file in manifest.of(name):
+            if file.path not in damaged:
+                whole.absorb(_check_table(root, manifest, file, keys))
+    if not damaged:
+        _check_counts(manifest, keys, whole)
+    return whole
+
+
+def _check_table(root: Path, manifest: Manifest, file: DataFile, keys: Keys) -> Collector:
+    report = Collector(file.path)
+    spec = next(spec for spec in TABLES if spec.name == file.table)
+    try:
+        table = read_table(root / file.path, spec)
+    except InternavError as error:
+        report.expect(False, "schema.columns", f"the columns of {file.table}", error)  # noqa: FBT003
+        return report
+    report.expect(table.schema.equals(spec.schema), "schema.columns", spec.schema, table.schema)
+    check_ranges(table, file.table, report)
+    if file.table == "assets":
+        _check_assets(table, keys, report)
+    elif file.table == "scenes":
+        _check_scenes(table, manifest, file, keys, report)
+    else:
+        _check_episodes(table, manifest, file, keys, report)
+    return report
+
+
+def _check_assets(table: pa.Table, keys: Keys, report: Collector) -> None:
+    ids = table.column("asset_id").to_pylist()
+    report.expect(ids == sorted(ids), "schema.assets.order", "rows by asset_id", "another order")
+    report.expect(len(set(ids)) == len(ids), "schema.assets.unique", "each asset once", "one twice")
+    keys.assets = frozenset(ids)
+    for asset in from_table(table, ASSETS):
+        report.expect(asset.parts, "schema.assets.parts", f"{asset.asset_id}: parts", "none")
+
+
+def _check_scenes(
+    table: pa.Table, manifest: Manifest, file: DataFile, keys: Keys, report: Collector
+) -> None:
+    houses = from_table(table, SCENES, {"assets": {}})
+    numbers = [house.scene for house in houses]
+    report.expect(
+        numbers == sorted(numbers), "schema.scenes.order", "rows by scene", "another order"
+    )
+    for house in houses:
+        report.scene = house.scene_id
+        wanted = f"scene-{house.scene:06d}"
+        report.expect(house.scene_id == wanted, "schema.scenes.scene_id", wanted, house.scene_id)
+        report.expect(
+            house.scene_id not in keys.scenes, "schema.scenes.unique", "each scene once", "twice"
+        )
+        split = split_of(house.scene)
+        report.expect(
+            split == house.split == file.split,
+            "schema.scenes.split",
+            split,
+            f"{house.split} in a file of {file.split}",
+        )
+        report.expect(house.seed == manifest.seed, "schema.scenes.seed", manifest.seed, house.seed)
+        _check_links(house, keys, report)
+        keys.scenes[house.scene_id] = SceneKeys(
+            house.split,
+            frozenset(room.room_id for room in house.rooms),
+            frozenset(door.door_id for door in house.doors),
+        )
+    report.scene = ""
+
+
+def _check_links(house: House, keys: Keys, report: Collector) -> None:
+    """Judge a house's ids: unique, and known where they refer to others."""
+
+    def expect(name: str, wrong: Sequence[Any], expected: str) -> None:
+        report.expect(not wrong, f"schema.scenes.{name}", expected, wrong)
+
+    rooms = [room.room_id for room in house.rooms]
+    report.expect(
+        rooms == list(range(len(rooms))) and bool(rooms),
+        "schema.scenes.room-ids",
+        "rooms numbered from 0",
+        rooms,
+    )
+    for name, ids in (
+        ("door-ids", [d.door_id for d in house.doors]),
+        ("window-ids", [w.window_id for w in house.windows]),
+        ("thing-ids", [t.thing_id for t in house.things]),
+    ):
+        expect(name, sorted(i for i, n in Counter(ids).items() if n > 1), "each id once")
+    known = {*rooms, OUTSIDE}
+    expect("door-rooms", [d.door_id for d in house.doors if not set(d.rooms) <= known], "rooms")
+    expect(
+        "door-rooms",
+        [d.door_id for d in house.doors if d.rooms[0] >= d.rooms[1]],
+        "two room ids, ascending",
+    )
+    expect("window-room", [w.window_id for w in house.windows if w.room not in rooms], "a room")
+    expect("thing-room", [t.thing_id for t in house.things if t.room not in rooms], "a room")
+    things = {t.thing_id for t in house.things}
+    expect(
+        "thing-support",
+        [t.thing_id for t in house.things if t.support != -1 and t.support not in things],
+        "a thing or -1",
+    )
+    expect(
+        "thing-asset",
+        sorted({t.asset_id for t in house.things} - keys.assets),
+        "assets of assets.parquet",
+    )
+    names = {material.name for material in house.materials}
+    used = {n for room in house.rooms for n in (room.floor_material, room.wall_material)}
+    expect("materials", sorted(used - names), "materials of the house")
+    expect("room-graph", [p for p in house.room_graph if not set(p) <= set(rooms)], "rooms")
+
+
+def _check_episodes(
+    table: pa.Table, manifest: Manifest, file: DataFile, keys: Keys, report: Collector
+) -> None:
+    columns = ("scene_id", "index", "episode_id", "split", "seed", "room_count", "obstacle_count")
+    rows = list(zip(*(table.column(name).to_pylist() for name in columns), strict=True))
+    order = [(number_of(row[0]), row[1]) for row in rows]
+    report.expect(
+        order == sorted(order), "schema.episodes.order", "rows by scene and index", "another order"
+    )
+    counts = _lengths(table, "obstacles")
+    for row, obstacles in zip(rows, counts, strict=True):
+        scene_id, index, episode_id, split, seed, room_count, obstacle_count = row
+        report.scene = scene_id
+        scene = keys.scenes.get(scene_id)
+        where = episode_id
+
+        def expect(name: str, expected: object, got: object, where: str = where) -> None:
+            report.expect(expected == got, f"schema.episodes.{name}", expected, got, where)
+
+        expect("episode_id", f"{scene_id}/{index:04d}", episode_id)
+        expect("index", keys.episodes[scene_id], index)
+        expect("split", split_of(number_of(scene_id)), split)
+        expect("split", file.split, split)
+        expect("seed", manifest.seed, seed)
+        expect("obstacle_count", obstacles, obstacle_count)
+        keys.episodes[scene_id] += 1
+        if report.expect(
+            scene, "schema.episodes.scene_id", "a scene of the scenes table", scene_id, where
+        ):
+            expect("room_count", len(scene.room_ids) if scene else 0, room_count)
+    report.scene = ""
+    _check_references(table, keys, report)
+
+
+def _lengths(table: pa.Table, name: str) -> list[int]:
+    return [n for chunk in table.column(name).chunks for n in chunk.value_lengths().to_pylist()]
+
+
+def _check_references(table: pa.Table, keys: Keys, report: Collector) -> None:
+    """Judge the room, door and asset ids that episodes name."""
+    for episode in from_table(table, EPISODES):
+        scene = keys.scenes.get(episode.scene_id)
+        if scene is None:
+            continue
+        report.scene = episode.scene_id
+        rooms = {episode.start.room, episode.goal.room}
+        rooms.update(room for path in episode.room_paths for room in path)
+        doors = {door for path in episode.node_paths for door in path.doors}
+        assets = {obstacle.asset_id for obstacle in episode.obstacles}
+        for name, unknown in (
+            ("room", rooms - scene.room_ids),
+            ("door", doors - scene.door_ids),
+            ("asset", assets - keys.assets),
+        ):
+            report.expect(
+                not unknown,
+                f"schema.episodes.{name}",
+                f"known {name} ids",
+                sorted(unknown, key=str),
+                episode.episode_id,
+            )
+    report.scene = ""
+
+
+def _check_counts(manifest: Manifest, keys: Keys, report: Collector) -> None:
+    """Judge that every scene asked for is there, with as many episodes as the config says."""
+    given_up = {q.scene_id for q in manifest.quarantined}
+    wanted = {f"scene-{k:06d}" for k in range(manifest.scenes)} - given_up
+    missing, surplus = sorted(wanted - set(keys.scenes)), sorted(set(keys.scenes) - wanted)
+    report.expect(
+        not missing, "schema.scenes.all", f"{len(wanted)} scenes", f"without {missing[:3]}"
+    )
+    report.expect(not surplus, "schema.scenes.all", f"{len(wanted)} scenes", f"also {surplus[:3]}")
+    each = _episodes_by_split(manifest.config)
+    for scene_id, scene in keys.scenes.items():
+        want = each.get(scene.split)
+        got = keys.episodes[scene_id]
+        if want is not None and got != want:
+            report.scene = scene_id
+            report.expect(False, "schema.episodes.per-scene", want, got)  # noqa: FBT003
+    report.scene = ""
+    report.counts["predicates"] += len(keys.scenes)
+
+
+def _episodes_by_split(config: Mapping[str, Any]) -> dict[str, int]:
+    """Read the episodes a scene of each split from the resolved config, {} where it says none."""
+    usual, test = config.get("episodes_per_scene"), config.get("test_episodes_per_scene")
+    if not isinstance(usual, int) or not isinstance(test, int):
+        return {}
+    return {"train": usual, "val": usual, "test": test}

@@ -1,0 +1,221 @@
+"""`validate`: the levels of checking, one after the other, over processes if asked."""
+
+from __future__ import annotations
+
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from typing import TYPE_CHECKING, Any
+
+from internav_data.dataset import ASSETS, EPISODES, SCENES, from_table, read_table
+from internav_data.dataset.parquet import open_parquet, read_group
+from internav_data.records import Purpose, generator
+from internav_data.records.errors import UsageError
+from internav_data.verification.files import check_file, check_listing, check_manifest
+from internav_data.verification.findings import LEVELS, Collector, Findings, Level, join
+from internav_data.verification.scenes import check_scene
+from internav_data.verification.tables import check_tables, number_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from pathlib import Path
+
+    from internav_data.dataset import DataFile, Manifest
+    from internav_data.records import Asset, Episode, House
+
+    Progress = Callable[[str, int, int], None]
+
+SCENES_A_UNIT = 10
+"""Scenes that a worker judges before it reports."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a scene's rows lie: files and row groups; no episodes where `episodes` is None."""
+
+    scene_id: str
+    house: tuple[str, int]
+    episodes: tuple[str, int] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """Some scenes for one worker."""
+
+    root: Path
+    assets: DataFile
+    places: tuple[Place, ...]
+
+
+def validate(
+    path: Path,
+    level: Level = "geometry",
+    sample: int | None = None,
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> Findings:
+    """Prove a dataset right, or say what in it is wrong.
+
+    Parameters
+    ----------
+    path
+        Folder of a finished dataset.
+    level
+        `files`: hashes, page checksums, nothing unlisted. `schema`: columns, ranges, ids.
+        `geometry`: every predicate of every house and episode, derived again by shapely, scipy
+        and networkx. Each level runs those before it.
+    sample
+        Look at the geometry of so many scenes only, drawn from the dataset's seed; None for all.
+    workers
+        Processes for the geometry. With more than one, a script that calls this needs the usual
+        `if __name__ == "__main__":`.
+    progress
+        Called with a level, what is done of it and how much there is.
+
+    Returns
+    -------
+    Findings
+        The same for any number of workers.
+
+    Raises
+    ------
+    UsageError
+        No such folder, level, sample or number of workers.
+    CorruptDataError
+        The folder holds no finished dataset.
+
+    """
+    _check_arguments(level, sample, workers)
+    tell: Progress = progress or (lambda *_: None)
+    whole = Collector()
+    manifest = check_manifest(path, whole)
+    if manifest is None:
+        return whole.findings(level)
+    check_listing(path, manifest, whole)
+    damaged: frozenset[str] = frozenset()
+    for done, file in enumerate(manifest.files, start=1):
+        report = check_file(path, file)
+        if report.by_predicate:
+            damaged |= {file.path}
+        whole.absorb(report)
+        tell("files", done, len(manifest.files))
+    if level != "files":
+        tell("schema", 0, 1)
+        tables = check_tables(path, manifest, damaged)
+        whole.absorb(tables)
+        tell("schema", 1, 1)
+        damaged |= {f.file for f in tables.found if f.predicate == "schema.columns"}
+    if level == "geometry":
+        _check_geometry(path, manifest, damaged, whole, sample, workers, tell)
+    return whole.findings(level)
+
+
+def _check_arguments(level: str, sample: int | None, workers: int) -> None:
+    if level not in LEVELS:
+        raise UsageError(f"level: expected one of {', '.join(LEVELS)}, got {level!r}")
+    if sample is not None and sample < 1:
+        raise UsageError(f"sample: expected at least 1 scene, got {sample}")
+    if workers < 1:
+        raise UsageError(f"workers: expected at least 1, got {workers}")
+
+
+def _check_geometry(
+    root: Path,
+    manifest: Manifest,
+    damaged: frozenset[str],
+    whole: Collector,
+    sample: int | None,
+    workers: int,
+    tell: Progress,
+) -> None:
+    assets = [file for file in manifest.of("assets") if file.path not in damaged]
+    places = _places(root, manifest, damaged)
+    if not assets or not places:
+        return
+    if sample is not None and sample < len(places):
+        rng = generator(manifest.seed, Purpose.LOADER, draw=sample)
+        chosen = sorted(rng.permutation(len(places))[:sample].tolist())
+        places = [places[k] for k in chosen]
+    units = [
+        Unit(root, assets[0], tuple(places[k : k + SCENES_A_UNIT]))
+        for k in range(0, len(places), SCENES_A_UNIT)
+    ]
+    done = 0
+    for unit, report in zip(units, _judged(units, workers), strict=True):
+        whole.absorb(report)
+        done += len(unit.places)
+        tell("geometry", done, len(places))
+
+
+def _judged(units: Sequence[Unit], workers: int) -> Iterator[Collector]:
+    """Yield what is found in each unit, in order."""
+    if workers == 1 or len(units) == 1:
+        yield from map(check_unit, units)
+        return
+    with ProcessPoolExecutor(min(workers, len(units)), mp_context=get_context("spawn")) as pool:
+        yield from pool.map(check_unit, units)
+
+
+def _places(root: Path, manifest: Manifest, damaged: frozenset[str]) -> list[Place]:
+    """Find every scene's rows, in order of scenes."""
+    found: dict[str, dict[str, tuple[str, int]]] = {"scenes": {}, "episodes": {}}
+    for name, spec in (("scenes", SCENES), ("episodes", EPISODES)):
+        for file in manifest.of(name):
+            if file.path in damaged:
+                continue
+            with open_parquet(root / file.path, spec) as parquet:
+                for group in range(parquet.num_row_groups):
+                    column = read_group(root / file.path, parquet, group, ["scene_id"])
+                    for scene_id in column.column(0).unique().to_pylist():
+                        found[name].setdefault(scene_id, (file.path, group))
+    return [
+        Place(scene_id, found["scenes"][scene_id], found["episodes"].get(scene_id))
+        for scene_id in sorted(found["scenes"], key=lambda s: (number_of(s), s))
+    ]
+
+
+class _Reader:
+    """Reads row groups as records; remembers the last one of each table."""
+
+    def __init__(self, root: Path) -> None:
+        self._root = root
+        self._last: dict[str, tuple[tuple[str, int], list[Any]]] = {}
+
+    def _group(self, name: str, place: tuple[str, int]) -> list[Any]:
+        if name not in self._last or self._last[name][0] != place:
+            file, group = place
+            spec = SCENES if name == "scenes" else EPISODES
+            with open_parquet(self._root / file, spec) as parquet:
+                table = read_group(self._root / file, parquet, group)
+            extra: dict[str, Any] | None = {"assets": {}} if name == "scenes" else None
+            self._last[name] = (place, from_table(table, spec, extra))
+        return self._last[name][1]
+
+    def house(self, place: Place) -> House:
+        houses: list[House] = self._group("scenes", place.house)
+        return next(house for house in houses if house.scene_id == place.scene_id)
+
+    def episodes(self, place: Place) -> list[Episode]:
+        if place.episodes is None:
+            return []
+        group = self._group("episodes", place.episodes)
+        return [episode for episode in group if episode.scene_id == place.scene_id]
+
+
+_ASSETS: dict[str, dict[str, Asset]] = {}
+"""Of this process, by sha256 of their file: read once for all its units."""
+
+
+def check_unit(unit: Unit) -> Collector:
+    """Judge the geometry of some scenes."""
+    key = unit.assets.sha256
+    if key not in _ASSETS:
+        _ASSETS.clear()
+        table = read_table(unit.root / unit.assets.path, ASSETS)
+        _ASSETS[key] = {asset.asset_id: asset for asset in from_table(table, ASSETS)}
+    reader = _Reader(unit.root)
+    reports = []
+    for place in unit.places:
+        file = place.episodes[0] if place.episodes else place.house[0]
+        reports.append(check_scene(reader.house(place), reader.episodes(place), _ASSETS[key], file))
+    return join(reports)
