@@ -4,6 +4,7 @@ from internav_data.dataset.commit import Identity, assemble, done_scenes, identi
 from internav_data.dataset.decode import from_table
 from internav_data.dataset.digest import logical_digest
 from internav_data.dataset.encode import to_table
+from internav_data.dataset.loader import Dataset, load_dataset
 from internav_data.dataset.manifest import (
     DataFile,
     Manifest,
@@ -38,6 +39,7 @@ __all__ = [
     "SCENES",
     "TABLES",
     "DataFile",
+    "Dataset",
     "FileInfo",
     "Identity",
     "Manifest",
@@ -50,6 +52,7 @@ __all__ = [
     "from_table",
     "has_manifest",
     "identity_of",
+    "load_dataset",
     "locate",
     "logical_digest",
     "open_work",

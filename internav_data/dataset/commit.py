@@ -176,7 +176,7 @@ def _manifest(
             quarantined.append(
                 Quarantined(state.scene, state.scene_id, state.attempts, state.quarantined)
             )
-    counts = {
+    counts: dict[str, Counts] = {
         split: Counts(
             len(source.scenes[split]),
             sum(f.rows for f in files if f.table == "episodes" and f.split == split),

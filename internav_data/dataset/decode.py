@@ -72,7 +72,7 @@ class ColumnReader:
         self._names = table.schema.names
         self._columns = [cursor(nodes[n], one_array(table.column(n))) for n in self._names]
 
-    def rows(self, start: int, stop: int) -> list[dict[str, Any]]:
+    def rows(self, start: int, stop: int) -> list[Any]:
         """Return the rows start … stop - 1, each a dictionary by column."""
         columns = [column.take(start, stop) for column in self._columns]
         return [dict(zip(self._names, row, strict=True)) for row in zip(*columns, strict=True)]

@@ -32,13 +32,18 @@ def to_table(records: Rows[R], spec: TableSpec[R]) -> pa.Table:
 
     """
     columns = [
-        _encode(field.node, [getattr(r, field.name) for r in records], field.nullable, field.name)
+        _encode(
+            field.node,
+            [getattr(record, field.name) for record in records],
+            field.name,
+            nullable=field.nullable,
+        )
         for field in spec.node.fields
     ]
     return pa.Table.from_arrays(columns, schema=spec.schema)
 
 
-def _encode(node: Node, values: list[Any], nullable: bool, path: str) -> pa.Array:
+def _encode(node: Node, values: list[Any], path: str, *, nullable: bool) -> pa.Array:
     missing = [value is None for value in values]
     mask = None
     if any(missing):
@@ -68,8 +73,8 @@ def _encode(node: Node, values: list[Any], nullable: bool, path: str) -> pa.Arra
                 _zero(field.node, field.nullable) if v is None else getattr(v, field.name)
                 for v in values
             ],
-            field.nullable,
             f"{path}.{field.name}",
+            nullable=field.nullable,
         )
         for field in node.fields
     ]
@@ -112,7 +117,7 @@ def _encode_sequence(
         raise ValidationError(f"column {path}: expected {node.length} members in every row")
     offsets = np.zeros(len(values) + 1, dtype=np.int32)
     np.cumsum(lengths, out=offsets[1:])
-    items = _encode(node.item, list(chain.from_iterable(values)), False, f"{path}.element")
+    items = _encode(node.item, list(chain.from_iterable(values)), f"{path}.element", nullable=False)
     return pa.ListArray.from_arrays(
         pa.array(offsets),
         items,

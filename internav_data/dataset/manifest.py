@@ -9,18 +9,21 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections.abc import Mapping  # noqa: TC003 - read at run time for the JSON Schema
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from internav_data.dataset.files import write_atomically
+from internav_data.dataset.parquet import footer_sha256, open_parquet
 from internav_data.dataset.tables import FORMAT_VERSION
+from internav_data.records import Split  # noqa: TC001 - as above
 from internav_data.records.errors import CorruptDataError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    import pyarrow.parquet as pq
 
-    from internav_data.records import Split
+    from internav_data.dataset.tables import TableSpec
 
 MANIFEST = "manifest.json"
 _MAX_BYTES = 64 << 20
@@ -44,6 +47,8 @@ class DataFile:
     bytes: int
     sha256: str
     """Of the file's bytes."""
+    footer_sha256: str
+    """Of the file's last bytes, the Parquet footer: checked whenever the file is opened."""
     logical_digest: str
     """Of what the file says, whatever library wrote it (see the format's documentation)."""
 
@@ -133,6 +138,8 @@ def read_manifest(root: Path) -> Manifest:
         raise CorruptDataError(f"{path}: no valid JSON ({error}): {_AGAIN}") from error
     _check_version(path, raw)
     manifest = _parse(path, raw)
+    if len(manifest.files) > _MAX_FILES:
+        raise CorruptDataError(f"{path}: names more than {_MAX_FILES} files: {_AGAIN}")
     for file in manifest.files:
         _check_file(root, file)
     return manifest
@@ -195,6 +202,21 @@ def _check_file(root: Path, file: DataFile) -> None:
     ):
         if type(value) is not int or not 0 <= value <= most:
             raise CorruptDataError(f"{where}: {name}: expected 0 … {most}, got {value!r}: {_AGAIN}")
+
+
+def open_file(root: Path, file: DataFile, spec: TableSpec[Any]) -> pq.ParquetFile:
+    """Open a file of the manifest; page checksums are verified as it is read.
+
+    Raises
+    ------
+    CorruptDataError
+        Missing, truncated, edited, or of other columns.
+
+    """
+    path = locate(root, file)
+    if footer_sha256(path) != file.footer_sha256:
+        raise CorruptDataError(f"{path}: the file's footer was damaged or edited: {_AGAIN}")
+    return open_parquet(path, spec)
 
 
 def locate(root: Path, file: DataFile) -> Path:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -9,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from internav_data.dataset.decode import schema_difference
+from internav_data.dataset.decode import one_array, schema_difference
 from internav_data.dataset.digest import logical_digest
 from internav_data.dataset.encode import to_table
 from internav_data.dataset.files import file_sha256, write_with
@@ -28,6 +30,7 @@ SCENES_PER_GROUP = 10
 ROWS_PER_GROUP = 400
 """... and at least so many rows: a random record costs reading its group, a group its overhead."""
 _ZSTD_LEVEL = 3
+_TAIL = 8  # bytes: the footer's length and the letters PAR1
 
 MENDING = "fetch the file again from where it came, or generate the dataset anew"
 
@@ -41,6 +44,7 @@ class FileInfo:
     rows: int
     bytes: int
     sha256: str
+    footer_sha256: str
     logical_digest: str
 
 
@@ -78,7 +82,12 @@ def write_table(path: Path, table: pa.Table, spec: TableSpec[Any]) -> FileInfo:
 
     write_with(path, write)
     return FileInfo(
-        path.name, table.num_rows, path.stat().st_size, file_sha256(path), logical_digest(table)
+        path.name,
+        table.num_rows,
+        path.stat().st_size,
+        file_sha256(path),
+        footer_sha256(path),
+        logical_digest(table),
     )
 
 
@@ -87,8 +96,7 @@ def group_bounds(table: pa.Table) -> list[tuple[int, int]]:
     rows = table.num_rows
     if "scene_id" not in table.column_names or not rows:
         return [(0, rows)]
-    codes = table.column("scene_id").combine_chunks().dictionary_encode()
-    scenes = (codes.chunk(0) if isinstance(codes, pa.ChunkedArray) else codes).indices.to_numpy()
+    scenes = one_array(table.column("scene_id")).dictionary_encode().indices.to_numpy()
     starts = [0, *(np.flatnonzero(np.diff(scenes)) + 1).tolist(), rows]
     bounds, first = [], 0
     per_row_scene = len(starts) - 1 == rows  # the table of scenes: a row each
@@ -100,6 +108,26 @@ def group_bounds(table: pa.Table) -> list[tuple[int, int]]:
     if starts[first] < rows:
         bounds.append((starts[first], rows))
     return bounds
+
+
+def footer_sha256(path: Path) -> str:
+    """Return the sha256 of a Parquet file's footer, which page checksums don't cover.
+
+    Raises
+    ------
+    CorruptDataError
+        Too short, or no Parquet file.
+
+    """
+    with path.open("rb") as stream:
+        size = stream.seek(0, os.SEEK_END)
+        stream.seek(max(0, size - _TAIL))
+        tail = stream.read(_TAIL)
+        length = int.from_bytes(tail[:4], "little") + _TAIL
+        if tail[4:] != b"PAR1" or length > size:
+            raise damaged(path, ValueError("it does not end like a Parquet file"))
+        stream.seek(size - length)
+        return hashlib.sha256(stream.read(length)).hexdigest()
 
 
 def open_parquet(path: Path, spec: TableSpec[Any]) -> pq.ParquetFile:
@@ -154,12 +182,23 @@ def read_table(path: Path, spec: TableSpec[Any], columns: Sequence[str] | None =
 
     """
     with open_parquet(path, spec) as file:
-        try:
-            names = None if columns is None else list(columns)
-            table = file.read(columns=names, use_threads=False)
-            table.validate(full=True)
-        except Exception as error:
-            raise damaged(path, error) from error
+        return read_all(path, file, columns)
+
+
+def read_all(path: Path, file: pq.ParquetFile, columns: Sequence[str] | None = None) -> pa.Table:
+    """Return the table in an open file.
+
+    Raises
+    ------
+    CorruptDataError
+        A page is damaged.
+
+    """
+    try:
+        table = file.read(columns=None if columns is None else list(columns))
+        table.validate(full=True)
+    except Exception as error:
+        raise damaged(path, error) from error
     return table
 
 

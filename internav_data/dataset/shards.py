@@ -116,4 +116,13 @@ def _write_split(
 
 
 def _data_file(info: FileInfo, path: str, table: str, split: Split | None) -> DataFile:
-    return DataFile(path, table, split, info.rows, info.bytes, info.sha256, info.logical_digest)
+    return DataFile(
+        path,
+        table,
+        split,
+        info.rows,
+        info.bytes,
+        info.sha256,
+        info.footer_sha256,
+        info.logical_digest,
+    )

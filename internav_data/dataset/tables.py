@@ -17,6 +17,17 @@ from internav_data.records import Asset, Episode, House
 
 R = TypeVar("R")
 
+_LEAVES: dict[str, pa.DataType] = {
+    "string": pa.string(),
+    "bool": pa.bool_(),
+    "float64": pa.float64(),
+    "int8": pa.int8(),
+    "uint8": pa.uint8(),
+    "int16": pa.int16(),
+    "int32": pa.int32(),
+    "int64": pa.int64(),
+}
+
 FORMAT_VERSION = 1
 """Raised whenever a reader of the version before would misunderstand what is written."""
 
@@ -33,18 +44,19 @@ class TableSpec(Generic[R]):
     @property
     def node(self) -> Record:
         """The shape of one row."""
-        return record_node(self.cls)
+        return record_node(self.cls)  # type: ignore[arg-type] # classes are hashable
 
     @property
     def schema(self) -> pa.Schema:
         """The Arrow schema of the table: every field that cannot be None is not nullable."""
-        return arrow_schema(self.cls)
+        return arrow_schema(self.cls)  # type: ignore[arg-type] # as above
 
 
 @functools.cache
 def arrow_schema(cls: type[Any]) -> pa.Schema:
     """Return the Arrow schema of a dataclass."""
-    return pa.schema([arrow_field(f) for f in record_node(cls).fields])
+    node = record_node(cls)  # type: ignore[arg-type] # classes are hashable
+    return pa.schema([arrow_field(field) for field in node.fields])
 
 
 def arrow_field(field: Field) -> pa.Field:
@@ -55,9 +67,7 @@ def arrow_field(field: Field) -> pa.Field:
 def arrow_type(node: Node) -> pa.DataType:
     """Return the Arrow type of a node."""
     if isinstance(node, Leaf):
-        return {"bool": pa.bool_, "string": pa.string}.get(
-            node.kind, getattr(pa, node.kind, None)
-        )()
+        return _LEAVES[node.kind]
     if isinstance(node, Coordinates):
         leaf = arrow_type(node.leaf)
         return pa.struct([pa.field(name, leaf, nullable=False) for name in node.names])

@@ -1,0 +1,267 @@
+"""`load_dataset`: episodes as dataclasses, by number or as a stream; columns as tables."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+from collections import OrderedDict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast, overload
+
+import numpy as np
+
+from internav_data.dataset.decode import from_table
+from internav_data.dataset.manifest import MANIFEST, Manifest, locate, open_file, read_manifest
+from internav_data.dataset.parquet import read_all
+from internav_data.dataset.select import Filters, check_columns, matching_rows, read_columns
+from internav_data.dataset.shelf import Shelf
+from internav_data.dataset.stream import EpisodeStream
+from internav_data.dataset.tables import ASSETS, EPISODES, SCENES
+from internav_data.records import Asset, Episode, House
+from internav_data.records.errors import CorruptDataError, UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    import pandas as pd  # type: ignore[import-untyped,unused-ignore]
+    import pyarrow as pa
+    from numpy.typing import NDArray
+
+E = TypeVar("E")
+
+_CACHED_HOUSES = 256
+_RUN = 64
+
+
+def load_dataset(
+    path: str | Path,
+    split: str | None = None,
+    filters: Filters | None = None,
+    columns: Sequence[str] | None = None,
+) -> Dataset[Any]:
+    """Open a finished dataset.
+
+    Parameters
+    ----------
+    path : str or Path
+        The folder that `internav-gen generate` wrote.
+    split : str, optional
+        train, val or test; all of them if not given.
+    filters : list of (column, operator, value), optional
+        Episodes to keep, on top-level columns, as in `[("room_count", ">=", 4)]`: all must hold.
+        A list of such lists is a choice between them. Operators: = == != < > <= >= in, not in.
+    columns : list of str, optional
+        Read these columns only: items are then dictionaries by column instead of `Episode`.
+
+    Raises
+    ------
+    CorruptDataError
+        No dataset, unfinished, of a newer version, or a file is missing, truncated or edited.
+    UsageError
+        An unknown split, column or operator.
+
+    """
+    return Dataset(Path(path), split, filters, columns)
+
+
+class Dataset(Generic[E]):
+    """Episodes by number: `len(ds)`, `ds[i]`, `ds[a:b]`, iteration; houses by scene.
+
+    Pickled by path and opened again where it is unpickled, so it goes into DataLoader workers.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        split: str | None = None,
+        filters: Filters | None = None,
+        columns: Sequence[str] | None = None,
+    ) -> None:
+        self.path = path
+        self.manifest: Manifest = read_manifest(path)
+        self.split, self.filters = split, filters
+        self.columns = None if columns is None else tuple(columns)
+        if split is not None and split not in self.manifest.counts:
+            raise UsageError(
+                f"split: expected one of {sorted(self.manifest.counts)}, got {split!r}"
+            )
+        if columns is not None:
+            check_columns(columns, EPISODES)
+        self._digest = hashlib.sha256((path / MANIFEST).read_bytes()).hexdigest()
+        self._files = self.manifest.of("episodes", split)
+        self.shelf = Shelf(path, self._files, EPISODES, self.columns)
+        self._houses: OrderedDict[str, House] = OrderedDict()
+        for file in (*self.manifest.of("scenes"), *self.manifest.of("assets")):
+            locate(path, file)
+        self._index: NDArray[np.int64] | None = None
+        if filters is not None:
+            self._index = matching_rows(path, self._files, filters)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {
+            "path": self.path,
+            "split": self.split,
+            "filters": self.filters,
+            "columns": self.columns,
+            "digest": self._digest,
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        digest = state.pop("digest")
+        self.__init__(**state)  # type: ignore[misc] # opened again, by path
+        if self._digest != digest:
+            raise CorruptDataError(f"{self.path}: the dataset changed meanwhile: load it again")
+
+    def __repr__(self) -> str:
+        chosen = f", split={self.split!r}" if self.split else ""
+        return f"Dataset({str(self.path)!r}{chosen}, {len(self)} episodes)"
+
+    @property
+    def fingerprint(self) -> str:
+        """What the selection of episodes is, for states: changes whenever the order would."""
+        said = repr((self._digest, self.split, self.filters, self.columns))
+        return hashlib.sha256(said.encode()).hexdigest()[:16]
+
+    def __len__(self) -> int:
+        return len(self.shelf) if self._index is None else len(self._index)
+
+    @overload
+    def __getitem__(self, item: int) -> E: ...
+
+    @overload
+    def __getitem__(self, item: slice) -> list[E]: ...
+
+    def __getitem__(self, item: int | slice) -> E | list[E]:
+        if isinstance(item, slice):
+            return self.__getitems__(range(*item.indices(len(self))))
+        number = int(item)
+        if not -len(self) <= number < len(self):
+            raise IndexError(f"episode {number} of {len(self)}")
+        return cast("E", self.shelf.row(self._row(number % len(self))))
+
+    def __getitems__(self, numbers: Sequence[int]) -> list[E]:
+        """Return several episodes, as torch's DataLoader asks for a batch."""
+        return [self[int(number)] for number in numbers]
+
+    def __iter__(self) -> Iterator[E]:
+        number = 0
+        while number < len(self):
+            first, end, reader = self.shelf.group_of(self._row(number))
+            if self._index is None:
+                stop = min(end - first, number - first + _RUN)
+                yield from reader.rows(number - first, stop)
+                number = first + stop
+            else:
+                row = self._row(number) - first
+                yield from reader.rows(row, row + 1)
+                number += 1
+
+    def _row(self, number: int) -> int:
+        return number if self._index is None else int(self._index[number])
+
+    def row_numbers(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return where selected episodes lie among all rows of the split's files."""
+        return numbers if self._index is None else self._index[numbers]
+
+    def blocks(self) -> NDArray[np.int64]:
+        """Return the numbers of selected episodes at which row groups start, and their count."""
+        bounds = self.shelf.all_bounds()
+        if self._index is not None:
+            bounds = np.searchsorted(self._index, bounds)
+        return np.unique(np.concatenate([[0], bounds])).astype(np.int64)
+
+    def iterable(
+        self,
+        *,
+        seed: int = 0,
+        epoch: int = 0,
+        shuffle: bool = True,
+        rank: int = 0,
+        world_size: int = 1,
+        worker_id: int | None = None,
+        num_workers: int | None = None,
+    ) -> EpisodeStream:
+        """Return a stream over one rank's share of the episodes (see `EpisodeStream`)."""
+        return EpisodeStream(
+            self,
+            seed=seed,
+            epoch=epoch,
+            shuffle=shuffle,
+            rank=rank,
+            world_size=world_size,
+            worker_id=worker_id,
+            num_workers=num_workers,
+        )
+
+    @functools.cached_property
+    def assets(self) -> Mapping[str, Asset]:
+        """Every asset of the dataset by its id."""
+        (file,) = self.manifest.of("assets")
+        with open_file(self.path, file, ASSETS) as opened:
+            table = read_all(self.path / file.path, opened)
+        return {asset.asset_id: asset for asset in from_table(table, ASSETS)}
+
+    @functools.cached_property
+    def _scenes(self) -> tuple[Shelf, dict[str, int]]:
+        files = self.manifest.of("scenes")
+        shelf = Shelf(self.path, files, SCENES, extra=lambda: {"assets": self.assets})
+        ids = read_columns(self.path, files, SCENES, ["scene_id"])["scene_id"].to_pylist()
+        return shelf, {scene_id: row for row, scene_id in enumerate(ids)}
+
+    @property
+    def scene_ids(self) -> tuple[str, ...]:
+        """The ids of all scenes of the split, in order."""
+        files = self.manifest.of("scenes", self.split)
+        return tuple(read_columns(self.path, files, SCENES, ["scene_id"])["scene_id"].to_pylist())
+
+    def scene(self, scene_id: str) -> House:
+        """Return a house with its assets.
+
+        Raises
+        ------
+        UsageError
+            No such scene in the dataset.
+
+        """
+        if scene_id not in self._houses:
+            shelf, rows = self._scenes
+            if scene_id not in rows:
+                raise UsageError(f"{self.path}: no scene {scene_id!r} (ids look like scene-000017)")
+            self._houses[scene_id] = shelf.row(rows[scene_id])
+            while len(self._houses) > _CACHED_HOUSES:
+                self._houses.popitem(last=False)
+        self._houses.move_to_end(scene_id)
+        return self._houses[scene_id]
+
+    def to_table(self, columns: Sequence[str] | None = None) -> pa.Table:
+        """Return the selected episodes as an Arrow table of the given (or all) columns."""
+        names = columns or self.columns or EPISODES.schema.names
+        check_columns(names, EPISODES)
+        table = read_columns(self.path, self._files, EPISODES, names)
+        return table if self._index is None else table.take(self._index)
+
+    def to_pandas(self, columns: Sequence[str] | None = None) -> pd.DataFrame:
+        """Return the selected episodes as a pandas frame: scalar columns unless named."""
+        names = columns or self.columns or scalar_columns()
+        return self.to_table(names).to_pandas()
+
+    def to_torch(self, columns: Sequence[str] | None = None) -> dict[str, Any]:
+        """Return scalar columns as torch tensors by name.
+
+        Words of a fixed choice become their number (mode: 0 blocked, 1 lengthened; split: 0
+        train, 1 val, 2 test), other words are left out. Missing floats are NaN, integers -1.
+        """
+        from internav_data.dataset.tensors import tensors  # noqa: PLC0415 - torch when used
+
+        names = columns or self.columns or scalar_columns()
+        return tensors(self.to_table([name for name in names if name in scalar_columns()]))
+
+
+def scalar_columns() -> tuple[str, ...]:
+    """Return the names of the episode columns that hold one value a row."""
+    from internav_data.dataset.nodes import Leaf  # noqa: PLC0415
+
+    return tuple(field.name for field in EPISODES.node.fields if isinstance(field.node, Leaf))
+
+
+__all__ = ["Dataset", "Episode", "load_dataset"]

@@ -1,0 +1,50 @@
+"""In which order an epoch visits episodes: a pure function of (seed, epoch)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from internav_data.records import Purpose, generator
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+WINDOW = 8
+"""Row groups that are shuffled into one another: so many are in memory at a time."""
+
+
+def epoch_order(
+    blocks: NDArray[np.int64], *, seed: int, epoch: int, shuffle: bool
+) -> NDArray[np.int64]:
+    """Return the positions 0 … n - 1 in the order of an epoch.
+
+    Row groups are shuffled, then the rows of every `WINDOW` neighbouring groups: far apart in the
+    data, yet read a few files at a time.
+
+    Parameters
+    ----------
+    blocks : (groups + 1,) int64
+        Positions at which row groups start, and n.
+    seed, epoch : int
+        What the order depends on.
+    shuffle : bool
+        False for the order on disk.
+
+    """
+    count = int(blocks[-1])
+    if not shuffle:
+        return np.arange(count)
+    rng = generator(seed, Purpose.LOADER, draw=epoch)
+    parts = [np.arange(blocks[k], blocks[k + 1]) for k in rng.permutation(len(blocks) - 1)]
+    windows = [np.concatenate(parts[k : k + WINDOW]) for k in range(0, len(parts), WINDOW)]
+    return np.concatenate([rng.permutation(w) for w in windows] or [np.arange(0)])
+
+
+def share(count: int, member: int, members: int) -> tuple[int, int]:
+    """Return which of `count` positions [start, stop) belong to one of several members.
+
+    Shares are disjoint, cover everything and differ in size by one at most.
+    """
+    return count * member // members, count * (member + 1) // members

@@ -1,0 +1,46 @@
+"""Scalar columns as torch tensors."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from internav_data.dataset.decode import one_array
+from internav_data.dataset.nodes import Leaf
+from internav_data.dataset.tables import EPISODES
+from internav_data.records.errors import UsageError
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+
+def tensors(table: pa.Table) -> dict[str, Any]:
+    """Return the columns of a table of scalar episode columns as tensors.
+
+    Raises
+    ------
+    UsageError
+        torch is not installed.
+
+    """
+    try:
+        import torch  # type: ignore[import-not-found,unused-ignore] # noqa: PLC0415 - optional
+    except ImportError as error:
+        raise UsageError("to_torch needs torch: install it with `pip install torch`") from error
+    leaves = {f.name: f.node for f in EPISODES.node.fields if isinstance(f.node, Leaf)}
+    arrays = {name: _numbers(table.column(name), leaves[name]) for name in table.column_names}
+    return {name: torch.from_numpy(a) for name, a in arrays.items() if a is not None}
+
+
+def _numbers(column: pa.ChunkedArray, leaf: Leaf) -> np.ndarray[Any, Any] | None:
+    array = one_array(column)
+    if leaf.kind == "string":
+        if not leaf.choices:
+            return None
+        coded = array.dictionary_encode()
+        numbers = [leaf.choices.index(word) for word in coded.dictionary.to_pylist()]
+        return np.array([numbers[k] for k in coded.indices.to_pylist()], dtype=np.int8)
+    if array.null_count:
+        array = array.fill_null(float("nan") if leaf.kind == "float64" else -1)
+    return np.array(array.to_numpy(zero_copy_only=False))
