@@ -14,6 +14,7 @@ from internav_data.houses.standards import (
     HALF_WALL_CM,
     PRIVATE,
     PUBLIC,
+    WALL_CM,
     WANTED,
     pair,
 )
@@ -32,6 +33,8 @@ LEAST_DOOR_CM = {"paper": 100, "realistic": 80}
 """A wall between two rooms counts as shared when a door of this width fits."""
 PATIENCE = 8
 """How many times `candidates` may be drawn while none of them keeps the standards."""
+LEAST_JOG_CM = 50
+"""Parallel walls nearer than this, side by side or end to end, are no architecture."""
 DAYLIGHT_CM = 130
 """Outer wall that a habitable room wants."""
 
@@ -111,7 +114,7 @@ def judged(
         score += room_score
     edges = sorted(possible_doors(plan, least_door_cm))
     found = door_tree(types, edges, rng)
-    if found is None or not _drawable(plan, len(specs)):
+    if found is None or _jogs(plan) or not _drawable(plan, len(specs)):
         return None
     tree, cost = found
     score += 0.25 * cost + _through_private(types, tree)
@@ -127,6 +130,21 @@ def judged(
         score += 12.0 * max(0.0, share - 0.14)
         score += max(0, 3 - sum(1 for door in tree if hall in door))
     return FloorPlan(types, plan, tuple(tree), score)
+
+
+def _jogs(plan: Plan) -> bool:
+    """Whether two walls run beside each other so closely that it looks like a mistake."""
+    segments = plan.segments
+    for k, one in enumerate(segments):
+        for other in segments[k + 1 :]:
+            if (
+                one.along_x == other.along_x
+                and 0 < abs(one.at - other.at) < LEAST_JOG_CM
+                and one.low - WALL_CM < other.high
+                and other.low - WALL_CM < one.high
+            ):
+                return True
+    return False
 
 
 def _drawable(plan: Plan, rooms: int) -> bool:

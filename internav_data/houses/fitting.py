@@ -66,6 +66,18 @@ def hits(box: Floats, boxes: Floats, count: int, gap: float) -> bool:
 
 
 @njit(cache=True)
+def any_overlap(first: Floats, second: Floats, gap: float) -> bool:
+    """Whether boxes (n, 6) come nearer than a gap in plan to others at the same height.
+
+    What lies on a box does not touch it: heights may meet.
+    """
+    for k in range(len(first)):
+        if hits(first[k], second, len(second), gap):
+            return True
+    return False
+
+
+@njit(cache=True)
 def _within(box: Floats, inner: Floats, gap: float) -> bool:
     return bool(
         box[0] >= inner[0] + gap

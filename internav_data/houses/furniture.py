@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from internav_data.geometry import round_m
 from internav_data.houses.furnishing import RoomState, quarter_quaternion, room_state
 from internav_data.houses.groups import Place
-from internav_data.houses.pieces import Picker
+from internav_data.houses.pieces import Picker, consistent
 from internav_data.houses.rules import RULES
 from internav_data.records import Purpose, Thing, generator
 
@@ -84,6 +84,8 @@ def _furnish_room(
 
 def _try_rule(state: RoomState, rule: Rule, place: Place, picker: Picker) -> bool:
     for group in rule.make(picker, place):
+        if not consistent(picker, group):
+            continue
         spots = (
             state.in_the_open(group, picker.rng)
             if rule.prefer == "open"

@@ -19,6 +19,7 @@ from internav_data.houses.pieces import (
     Picker,
     against,
     in_front,
+    overlap,
 )
 
 if TYPE_CHECKING:
@@ -259,6 +260,9 @@ def dining(p: Picker, place: Place) -> list[Group]:
     along = [(k - (seats - 1) / 2.0) * (chair.size[0] + 0.12) for k in range(seats)]
     long_sides = [p.tucked(table, chair, side, a) for side in (0, 2) for a in along]
     ends = [p.tucked(table, chair, side, 0.0) for side in (1, 3)]
+    # Corners have room for one pair of knees.
+    near = [p.parts(item) for item in long_sides]
+    ends = [e for e in ends if not any(overlap(p.parts(e), other, 0.04) for other in near)]
     four = plain.with_items(*long_sides)
     bowl = p.one(["Apple", "Bread", "Laptop"][int(float(p.rng.random()) * 3)]) if p.chance(0.5) else None
     resting = p.resting(table, 0, bowl, 0.1, 0.05) if bowl else None

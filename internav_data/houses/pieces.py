@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from internav_data.geometry import asset_corners
-from internav_data.houses.fitting import turned
+from internav_data.houses.fitting import any_overlap, turned
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -206,13 +206,17 @@ class Picker:
 
 def overlap(first: Floats, second: Floats, gap: float = 0.005) -> bool:
     """Whether boxes (n, 6) of one thing come nearer than a gap to those of another."""
-    a, b = first[:, None, :], second[None, :, :]
-    apart = (
-        (a[..., 0] >= b[..., 2] + gap)
-        | (b[..., 0] >= a[..., 2] + gap)
-        | (a[..., 1] >= b[..., 3] + gap)
-        | (b[..., 1] >= a[..., 3] + gap)
-        | (a[..., 4] >= b[..., 5] + gap)
-        | (b[..., 4] >= a[..., 5] + gap)
-    )
-    return not bool(apart.all())
+    return bool(any_overlap(first, second, gap))
+
+
+def consistent(picker: Picker, group: Group) -> bool:
+    """Whether no two things of a group share volume: a chair may stand under a table."""
+    boxes = group.boxes
+    count = len(boxes)
+    for a in range(count):
+        for b in range(a + 1, count):
+            if overlap(boxes[a : a + 1], boxes[b : b + 1], 0.0) and overlap(
+                picker.parts(group.items[a]), picker.parts(group.items[b]), 0.0005
+            ):
+                return False
+    return True
