@@ -1,0 +1,95 @@
+# make demo | test | check | bench: each sets up .venv first, once.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.set-up
+BARE := .venv-bare
+# The interpreter to use; empty: the first CPython 3.11 found.
+PYTHON ?=
+# More for pytest, as in `make test ARGS='-k lattice -x'`.
+ARGS ?=
+DEMO ?= demo
+
+.PHONY: help
+help: ## list the targets
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
+
+define NO_PYTHON
+No CPython 3.11 was found (looked for python3.11, python3 and python on PATH).
+
+The physics engine, pybullet, has ready-made wheels for CPython 3.11 and older only. Either
+  install 3.11     apt install python3.11 python3.11-venv | brew install python@3.11 |
+                   pyenv install 3.11 | uv python install 3.11 | conda create -n py311 python=3.11
+                   and run make again, or make PYTHON=/path/to/python3.11
+  or use a newer one, with a C++ compiler: make PYTHON=python3.12
+                   (pip then compiles pybullet, which takes 5 to 9 minutes once)
+endef
+export NO_PYTHON
+
+# Finds $python, makes the virtual environment $(1) with it unless there is a working one.
+define VIRTUAL_ENVIRONMENT
+python="$(PYTHON)"; \
+for candidate in python3.11 python3 python; do \
+  if [ -z "$$python" ] && "$$candidate" -c \
+    'import sys; sys.exit(sys.version_info[:2] != (3, 11))' >/dev/null 2>&1; then \
+    python=$$candidate; \
+  fi; \
+done; \
+if [ -z "$$python" ]; then echo "$$NO_PYTHON" >&2; exit 1; fi; \
+if ! "$$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1; then \
+  echo "PYTHON=$$python is not a Python of version 3.11 or above" >&2; exit 1; \
+fi; \
+if ! $(1)/bin/python -m pip --version >/dev/null 2>&1; then \
+  "$$python" -m venv --clear $(1); \
+fi
+endef
+
+$(STAMP): pyproject.toml constraints.txt
+	@$(call VIRTUAL_ENVIRONMENT,$(VENV)); \
+	echo "Setting up $(VENV) with $$($(BIN)/python --version); about a minute, once ..." >&2; \
+	if ! $(BIN)/python -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))'; then \
+	  echo "pybullet has no wheel for this version: compiling it takes 5 to 9 minutes." >&2; \
+	fi; \
+	$(BIN)/python -m pip install -qq --disable-pip-version-check --no-input \
+	  --constraint constraints.txt --editable '.[dev]'; \
+	touch $(STAMP)
+
+.PHONY: setup
+setup: $(STAMP) ## only set up .venv
+
+.PHONY: test
+test: $(STAMP) ## run the tests (but not the slow campaigns)
+	$(BIN)/python -m pytest -q -m 'not slow' -n 2 --dist loadfile $(ARGS)
+
+.PHONY: test-slow
+test-slow: $(STAMP) ## run the slow campaigns
+	$(BIN)/python -m pytest -q -m slow $(ARGS)
+
+.PHONY: test-bare
+test-bare: ## run the loader's tests with nothing but numpy and pyarrow installed
+	@$(call VIRTUAL_ENVIRONMENT,$(BARE)); \
+	$(BARE)/bin/python -m pip install -qq --disable-pip-version-check --no-input \
+	  --constraint constraints.txt --editable . pytest
+	$(BARE)/bin/python -m pytest -q -m bare $(ARGS)
+
+.PHONY: check
+check: $(STAMP) ## lint, format, types, layers, schemas
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-cache
+
+.PHONY: format
+format: $(STAMP) ## mend what ruff can mend
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+.PHONY: clean
+clean: ## remove what was built here (not .venv)
+	rm -rf build dist bench-results demo .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find internav_data cli tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
