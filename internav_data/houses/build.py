@@ -9,6 +9,7 @@ from internav_data.houses.choice import FloorPlan, choose_floor_plan
 from internav_data.houses.furniture import furnish
 from internav_data.houses.materials import draw_materials
 from internav_data.houses.openings import draw_doors, draw_windows
+from internav_data.houses.plan_file import load_floor_plan
 from internav_data.houses.programme import programme
 from internav_data.houses.splits import split_of_scene
 from internav_data.houses.standards import CEILING_CM
@@ -87,7 +88,8 @@ def _ceiling_cm(seed: int, scene: int, attempt: int) -> int:
     """Draw a height for the whole house: mostly 2.5 to 2.8 m."""
     rng = generator(seed, Purpose.FLOOR_PLAN, scene, attempt, draw=1)
     low, high = CEILING_CM
-    return 5 * round((low + (high - low) * float(rng.random()) ** 1.7) / 5)
+    draw = float(rng.random())
+    return 5 * round((low + (high - low) * draw * draw) / 5)
 
 
 def build_house(
@@ -101,13 +103,19 @@ def build_house(
         For a configuration that cannot be meant.
 
     """
-    specs = programme(seed, scene, config, attempt)
-    floor_plan = choose_floor_plan(seed, scene, config, specs, attempt)
-    ceiling_cm = _ceiling_cm(seed, scene, attempt)
-    doors = draw_doors(floor_plan, config, seed, scene, attempt)
-    windows = (
-        draw_windows(floor_plan, doors, ceiling_cm, seed, scene, attempt) if config.windows else []
-    )
+    if config.floor_plan is not None:
+        config.check()
+        floor_plan = load_floor_plan(config.floor_plan)
+    else:
+        specs = programme(seed, scene, config, attempt)
+        floor_plan = choose_floor_plan(seed, scene, config, specs, attempt)
+    ceiling_cm = floor_plan.ceiling_cm or _ceiling_cm(seed, scene, attempt)
+    doors = list(floor_plan.doors)
+    if config.floor_plan is None:
+        doors = draw_doors(floor_plan, config, seed, scene, attempt)
+    windows = list(floor_plan.windows or ())
+    if floor_plan.windows is None and config.windows:
+        windows = draw_windows(floor_plan, doors, ceiling_cm, seed, scene, attempt)
     return _assembled(
         floor_plan, doors, windows, ceiling_cm, (seed, scene, attempt), config, catalogue
     )

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from numpy.random import Generator
 
     from internav_data.houses.config import HouseConfig
+    from internav_data.houses.openings import Opening
     from internav_data.houses.programme import RoomSpec
 
 LEAST_DOOR_CM = {"paper": 100, "realistic": 80}
@@ -52,6 +53,12 @@ class FloorPlan:
     """Pairs of rooms to be joined by a door, so that all rooms can be reached."""
     score: float
     """Lower is more like a home."""
+    doors: tuple[Opening, ...] = ()
+    """A user's own doors; empty where they are to be drawn."""
+    windows: tuple[Opening, ...] | None = None
+    """A user's own windows; None where they are to be drawn."""
+    ceiling_cm: int | None = None
+    """A user's own height."""
 
 
 def clear_area_m2(plan: Plan, room: int) -> float:

@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 from internav_data.houses.standards import MAX_ROOMS, ROOM_TYPES
-from internav_data.records import Preset
+from internav_data.records import Preset  # noqa: TC001 - fields' types are read at run time
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class HouseConfig:
     """Windows in outer walls."""
 
     def check(self) -> RoomsRequest:
-        """Return what `rooms` asks for; raise UsageError where the configuration cannot be meant."""
+        """Return what `rooms` asks for; raise UsageError for what cannot be meant."""
         if self.preset not in {"paper", "realistic"}:
             raise UsageError(f"preset is '{self.preset}': use 'paper' or 'realistic'")
         for name, (low, high) in _BANDS.items():

@@ -118,12 +118,7 @@ def reached(free: Bools, start_i: int, start_j: int) -> Bools:
         for k in range(4):
             a = i + (1 if k == 0 else -1 if k == 1 else 0)
             b = j + (1 if k == 2 else -1 if k == 3 else 0)  # noqa: PLR2004 - four directions
-            if (
-                0 <= a < free.shape[0]
-                and 0 <= b < free.shape[1]
-                and free[a, b]
-                and not seen[a, b]
-            ):
+            if 0 <= a < free.shape[0] and 0 <= b < free.shape[1] and free[a, b] and not seen[a, b]:
                 seen[a, b] = True
                 queue[tail, 0], queue[tail, 1] = a, b
                 tail += 1
@@ -153,6 +148,43 @@ def ways_open(free: Bools, anchors: Ints, least: int, share: float) -> bool:
 
 
 @njit(cache=True)
+def _stands(
+    moved: Floats,
+    inner: Floats,
+    solids: Floats,
+    solid_count: int,
+    keeps: Floats,
+    keep_count: int,
+) -> bool:
+    """Whether boxes lie in the room, apart from what stands there and what must stay clear."""
+    for k in range(len(moved)):
+        if (
+            not _within(moved[k], inner, FROM_WALL_M)
+            or hits(moved[k], solids, solid_count, GAP_M)
+            or hits(moved[k], keeps, keep_count, 0.0)
+        ):
+            return False
+    return True
+
+
+@njit(cache=True)
+def _leaves_ways(
+    moved: Floats,
+    blocking: Bools,
+    free: Bools,
+    origin: Ints,
+    anchors: Ints,
+    least: int,
+    share: float,
+) -> bool:
+    trial = free.copy()
+    for k in range(len(moved)):
+        if blocking[k]:
+            block(trial, origin, moved[k])
+    return ways_open(trial, anchors, least, share)
+
+
+@njit(cache=True)
 def first_fit(
     spots: Floats,
     items: Floats,
@@ -179,29 +211,16 @@ def first_fit(
     moved = np.empty_like(items)
     for m in range(len(spots)):
         x, y, turn = spots[m, 0], spots[m, 1], int(spots[m, 2])
-        good = True
         for k in range(len(items)):
             turned(items[k], x, y, turn, moved[k])
-            if (
-                not _within(moved[k], inner, FROM_WALL_M)
-                or hits(moved[k], solids, solid_count, GAP_M)
-                or hits(moved[k], keeps, keep_count, 0.0)
-            ):
-                good = False
-                break
-        if not good:
+        if not _stands(moved, inner, solids, solid_count, keeps, keep_count):
             continue
+        good = True
         for k in range(len(fronts)):
             turned(fronts[k], x, y, turn, box)
             if not _within(box, inner, 0.0) or hits(box, solids, solid_count, 0.0):
                 good = False
                 break
-        if not good:
-            continue
-        trial = free.copy()
-        for k in range(len(items)):
-            if blocking[k]:
-                block(trial, origin, moved[k])
-        if ways_open(trial, anchors, least, share):
+        if good and _leaves_ways(moved, blocking, free, origin, anchors, least, share):
             return m
     return -1

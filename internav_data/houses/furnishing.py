@@ -82,7 +82,7 @@ class RoomState:
         self.keep_count += 1
 
     def place(self, group: Group, spots: Floats) -> bool:
-        """Put a group at the first spot (x, y, quarter turns) where it fits; tell whether one did."""
+        """Put a group at the first spot (x, y, quarter turns) where it fits, if there is one."""
         full = CAPACITY - 24
         if len(spots) == 0 or self.solid_count > full or self.keep_count > full:
             return False
@@ -133,7 +133,7 @@ class RoomState:
             if spare < 0.0:
                 continue
             count = max(1, int(spare / step) + 1)
-            along = -left + np.arange(count) * step
+            along: Floats = np.arange(count, dtype=np.float64) * step - left
             along[-1] = edge.length - right
             ends = np.minimum(along + left, edge.length - along - right)
             like = 0.6 * rng.random(count)
@@ -179,9 +179,7 @@ def _on_edge(edge: Edge, along: Floats) -> Floats:
     return out
 
 
-def _edges(
-    corners: Sequence[tuple[int, int]], openings: Sequence[Opening]
-) -> tuple[Edge, ...]:
+def _edges(corners: Sequence[tuple[int, int]], openings: Sequence[Opening]) -> tuple[Edge, ...]:
     """Wall faces of a room: its polygon moved inwards by half a wall."""
     count = len(corners)
     directions = []

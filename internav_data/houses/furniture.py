@@ -65,9 +65,7 @@ def _times(rule: Rule, picker: Picker, area_m2: float, density: float) -> int:
     return min(MOST, whole + (draw < expected - whole))
 
 
-def _furnish_room(
-    state: RoomState, types: frozenset[str], picker: Picker, density: float
-) -> None:
+def _furnish_room(state: RoomState, types: frozenset[str], picker: Picker, density: float) -> None:
     width, depth = float(state.inner[2] - state.inner[0]), float(state.inner[3] - state.inner[1])
     place = Place(state.area_m2, min(width, depth), max(width, depth), types)
     found = True

@@ -12,7 +12,6 @@ from internav_data.houses.pieces import (
     BACK_GAP_M,
     FACING_LEFT,
     FACING_RIGHT,
-    FACING_ROOM,
     FACING_WALL,
     Group,
     Item,
@@ -45,10 +44,8 @@ class Place:
     """All types of room in the house."""
 
 
-Maker = "Callable[[Picker, Place], list[Group]]"
-
-
-def _narrow(limit: float) -> Callable[[Asset], bool]:
+def narrow(limit: float) -> Callable[[Asset], bool]:
+    """Return a test for assets at most so wide."""
     return lambda asset: asset.size[0] <= limit
 
 
@@ -59,7 +56,7 @@ def _beside(item: Item, asset: Asset, side: int) -> Item:
 
 
 def bed(p: Picker, place: Place) -> list[Group]:
-    """A bed with its head to the wall and a nightstand on either side."""
+    """Make a bed with its head to the wall and a nightstand on either side."""
     double = place.area_m2 >= 11.5 and place.short_m >= 2.75  # noqa: PLR2004 - the stated minima
     asset = p.one("Bed", lambda a: (a.size[0] >= DOUBLE_BED_M) == double)
     if asset is None:
@@ -69,7 +66,7 @@ def bed(p: Picker, place: Place) -> list[Group]:
     main = against(asset)
     foot = in_front(main, 0.45)
     plain = Group((main,), (foot,))
-    stand = p.one("Nightstand", _narrow(0.65))
+    stand = p.one("Nightstand", narrow(0.65))
     lengthwise = Item(asset, 0.0, BACK_GAP_M + asset.size[0] / 2.0, FACING_RIGHT)
     corner = Group((lengthwise,), (in_front(lengthwise, 0.5, 0.5),))
     if stand is None:
@@ -126,7 +123,7 @@ fridge = _plain("Fridge", front=0.6)
 
 
 def side_table(p: Picker, place: Place) -> list[Group]:
-    """A small table against a wall, with something on it."""
+    """Make a small table against a wall, with something on it."""
     del place
     asset = p.one("SideTable")
     if asset is None:
@@ -141,14 +138,14 @@ def side_table(p: Picker, place: Place) -> list[Group]:
 
 
 def painting(p: Picker, place: Place) -> list[Group]:
-    """A picture on the wall."""
+    """Make a picture on the wall."""
     del place
-    asset = p.one("Painting", _narrow(1.3), any_size=True)
+    asset = p.one("Painting", narrow(1.3), any_size=True)
     return [Group((against(asset, z=EYE_LEVEL_M + 0.1),))] if asset else []
 
 
 def wall_mirror(p: Picker, place: Place) -> list[Group]:
-    """A mirror on the wall."""
+    """Make a mirror on the wall."""
     del place
     asset = p.one("Mirror")
     if asset is None:
@@ -158,16 +155,18 @@ def wall_mirror(p: Picker, place: Place) -> list[Group]:
 
 
 def rug(p: Picker, place: Place) -> list[Group]:
-    """A rug on free floor."""
-    asset = p.one("Rug", lambda a: a.size[0] < 0.6 * place.long_m and a.size[1] < 0.6 * place.short_m)
+    """Make a rug on free floor."""
+    asset = p.one(
+        "Rug", lambda a: a.size[0] < 0.6 * place.long_m and a.size[1] < 0.6 * place.short_m
+    )
     return [Group((Item(asset, 0.0, 0.0, 0),))] if asset else []
 
 
 def seating(p: Picker, place: Place) -> list[Group]:
-    """Sofa facing a television, coffee table between, an armchair beside."""
+    """Make sofa facing a television, coffee table between, an armchair beside."""
     stand = p.one("TVStand")
     screen = p.one("Television", lambda a: stand is not None and a.size[0] <= stand.size[0] + 0.05)
-    sofa = p.one("Sofa", _narrow(max(1.6, 0.6 * place.long_m)), any_size=True)
+    sofa = p.one("Sofa", narrow(max(1.6, 0.6 * place.long_m)), any_size=True)
     if sofa is None:
         return []
     out: list[Group] = []
@@ -192,7 +191,7 @@ def _viewing_distances(place: Place, stand: Asset, sofa: Asset) -> list[float]:
 
 
 def _around(p: Picker, screens: tuple[Item, ...], sofa: Asset, gap: float) -> list[Group]:
-    """Sofa across from a screen, with and without what stands between and beside."""
+    """Make sofa across from a screen, with and without what stands between and beside."""
     base = screens[0]
     front = base.y + base.half[1]
     seat = Item(sofa, base.x, front + gap + sofa.size[1] / 2.0, FACING_WALL)
@@ -213,7 +212,7 @@ def _around(p: Picker, screens: tuple[Item, ...], sofa: Asset, gap: float) -> li
         on_it = p.resting(lying, len(plain.items), coffee, 0.0, 0.0, FACING_WALL)
         if on_it is not None:
             with_table = plain.with_items(lying, on_it)
-    chair = p.one("ArmChair", _narrow(1.0))
+    chair = p.one("ArmChair", narrow(1.0))
     if chair is None:
         return [with_table, plain]
     side = 1 if p.chance(0.5) else -1
@@ -224,8 +223,8 @@ def _around(p: Picker, screens: tuple[Item, ...], sofa: Asset, gap: float) -> li
 
 
 def sofa_alone(p: Picker, place: Place) -> list[Group]:
-    """A sofa with its back to the wall."""
-    asset = p.one("Sofa", _narrow(max(1.6, 0.6 * place.long_m)), any_size=True)
+    """Make a sofa with its back to the wall."""
+    asset = p.one("Sofa", narrow(max(1.6, 0.6 * place.long_m)), any_size=True)
     if asset is None:
         return []
     item = against(asset)
@@ -233,7 +232,7 @@ def sofa_alone(p: Picker, place: Place) -> list[Group]:
 
 
 def television(p: Picker, place: Place) -> list[Group]:
-    """A television on its stand."""
+    """Make a television on its stand."""
     del place
     stand, screen = p.one("TVStand"), p.one("Television")
     if stand is None:
@@ -245,9 +244,9 @@ def television(p: Picker, place: Place) -> list[Group]:
 
 
 def dining(p: Picker, place: Place) -> list[Group]:
-    """A table with chairs pushed in, for as many as the room can take."""
+    """Make a table with chairs pushed in, for as many as the room can take."""
     largest = 1.1 if place.area_m2 < 12 else 1.6 if place.area_m2 < 18 else 2.9  # noqa: PLR2004
-    asset = p.one("DiningTable", _narrow(largest), any_size=True)
+    asset = p.one("DiningTable", narrow(largest), any_size=True)
     chair = p.one("Chair")
     if asset is None:
         return []
@@ -264,7 +263,11 @@ def dining(p: Picker, place: Place) -> list[Group]:
     near = [p.parts(item) for item in long_sides]
     ends = [e for e in ends if not any(overlap(p.parts(e), other, 0.04) for other in near)]
     four = plain.with_items(*long_sides)
-    bowl = p.one(["Apple", "Bread", "Laptop"][int(float(p.rng.random()) * 3)]) if p.chance(0.5) else None
+    bowl = (
+        p.one(["Apple", "Bread", "Laptop"][int(float(p.rng.random()) * 3)])
+        if p.chance(0.5)
+        else None
+    )
     resting = p.resting(table, 0, bowl, 0.1, 0.05) if bowl else None
     extra = () if resting is None else (resting,)
     six = four.with_items(*ends)
@@ -274,8 +277,8 @@ def dining(p: Picker, place: Place) -> list[Group]:
 
 
 def desk(p: Picker, place: Place) -> list[Group]:
-    """A desk against the wall with its chair before it."""
-    asset = p.one("Desk", _narrow(max(1.2, 0.5 * place.long_m)), any_size=True)
+    """Make a desk against the wall with its chair before it."""
+    asset = p.one("Desk", narrow(max(1.2, 0.5 * place.long_m)), any_size=True)
     seat = p.one("OfficeChair") if p.chance(0.7) else p.one("Chair")
     if asset is None:
         return []
@@ -293,9 +296,9 @@ def desk(p: Picker, place: Place) -> list[Group]:
 
 
 def washbasin(p: Picker, place: Place) -> list[Group]:
-    """A basin with a mirror over it."""
+    """Make a basin with a mirror over it."""
     del place
-    asset, glass = p.one("Sink"), p.one("Mirror", _narrow(0.9))
+    asset, glass = p.one("Sink"), p.one("Mirror", narrow(0.9))
     if asset is None:
         return []
     basin = against(asset)
@@ -309,7 +312,7 @@ def washbasin(p: Picker, place: Place) -> list[Group]:
 
 
 def laundry(p: Picker, place: Place) -> list[Group]:
-    """Washing machine and dryer side by side."""
+    """Make washing machine and dryer side by side."""
     del place
     washer, dryer = p.one("WashingMachine"), p.one("ClothesDryer")
     if washer is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from internav_data.houses.groups import narrow
 from internav_data.houses.pieces import FACING_WALL, Group, Item, Picker, against, in_front
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def _run(p: Picker, kinds: tuple[str, ...], longest: float) -> Group | None:
         piece = asset
         if kind == "CounterTop":
             limit = spare / counters - SEAM_M
-            piece = p.one(kind, lambda a, most=limit: a.size[0] <= most)
+            piece = p.one(kind, narrow(limit))
         if piece is None:
             continue
         items.append(against(piece, x + piece.size[0] / 2.0))
@@ -71,7 +72,7 @@ _SHORT_RUNS: tuple[tuple[str, ...], ...] = (
 
 
 def kitchen_run(p: Picker, place: Place) -> list[Group]:
-    """Everything one cooks with along one wall, as much as fits, then less."""
+    """Make everything one cooks with along one wall, as much as fits, then less."""
     start = 0 if place.area_m2 > 12 else 1  # noqa: PLR2004 - m², a roomy kitchen
     kinds = list(_RUNS[start:])
     if p.chance(0.5):
@@ -81,7 +82,7 @@ def kitchen_run(p: Picker, place: Place) -> list[Group]:
 
 
 def short_run(p: Picker, place: Place) -> list[Group]:
-    """Stove and sink where no whole run found room."""
+    """Make stove and sink where no whole run found room."""
     runs = [
         _run(p, k, length)
         for k in _SHORT_RUNS
@@ -91,13 +92,13 @@ def short_run(p: Picker, place: Place) -> list[Group]:
 
 
 def counter(p: Picker, place: Place) -> list[Group]:
-    """Another counter."""
+    """Make another counter."""
     run = _run(p, ("CounterTop",), 0.6 * place.long_m)
     return [_laid(p, run)] if run is not None else []
 
 
 def sink_alone(p: Picker, place: Place) -> list[Group]:
-    """A sink by itself."""
+    """Make a sink by itself."""
     del place
     asset = p.one("Sink")
     if asset is None:
@@ -107,7 +108,7 @@ def sink_alone(p: Picker, place: Place) -> list[Group]:
 
 
 def island(p: Picker, place: Place) -> list[Group]:
-    """A free-standing counter with stools."""
+    """Make a free-standing counter with stools."""
     asset = p.one("KitchenIsland", lambda a: a.size[0] < 0.45 * place.long_m)
     if asset is None:
         return []

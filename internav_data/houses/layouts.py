@@ -1,4 +1,4 @@
-"""Kinds of floor plans: sliced blocks, halls as spines, notches and L-shapes, rows as a fallback."""
+"""Kinds of floor plans: sliced blocks, halls as spines, notches, L-shapes, and plain rows."""
 
 from __future__ import annotations
 
@@ -50,6 +50,11 @@ def _shuffled(rng: Generator, items: Sequence[int]) -> list[int]:
     return [items[int(k)] for k in keys.argsort(kind="stable")]
 
 
+def _least(specs: Sequence[RoomSpec], rooms: Sequence[int]) -> int:
+    """Depth that some rooms side by side need, centimetres."""
+    return max(least_width(specs[k]) for k in rooms)
+
+
 def sliced(specs: Sequence[RoomSpec], rng: Generator) -> Layout:
     """One block cut by a slicing tree."""
     order = sorted(range(len(specs)), key=lambda k: (_ORDER.index(specs[k].type), k))
@@ -57,8 +62,9 @@ def sliced(specs: Sequence[RoomSpec], rng: Generator) -> Layout:
         order = _shuffled(rng, order)
     area = sum(spec.area_m2 for spec in specs) * 1e4
     aspect = _uniform(rng, 1.0, 1.35 if len(specs) == 1 else 1.75)
-    width = max(snapped(math.sqrt(area * aspect)), max(map(least_width, specs)))
-    height = max(snapped(area / width), max(map(least_width, specs)))
+    least = _least(specs, order)
+    width = max(snapped(math.sqrt(area * aspect)), least)
+    height = max(snapped(area / width), least)
     layout: Layout = {}
     slice_rooms((0, 0, width, height), specs, order, rng, layout)
     return layout
@@ -100,7 +106,12 @@ def _cells(specs: Sequence[RoomSpec], band: list[int], rng: Generator) -> list[t
 
 
 def _wrap(
-    rect: Rect, specs: Sequence[RoomSpec], cell: tuple[int, ...], *, hall_above: bool, rng: Generator
+    rect: Rect,
+    specs: Sequence[RoomSpec],
+    cell: tuple[int, ...],
+    *,
+    hall_above: bool,
+    rng: Generator,
 ) -> Layout:
     """Put a small room into a corner of a large one's cell: beside the hall, or at its far end."""
     x0, y0, x1, y1 = rect
@@ -151,7 +162,7 @@ def _fill_band(
 
 
 def spine(specs: Sequence[RoomSpec], rng: Generator) -> Layout:
-    """A hall with rooms on both sides; the living rooms often fill its end."""
+    """Line a hall with rooms on both sides; the living rooms often fill its end."""
     hall = next(k for k, spec in enumerate(specs) if spec.type == "hall")
     rest = [k for k in range(len(specs)) if k != hall]
     end: list[int] = []
@@ -179,7 +190,7 @@ def spine(specs: Sequence[RoomSpec], rng: Generator) -> Layout:
         if sides == 2 and porch == int(above):  # noqa: PLR2004 - both sides of the hall
             side = length - max(120, snapped(length * _uniform(rng, 0.12, 0.25)))
         band_area = sum(specs[k].area_m2 for k in band) * 1e4
-        deep = max(snapped(band_area / side), max(least_width(specs[k]) for k in band))
+        deep = max(snapped(band_area / side), _least(specs, band))
         heights.append(deep)
         y0, y1 = (hall_width, hall_width + deep) if above else (-deep, 0)
         cells = _cells(specs, band, rng)
@@ -187,7 +198,7 @@ def spine(specs: Sequence[RoomSpec], rng: Generator) -> Layout:
     if end:
         height = heights[0] + heights[1] + hall_width
         width = snapped(sum(specs[k].area_m2 for k in end) * 1e4 / height)
-        width = max(width, max(least_width(specs[k]) for k in end))
+        width = max(width, _least(specs, end))
         order = end if float(rng.random()) < 0.5 else end[::-1]  # noqa: PLR2004 - a fair coin
         rect = (-width, -heights[1], 0, heights[0] + hall_width)
         slice_rooms(rect, specs, order, rng, layout)
@@ -202,7 +213,7 @@ def row(specs: Sequence[RoomSpec]) -> Layout:
     rest = sorted(
         (k for k in range(len(specs)) if k != along), key=lambda k: _ORDER.index(specs[k].type)
     )
-    deepest = max(max(least_width(specs[k]) for k in rest), 300)
+    deepest = max(300, _least(specs, rest))
     largest = max(specs[k].area_m2 for k in rest) * 1e4
     depth = max(deepest, snapped(math.sqrt(largest)))
     layout: Layout = {}

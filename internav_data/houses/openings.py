@@ -172,10 +172,15 @@ def draw_windows(
             centre = segment.low + round((k + 0.5) * pitch + 10.0 * (float(rng.random()) - 0.5))
             low, high = centre - width // 2, centre + width - width // 2
             if float(rng.random()) < (0.85 if name in HABITABLE else 0.6) and not any(
-                d.along_x == segment.along_x and d.at == segment.at and low < d.high + 20 and d.low - 20 < high
+                d.along_x == segment.along_x
+                and d.at == segment.at
+                and low < d.high + 20
+                and d.low - 20 < high
                 for d in doors
             ):
                 out.append(
-                    Opening(segment.along_x, segment.at, low, high, (OUTSIDE, room), None, sill, top)
+                    Opening(
+                        segment.along_x, segment.at, low, high, (OUTSIDE, room), None, sill, top
+                    )
                 )
     return out

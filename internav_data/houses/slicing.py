@@ -31,9 +31,7 @@ def least_width(spec: RoomSpec) -> int:
     return -(-clear // GRID_CM) * GRID_CM
 
 
-def _best_cut(
-    specs: Sequence[RoomSpec], order: Sequence[int], rng: Generator
-) -> tuple[int, float]:
+def _best_cut(specs: Sequence[RoomSpec], order: Sequence[int], rng: Generator) -> tuple[int, float]:
     """Where to part the order of rooms, and the share of area before it."""
     areas = [specs[k].area_m2 for k in order]
     total = sum(areas)

@@ -61,7 +61,9 @@ def _pieces(
     out: list[Wall] = []
     start = low
     inside = [
-        o for o in openings if o.along_x == along_x and o.at == line and low <= o.low and o.high <= high
+        o
+        for o in openings
+        if o.along_x == along_x and o.at == line and low <= o.low and o.high <= high
     ]
     for opening in sorted(inside, key=lambda o: o.low):
         if opening.low > start:

@@ -34,9 +34,7 @@ def parts_of(house, thing):
     out = []
     for a, b in itertools.pairwise(starts):
         points = moved[a:b]
-        out.append(
-            (MultiPoint(points[:, :2]).convex_hull, points[:, 2].min(), points[:, 2].max())
-        )
+        out.append((MultiPoint(points[:, :2]).convex_hull, points[:, 2].min(), points[:, 2].max()))
     return out
 
 
@@ -183,11 +181,15 @@ def free_graph(house):
     outline = Polygon(house.outline)
     inside = shapely.contains_xy(outline, xy[:, 0], xy[:, 1])
     graph = nx.Graph()
-    graph.add_nodes_from(n for n, bad, good in zip(nodes, near, inside, strict=True) if good and not bad)
+    graph.add_nodes_from(
+        n for n, bad, good in zip(nodes, near, inside, strict=True) if good and not bad
+    )
     for i, j in list(graph.nodes):
         for other in ((i + 1, j), (i, j + 1)):
             if other in graph:
-                line = shapely.LineString([(i * SPACING_M, j * SPACING_M), (other[0] * SPACING_M, other[1] * SPACING_M)])
+                line = shapely.LineString(
+                    [(i * SPACING_M, j * SPACING_M), (other[0] * SPACING_M, other[1] * SPACING_M)]
+                )
                 if not shapely.dwithin(blocked, line, RADIUS_M - 1e-6 - 1e-12):
                     graph.add_edge((i, j), other)
     return graph

@@ -1,0 +1,138 @@
+"""Polygons of a user's floor plan: read, checked and laid on the grid of a Plan."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import TYPE_CHECKING
+
+from internav_data.houses.plan import Plan
+from internav_data.houses.standards import HALF_WALL_CM
+from internav_data.records import OUTSIDE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from internav_data.houses.plan import Corner, Rect
+
+LEAST_SIDE_CM = 100
+"""Narrower rooms leave the agent no place to turn beside furniture."""
+LARGEST_CM = 10_000
+
+
+class Complaint(ValueError):  # noqa: N818 - the reader turns it into the user's error
+    """What is wrong with a floor plan, before the file's name is known."""
+
+
+def read_polygon(value: object, name: str) -> list[Corner]:
+    """Return a room's corners in centimetres, straight ones dropped."""
+    if not isinstance(value, list) or len(value) < 4:  # noqa: PLR2004 - a rectangle has four
+        raise Complaint(f"room '{name}': 'polygon' needs four or more corners [x, y] in metres")
+    corners: list[Corner] = []
+    for entry in value:
+        good = (
+            isinstance(entry, list)
+            and len(entry) == 2  # noqa: PLR2004 - x and y
+            and all(
+                isinstance(v, (int, float))
+                and not isinstance(v, bool)
+                and math.isfinite(v)
+                and abs(v) * 100 <= LARGEST_CM
+                for v in entry
+            )
+        )
+        if not good:
+            raise Complaint(
+                f"room '{name}': corner {entry!r} is no [x, y] in metres within "
+                f"{LARGEST_CM // 100} m"
+            )
+        corners.append((round(entry[0] * 100), round(entry[1] * 100)))
+    if corners[0] == corners[-1]:
+        corners.pop()
+    for (ax, ay), (bx, by) in itertools.pairwise([*corners, corners[0]]):
+        if (ax == bx) == (ay == by):
+            raise Complaint(
+                f"room '{name}': the side from ({ax / 100}, {ay / 100}) to ({bx / 100}, "
+                f"{by / 100}) is not along x or y; walls are rectilinear"
+            )
+    _simple(corners, name)
+    return corners
+
+
+def _simple(corners: Sequence[Corner], name: str) -> None:
+    """Complain about sides that touch or cross others than their neighbours."""
+    count = len(corners)
+    sides = [(corners[k], corners[(k + 1) % count]) for k in range(count)]
+    for a, b in itertools.combinations(range(count), 2):
+        (p, q), (r, s) = sides[a], sides[b]
+        meet = max(min(p[0], q[0]), min(r[0], s[0])) <= min(
+            max(p[0], q[0]), max(r[0], s[0])
+        ) and max(min(p[1], q[1]), min(r[1], s[1])) <= min(max(p[1], q[1]), max(r[1], s[1]))
+        neighbours = b == a + 1 or (a == 0 and b == count - 1)
+        backwards = neighbours and (p[0] == q[0]) == (r[0] == s[0])
+        if meet and (not neighbours or backwards):
+            raise Complaint(f"room '{name}': its outline touches or crosses itself")
+
+
+def _covers(corners: Sequence[Corner], x: float, y: float) -> bool:
+    """Whether a point (never on a side) lies inside: count the sides to its right."""
+    inside = False
+    for (ax, ay), (bx, by) in itertools.pairwise([*corners, corners[0]]):
+        if ax == bx and ax > x and min(ay, by) < y < max(ay, by):
+            inside = not inside
+    return inside
+
+
+def laid_out(
+    polygons: Sequence[Sequence[Corner]], names: Sequence[str]
+) -> tuple[Plan, tuple[int, int]]:
+    """Lay rooms on a grid; return the plan and how far it was moved (centimetres)."""
+    left = min(x for corners in polygons for x, _ in corners) + HALF_WALL_CM
+    low = min(y for corners in polygons for _, y in corners) + HALF_WALL_CM
+    moved = [[(x - left, y - low) for x, y in corners] for corners in polygons]
+    xs = sorted({x for corners in moved for x, _ in corners})
+    ys = sorted({y for corners in moved for _, y in corners})
+    rooms: list[list[Rect]] = [[] for _ in moved]
+    for x0, x1 in itertools.pairwise(xs):
+        for y0, y1 in itertools.pairwise(ys):
+            inside = [
+                k
+                for k, corners in enumerate(moved)
+                if _covers(corners, (x0 + x1) / 2, (y0 + y1) / 2)
+            ]
+            if len(inside) > 1:
+                raise Complaint(
+                    f"room '{names[inside[1]]}': overlaps room '{names[inside[0]]}' at "
+                    f"({(x0 + left) / 100}, {(y0 + low) / 100})"
+                )
+            if inside:
+                rooms[inside[0]].append((x0, y0, x1, y1))
+    plan = Plan.of(rooms)
+    _whole(plan, names)
+    return plan, (left, low)
+
+
+def _whole(plan: Plan, names: Sequence[str]) -> None:
+    """Complain about gaps between rooms and about rooms too narrow to furnish."""
+    for room, name in enumerate(names):
+        x0, y0, x1, y1 = plan.main_rectangle(room)
+        if min(x1 - x0, y1 - y0) < LEAST_SIDE_CM:
+            raise Complaint(f"room '{name}': it is narrower than {LEAST_SIDE_CM / 100} m")
+    if plan.polygon(frozenset(range(len(names)))):
+        return
+    reached = {0}
+    for _ in names:
+        for wall in plan.segments:
+            pair = {wall.before, wall.after}
+            if OUTSIDE not in pair and pair & reached:
+                reached |= pair
+    lost = next((name for k, name in enumerate(names) if k not in reached), None)
+    if lost is not None:
+        raise Complaint(
+            f"room '{lost}': shares no wall with the others; rooms are centre lines of walls, "
+            "close the gap"
+        )
+    raise Complaint(
+        f"room '{names[-1]}': the rooms enclose a gap or touch at a corner only; fill the gap "
+        "with a room or close it"
+    )
