@@ -37,18 +37,18 @@ GRACE_S = 5.0
 """After an interruption workers get this long to finish what they do (process control, no data)."""
 TICK_S = 0.25
 """The longest a signal waits to be seen."""
-SINGLE_THREADED = {
-    # One thread a process: the cores are shared by processes, and idle pools cost memory.
-    name: "1"
-    for name in (
+SINGLE_THREADED = dict.fromkeys(
+    (
         "OMP_NUM_THREADS",
         "OPENBLAS_NUM_THREADS",
         "MKL_NUM_THREADS",
         "NUMEXPR_NUM_THREADS",
         "NUMBA_NUM_THREADS",
         "OPENCV_FOR_THREADS_NUM",
-    )
-}
+    ),
+    "1",
+)
+"""One thread a process: the cores are shared by processes, and idle pools cost memory."""
 
 
 class CannotStartError(InternavError):
@@ -154,7 +154,7 @@ class Crew:
     """Some workers that do tasks in any order; use it as a context manager."""
 
     def __init__(self, size: int, recipe: Recipe, stop: StopFlag = lambda: False) -> None:
-        self._size = size
+        self.size = size
         self._recipe = recipe
         self._stop = stop
         self._workers: list[_Worker] = []
@@ -215,7 +215,7 @@ class Crew:
             if worker.ready and not worker.busy and todo:
                 worker.begin(todo.popleft())
         starting = sum(not worker.ready for worker in self._workers)
-        for _ in range(min(self._size - len(self._workers), len(todo) - starting)):
+        for _ in range(min(self.size - len(self._workers), len(todo) - starting)):
             self._workers.append(_Worker(self._recipe))
 
     def _listen(self, todo: deque[Any], deaths: Counter[Any]) -> Iterator[Any]:

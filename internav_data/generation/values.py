@@ -124,6 +124,8 @@ def _hint_of(config: object, key: str) -> Any:  # noqa: ANN401 - a type hint
 
 
 def _is_text(hint: Any) -> bool:  # noqa: ANN401 - a type hint
+    if typing.get_origin(hint) is tuple:
+        return False
     return hint is str or str in typing.get_args(hint) or typing.get_origin(hint) is typing.Literal
 
 

@@ -1,0 +1,54 @@
+"""How episodes are made: every figure of the algorithm that a user may change."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from internav_data.records.errors import UsageError
+
+
+@dataclass(frozen=True, slots=True)
+class EpisodeConfig:
+    """Settings of the episodes; the defaults are calibrated to Table 2 of the paper."""
+
+    max_obstacles: tuple[int, int, int] = (4, 7, 10)
+    """Most obstacles in houses of 1-2, 3-5 and 6-10 rooms; then start and goal are drawn anew."""
+    sideways_m: float = 0.25
+    """Standard deviation of an obstacle's distance from the way, metres."""
+    gap_m: float = 0.01
+    """Least distance between an obstacle and everything else when it is spawned, metres."""
+    least_clear_m: float = 2.0
+    """Least any-angle distance from start to goal without obstacles, metres."""
+    spots: int = 200
+    """Spots tried for the obstacles of one start and goal."""
+    redraws: int = 50
+    """Starts and goals tried for one episode."""
+    unseen_assets: bool = False
+    """Each split draws its obstacles from its own share of the assets (2/3, 1/6, 1/6)."""
+
+    def check(self) -> None:
+        """Raise UsageError for a value that cannot be meant."""
+        problems = [
+            (
+                any(most < 1 for most in self.max_obstacles),
+                f"max_obstacles: expected three counts of at least 1, got {self.max_obstacles}",
+            ),
+            (self.sideways_m < 0.0, f"sideways_m: expected 0 or more, got {self.sideways_m}"),
+            (self.gap_m < 0.0, f"gap_m: expected 0 or more, got {self.gap_m}"),
+            (
+                self.least_clear_m <= 0.0,
+                f"least_clear_m: expected more than 0, got {self.least_clear_m}",
+            ),
+            (self.spots < 1, f"spots: expected at least 1, got {self.spots}"),
+            (self.redraws < 1, f"redraws: expected at least 1, got {self.redraws}"),
+        ]
+        for wrong, message in problems:
+            if wrong:
+                raise UsageError(f"episodes.{message}")
+
+    def most_obstacles(self, room_count: int) -> int:
+        """Most obstacles for a house of that many rooms."""
+        few, some, many = self.max_obstacles
+        if room_count <= 2:  # noqa: PLR2004 - the classes of Table 2
+            return few
+        return some if room_count <= 5 else many  # noqa: PLR2004

@@ -1,0 +1,48 @@
+"""What a run did, for programs and for people."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from internav_data.generation.progress import clock
+from internav_data.records.errors import QuarantineError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What a run did."""
+
+    out: Path
+    scenes: int
+    """In the dataset now, quarantined ones included."""
+    episodes: int
+    """In the dataset now."""
+    new_scenes: int
+    """Made by this run."""
+    new_episodes: int
+    seconds: float
+    quarantined: tuple[tuple[str, str], ...]
+    """Scene ids in the dataset's manifest that could not be made, and why."""
+
+    @property
+    def exit_code(self) -> int:
+        """0, or 4 when scenes are missing."""
+        return QuarantineError.exit_code if self.quarantined else 0
+
+
+def summary(report: Report) -> str:
+    """Return in one line what a run did."""
+    if not report.new_scenes:
+        return (
+            f"{report.out} holds {report.scenes} scenes and {report.episodes} episodes of this "
+            "config already; ask for more --scenes to extend it"
+        )
+    rate = report.new_episodes / max(report.seconds, 1e-9)
+    return (
+        f"{report.out}: {report.scenes} scenes, {report.episodes} episodes "
+        f"({report.new_episodes} new in {clock(report.seconds)}, {rate:.1f} episodes/s)"
+    )

@@ -1,0 +1,265 @@
+"""Many scenes: seeds to a finished dataset, whatever happens on the way.
+
+Every scene is a pure function of the config and its index. Workers store each one whole; scenes
+are put together in order of their index once all are there. So neither the number of workers nor
+the order in which they end, nor any kill and resume, changes a byte.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from internav_data.dataset import (
+    Identity,
+    assemble,
+    done_scenes,
+    finished_scenes,
+    has_manifest,
+    open_work,
+    read_manifest,
+    work_dir,
+    write_quarantine,
+)
+from internav_data.generation.crew import Crew, Recipe
+from internav_data.generation.interrupts import InterruptedRunError, Interrupts
+from internav_data.generation.lock import locked
+from internav_data.generation.messages import Done
+from internav_data.generation.progress import Progress
+from internav_data.generation.report import Report
+from internav_data.generation.scenes import (
+    ATTEMPTS,
+    ScenePayload,
+    asset_folders,
+    scene_maker,
+    version,
+)
+from internav_data.houses.quota import room_count
+from internav_data.houses.splits import split_of_scene
+from internav_data.records.errors import InternavError, QuarantineError, UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from internav_data.catalog import Catalogue
+    from internav_data.dataset import Manifest
+    from internav_data.generation.config import GenerationConfig
+
+GENERATOR = "internav-gen"
+MAX_SCENES = 1_000_000
+"""Scene ids have six digits."""
+HOPELESS = 20
+"""When this many scenes fail before one succeeds, the config is at fault."""
+TAIL = 8
+"""Scenes a worker that are handed out largest first at the end, so that all end together."""
+
+
+def generate(
+    out: Path,
+    config: GenerationConfig,
+    scenes: int,
+    workers: int = 0,
+    progress: Progress | None = None,
+    assets: Catalogue | None = None,
+    setup: Callable[[ScenePayload], Callable[[int], int]] = scene_maker,
+) -> Report:
+    """Make a dataset of scenes 0 to scenes - 1, continue an unfinished one, or extend one.
+
+    Parameters
+    ----------
+    out
+        The dataset's folder: new, empty, or one that holds a dataset of this config.
+    config
+        What decides every scene.
+    scenes
+        How many scenes the dataset is to hold.
+    workers
+        Processes; 0 for one a core.
+    progress
+        Told about every scene; silent by default.
+    assets
+        The catalogue of the config's asset folders, if it is loaded already.
+    setup
+        What workers do; tests put stubs here.
+
+    Raises
+    ------
+    UsageError
+        A config that cannot be meant, or a folder that holds something else.
+    LockedError
+        Another generator is at work in the folder.
+    InterruptedRunError
+        A signal ended the run; finished scenes are kept, the same call continues.
+    QuarantineError
+        Not one scene could be made.
+    InternavError
+        A full or read-only disk; finished scenes are kept.
+
+    """
+    progress = progress or Progress()
+    check_counts(scenes, workers)
+    config.check()
+    assets = assets or _catalogue(config)
+    identity = identity_for(config, assets)
+    with _disk_errors(out):
+        if out.exists() and not out.is_dir():
+            raise UsageError(f"{out} is a file: give a folder that is new, empty or a dataset")
+        out.mkdir(parents=True, exist_ok=True)
+        with locked(out):
+            work = open_work(out, identity)
+            done = _done_before(out, scenes)
+            plan = _Plan(config, scenes, tuple(k for k in range(scenes) if k not in done))
+            recipe = Recipe(setup, ScenePayload(config, str(work)))
+            with Interrupts() as stop, Crew(workers or cores(), recipe, stop) as crew:
+                _make(crew, plan, progress, work)
+                if stop():
+                    raise InterruptedRunError(_interruption(out, progress), stop.signum)
+            manifest = _assembled(out, identity, assets, scenes, progress)
+    return _report(out, manifest, progress)
+
+
+def _catalogue(config: GenerationConfig) -> Catalogue:
+    from internav_data.catalog import catalogue  # noqa: PLC0415 - imported when needed
+
+    return catalogue(asset_folders(config))
+
+
+def check_counts(scenes: int, workers: int) -> None:
+    """Raise UsageError for counts that cannot be meant."""
+    if not 1 <= scenes <= MAX_SCENES:
+        raise UsageError(f"scenes is {scenes}: ask for 1 to {MAX_SCENES:,} scenes")
+    if workers < 0:
+        raise UsageError(f"workers is {workers}: ask for 1 or more, or 0 for one a core")
+
+
+def cores() -> int:
+    """Return how many processors this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def identity_for(config: GenerationConfig, assets: Catalogue) -> Identity:
+    """Return what makes another run the same dataset."""
+    return Identity(
+        generator=GENERATOR,
+        generator_version=version(),
+        seed=config.seed,
+        catalogue_version=assets.version,
+        catalogue_digest=assets.digest,
+        config=config.identity(assets.digest),
+    )
+
+
+def _done_before(out: Path, scenes: int) -> frozenset[int]:
+    done = done_scenes(out)
+    held = read_manifest(out).scenes if has_manifest(out) else 0
+    most = max(done, default=-1) + 1
+    if scenes < most and most > held:
+        raise UsageError(
+            f"{out}: scenes up to {most - 1} are finished there and would be lost: ask for "
+            f"--scenes {most} or more, or remove {work_dir(out)} first"
+        )
+    return done
+
+
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    """What a run has to do."""
+
+    config: GenerationConfig
+    scenes: int
+    todo: tuple[int, ...]
+
+    def expected(self, scene: int) -> int:
+        """Return how many episodes a scene should have."""
+        return self.config.episodes_of(split_of_scene(scene))
+
+    def ordered(self, workers: int) -> list[int]:
+        """Return the scenes to make; the last ones largest first, so that all workers end together.
+
+        Whatever the order, the dataset is the same.
+        """
+        cut = max(0, len(self.todo) - TAIL * workers)
+        seed = self.config.seed
+        tail = sorted(self.todo[cut:], key=lambda scene: -room_count(seed, scene))
+        return [*self.todo[:cut], *tail]
+
+
+def _make(crew: Crew, plan: _Plan, progress: Progress, work: Path) -> None:
+    """Have the scenes made; those that cannot be are stored as quarantined."""
+    before = plan.scenes - len(plan.todo)
+    progress.begin(plan.scenes, before, sum(plan.expected(scene) for scene in plan.todo))
+    for result in crew.run(plan.ordered(crew.size), progress.tick):
+        scene, episodes = result.task, 0
+        if isinstance(result, Done):
+            episodes = result.value
+        else:
+            progress.say(f"scene-{scene:06d} is quarantined: {result.reason}")
+            split = split_of_scene(scene)
+            write_quarantine(work, scene, result.reason, split=split, attempts=ATTEMPTS)
+        progress.scene(episodes, expected=plan.expected(scene))
+        if progress.quarantined == progress.scenes >= HOPELESS:
+            raise QuarantineError(_hopeless(progress.scenes, result.reason))
+    progress.end()
+
+
+def _assembled(
+    out: Path, identity: Identity, assets: Catalogue, scenes: int, progress: Progress
+) -> Manifest:
+    if has_manifest(out):
+        held = read_manifest(out)
+        if held.scenes >= scenes:
+            _forget_work(out)
+            return held
+    states = finished_scenes(work_dir(out))
+    if not has_manifest(out) and all(state.quarantined for state in states.values()):
+        reason = next(iter(states.values())).quarantined
+        raise QuarantineError(_hopeless(len(states), reason))
+    progress.say(f"writing {scenes} scenes into {out}")
+    return assemble(out, identity, tuple(assets.assets.values()), scenes)
+
+
+def _forget_work(out: Path) -> None:
+    """Remove the empty work folder of a run that had nothing to do."""
+    work = work_dir(out)
+    for path in work.iterdir():
+        path.unlink()
+    work.rmdir()
+
+
+def _hopeless(count: int, reason: str) -> str:
+    return f"none of {count} scenes could be made: {reason}; nothing was written"
+
+
+def _interruption(out: Path, progress: Progress) -> str:
+    done = progress.scenes_before + progress.scenes
+    return (
+        f"interrupted after {done} of {progress.scenes_total} scenes; they are kept in {out}: "
+        "run the same command again to continue"
+    )
+
+
+def _report(out: Path, manifest: Manifest, progress: Progress) -> Report:
+    return Report(
+        out=out,
+        scenes=manifest.scenes,
+        episodes=sum(count.episodes for count in manifest.counts.values()),
+        new_scenes=progress.scenes,
+        new_episodes=progress.episodes,
+        seconds=progress.seconds,
+        quarantined=tuple((entry.scene_id, entry.reason) for entry in manifest.quarantined),
+    )
+
+
+@contextlib.contextmanager
+def _disk_errors(out: Path) -> Iterator[None]:
+    """Turn what a disk refuses into an error that says what to do."""
+    try:
+        yield
+    except OSError as error:
+        raise InternavError(
+            f"cannot write to {out}: {error.strerror or error}; make it writable or free some "
+            "space, then run the same command again: finished scenes are kept"
+        ) from error

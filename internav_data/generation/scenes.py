@@ -1,0 +1,102 @@
+"""One scene: its house and its episodes, from the config and the scene's index alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from internav_data.records.errors import QuarantineError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from internav_data.catalog import Catalogue
+    from internav_data.generation.config import GenerationConfig
+    from internav_data.records import Asset, Episode, House, Split
+
+ATTEMPTS = 3
+"""Sub-seeds tried for a scene whose house or episodes cannot be made within their bounds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """A finished scene."""
+
+    house: House
+    episodes: tuple[Episode, ...]
+    attempts: int
+
+
+@dataclass(frozen=True, slots=True)
+class ScenePayload:
+    """What a worker needs to make scenes and store them."""
+
+    config: GenerationConfig
+    work: str
+    """Folder of unfinished work."""
+
+
+def build_scene(
+    scene: int, config: GenerationConfig, catalogue: Catalogue, episodes: int | None = None
+) -> Scene:
+    """Return a scene with its episodes (so many, or those of its split).
+
+    Raises
+    ------
+    QuarantineError
+        No attempt succeeded; it says why the last one failed.
+
+    """
+    from internav_data.episodes import build_episodes  # noqa: PLC0415 - numba, pybullet when used
+    from internav_data.houses import build_house  # noqa: PLC0415 - as above
+
+    reason = ""
+    for attempt in range(ATTEMPTS):
+        try:
+            house = build_house(config.seed, scene, config.house, catalogue, attempt)
+            count = config.episodes_of(house.split) if episodes is None else episodes
+            pool = obstacle_pool(catalogue, config, house.split)
+            made = build_episodes(house, count, pool, config.episodes, attempt=attempt)
+        except QuarantineError as error:
+            reason = str(error)
+        else:
+            return Scene(house, made, attempt + 1)
+    raise QuarantineError(reason)
+
+
+def obstacle_pool(catalogue: Catalogue, config: GenerationConfig, split: Split) -> Sequence[Asset]:
+    """Return the assets that obstacles of a split are drawn from."""
+    from internav_data.catalog import split_of_asset  # noqa: PLC0415 - needed with one option only
+
+    if not config.episodes.unseen_assets:
+        return catalogue.spawnable
+    return tuple(asset for asset in catalogue.spawnable if split_of_asset(asset) == split)
+
+
+def scene_maker(payload: ScenePayload) -> Callable[[int], int]:
+    """Set a worker up: return what makes and stores a scene and says how many episodes it has."""
+    from internav_data.catalog import catalogue  # noqa: PLC0415 - workers only
+    from internav_data.dataset.work import write_scene_work  # noqa: PLC0415 - workers only
+
+    config, work = payload.config, Path(payload.work)
+    assets = catalogue(asset_folders(config))
+
+    def make(scene: int) -> int:
+        built = build_scene(scene, config, assets)
+        write_scene_work(work, scene, built.house, built.episodes, attempts=built.attempts)
+        return len(built.episodes)
+
+    return make
+
+
+def version() -> str:
+    """Return the release of this package: another one may make other scenes."""
+    from importlib import metadata  # noqa: PLC0415 - slow to import, needed once
+
+    return metadata.version("internav-data")
+
+
+def asset_folders(config: GenerationConfig) -> tuple[Path, ...]:
+    """Return the folders of the user's own meshes."""
+    return tuple(Path(folder) for folder in config.assets)

@@ -1,0 +1,113 @@
+import dataclasses
+
+import pytest
+
+from internav_data.generation.config import GenerationConfig, identity_digest, load_config
+from internav_data.generation.values import known_keys
+from internav_data.records.errors import UsageError
+
+
+def refusal(*overrides, path=None):
+    with pytest.raises(UsageError) as caught:
+        load_config(path, overrides).check()
+    message = str(caught.value)
+    assert "\n" not in message
+    return message
+
+
+def test_defaults_are_the_papers():
+    config = load_config()
+    assert config == GenerationConfig()
+    assert (config.episodes_of("train"), config.episodes_of("test")) == (50, 5)
+    config.check()
+
+
+def test_a_file_and_overrides_in_that_order(tmp_path):
+    path = tmp_path / "c.toml"
+    path.write_text('seed = 7\nepisodes_per_scene = 12\n[house]\nrooms = "2-5"\nscale = 1\n')
+    config = load_config(path, ["seed=8", "episodes.max_obstacles=[1, 2, 3]", "house.rooms=4"])
+    assert (config.seed, config.episodes_per_scene, config.house.rooms) == (8, 12, "4")
+    assert config.house.scale == 1.0
+    assert isinstance(config.house.scale, float)
+    assert config.episodes.max_obstacles == (1, 2, 3)
+    assert config.episodes_of("test") == 2, "a tenth, rounded up"
+
+
+def test_paths_in_a_file_are_relative_to_it(tmp_path):
+    path = tmp_path / "c.toml"
+    path.write_text('assets = ["meshes"]\n[house]\nfloor_plan = "plan.toml"\n')
+    config = load_config(path)
+    assert config.assets == (str(tmp_path / "meshes"),)
+    assert config.house.floor_plan == str(tmp_path / "plan.toml")
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("house.scal=1.1", ["'house.scal'", "did you mean 'house.scale'"]),
+        ("rooms=4", ["'rooms'", "'house.rooms'"]),
+        ("episodes.sidewaysm=1", ["'episodes.sidewaysm'", "'episodes.sideways_m'"]),
+        ("scenes=10", ["'scenes'", "command line"]),
+        ("zzzzzz=1", ["'zzzzzz'", "seed"]),
+        ("seed=a", ["seed", "a whole number", "'a'"]),
+        ("seed=true", ["a whole number"]),
+        ("seed=1.5", ["a whole number", "1.5"]),
+        ("seed=-1", ["0 to 2^63"]),
+        ("house.scale=big", ["house.scale", "a number"]),
+        ("house.scale=nan", ["finite"]),
+        ("house.windows=1", ["true or false"]),
+        ("house.preset=palace", ["'palace'", "paper, realistic"]),
+        ("episodes.max_obstacles=[1, 2]", ["a list of 3"]),
+        ("episodes.max_obstacles=[1, 2, 'x']", ["max_obstacles[2]", "a whole number"]),
+        ("episodes_per_scene=0", ["1 or more"]),
+        ("episodes_per_scene=-3", ["1 or more"]),
+        ("house=1", ["table of settings"]),
+        ("seed", ["KEY=VALUE"]),
+        ("house.rooms=kitchen:40", ["10 rooms"]),
+    ],
+)
+def test_what_cannot_be_meant(override, words):
+    message = refusal(override)
+    for word in words:
+        assert word in message, message
+
+
+def test_errors_name_the_file(tmp_path):
+    path = tmp_path / "c.toml"
+    path.write_text("[house]\nscal = 1\n")
+    assert str(path) in refusal(path=path)
+    path.write_text("seed = = 1\n")
+    assert "is not TOML" in refusal(path=path)
+    assert "cannot read config" in refusal(path=tmp_path / "none.toml")
+    assert "is no folder" in refusal(f'assets=["{tmp_path}/none"]')
+
+
+def test_identity_leaves_paths_out(tmp_path):
+    one, two = tmp_path / "a.toml", tmp_path / "b.toml"
+    one.write_text("x = 1")
+    two.write_text("x = 1")
+    base = GenerationConfig()
+
+    def digest(path):
+        house = dataclasses.replace(base.house, floor_plan=str(path))
+        return identity_digest(dataclasses.replace(base, house=house).identity("c"))
+
+    assert digest(one) == digest(two)
+    two.write_text("x = 2")
+    assert digest(one) != digest(two)
+    spelled_out = dataclasses.replace(base, test_episodes_per_scene=5)
+    assert identity_digest(base.identity("c")) == identity_digest(spelled_out.identity("c"))
+
+
+@pytest.mark.parametrize("key", known_keys(GenerationConfig()))
+def test_every_value_but_paths_is_identity(key):
+    if key in {"assets", "house.floor_plan"}:
+        pytest.skip("what counts is their content")
+    base = GenerationConfig()
+    value = base
+    for name in key.split("."):
+        value = getattr(value, name)
+    other = {bool: "false" if value else "true", int: "3", float: "0.77", str: "realistic"}
+    text = "[1, 1, 1]" if isinstance(value, tuple) else other[type(value)]
+    changed = load_config(overrides=[f"{key}={text}"])
+    assert identity_digest(base.identity("c")) != identity_digest(changed.identity("c"))

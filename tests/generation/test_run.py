@@ -1,0 +1,180 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from scene_stubs import CATALOGUE, stub
+
+from internav_data.dataset import read_manifest
+from internav_data.generation.config import load_config
+from internav_data.generation.lock import LockedError, locked
+from internav_data.generation.run import generate
+from internav_data.records.errors import InternavError, QuarantineError, UsageError
+
+CONFIG = load_config(overrides=["episodes_per_scene=3"])
+
+
+def made(out, scenes, workers=2, config=CONFIG, **orders):
+    """Generate stub scenes; the journal lists every scene begun since the last call."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    (out.parent / "stub.json").write_text(json.dumps(orders))
+    (out.parent / "journal").write_text("")
+    return generate(out, config, scenes, workers, assets=CATALOGUE, setup=stub)
+
+
+def journal(out):
+    return sorted(int(line) for line in (out.parent / "journal").read_text().split())
+
+
+def contents(out):
+    files = sorted(path for path in out.rglob("*") if path.is_file())
+    return {path.relative_to(out).as_posix(): path.read_bytes() for path in files}
+
+
+def test_a_dataset_is_made(tmp_path):
+    report = made(tmp_path / "d", 5)
+    assert (report.scenes, report.new_scenes, report.exit_code) == (5, 5, 0)
+    assert report.episodes == report.new_episodes == 4 * 3 + 1, "scene 1 is test: a tenth"
+    assert not (tmp_path / "d" / ".work").exists()
+    assert read_manifest(tmp_path / "d").config["episodes_per_scene"] == 3
+
+
+def test_the_same_bytes_for_any_workers_and_after_deaths(tmp_path):
+    made(tmp_path / "1" / "d", 12, workers=1)
+    made(tmp_path / "3" / "d", 12, workers=3, kill_once=[4, 9])
+    assert contents(tmp_path / "1" / "d") == contents(tmp_path / "3" / "d")
+    assert journal(tmp_path / "3" / "d").count(4) == 2
+
+
+def test_scenes_that_cannot_be_made_are_named(tmp_path):
+    report = made(tmp_path / "d", 8, kill_always=[2], quarantine=[5])
+    reasons = dict(report.quarantined)
+    assert set(reasons) == {"scene-000002", "scene-000005"}
+    assert "SIGKILL" in reasons["scene-000002"]
+    assert reasons["scene-000005"] == "nothing can be blocked"
+    assert report.exit_code == 4
+    assert report.scenes == 8
+    assert report.episodes == 5 * 3 + 1
+    assert [q.scene for q in read_manifest(tmp_path / "d").quarantined] == [2, 5]
+
+
+def test_nothing_at_all_is_an_error(tmp_path):
+    with pytest.raises(QuarantineError, match="none of 3 scenes could be made: nothing can be"):
+        made(tmp_path / "few" / "d", 3, hopeless=True)
+    with pytest.raises(QuarantineError, match="none of 20 scenes"):
+        made(tmp_path / "many" / "d", 500, hopeless=True)
+    assert not (tmp_path / "few" / "d" / "manifest.json").exists()
+
+
+def killed(out, signum, scenes=60):
+    """Start a generator over slow scenes and end it when some are done."""
+    (out.parent / "stub.json").write_text(json.dumps({"seconds": 0.05}))
+    script = Path(__file__).with_name("run_stub.py")
+    process = subprocess.Popen([sys.executable, script, out, str(scenes), "2"])
+    deadline = time.monotonic() + 30
+    while len(list(out.rglob("scene-*.work"))) < 5 and time.monotonic() < deadline:
+        time.sleep(0.02)
+    process.send_signal(signum)
+    return process.wait(timeout=20)
+
+
+@pytest.mark.parametrize("signum", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+def test_what_is_done_stays_after_a_kill(tmp_path, signum):
+    out = tmp_path / "d"
+    code = killed(out, signum)
+    assert code == (-signal.SIGKILL if signum == signal.SIGKILL else 128 + signum)
+    time.sleep(0.3)  # workers whose parent was killed may still end their scene
+    finished = {int(path.stem[-6:]) for path in out.rglob("scene-*.work")}
+    assert 5 <= len(finished) < 60
+    assert not (out / "manifest.json").exists()
+    report = made(out, 60)
+    assert set(journal(out)) == set(range(60)) - finished
+    assert report.new_scenes == 60 - len(finished)
+    made(tmp_path / "whole" / "d", 60)
+    assert contents(out) == contents(tmp_path / "whole" / "d")
+
+
+def test_more_scenes_extend(tmp_path):
+    out = tmp_path / "d"
+    made(out, 5)
+    report = made(out, 11)
+    assert journal(out) == list(range(5, 11))
+    assert (report.scenes, report.new_scenes) == (11, 6)
+    made(tmp_path / "whole" / "d", 11)
+    assert contents(out) == contents(tmp_path / "whole" / "d")
+
+
+@pytest.mark.parametrize("scenes", [5, 3])
+def test_no_more_scenes_change_nothing(tmp_path, scenes):
+    out = tmp_path / "d"
+    made(out, 5)
+    before = contents(out)
+    report = made(out, scenes)
+    assert (report.scenes, report.new_scenes) == (5, 0)
+    assert contents(out) == before
+    assert not (out / ".work").exists()
+
+
+def test_fewer_scenes_never_throw_work_away(tmp_path):
+    out = tmp_path / "d"
+    killed(out, signal.SIGKILL)
+    with pytest.raises(UsageError, match=r"would be lost: ask for --scenes \d+ or more"):
+        made(out, 2)
+
+
+@pytest.mark.parametrize("finished", [True, False])
+def test_another_config_is_refused(tmp_path, finished):
+    out = tmp_path / "d"
+    if finished:
+        made(out, 3)
+    else:
+        killed(out, signal.SIGKILL)
+    before = contents(out)
+    other = load_config(overrides=["episodes_per_scene=3", "house.scale=1.5"])
+    with pytest.raises(UsageError, match=r"another config.*scale"):
+        made(out, 60, config=other)
+    assert contents(out) == before
+
+
+def test_a_folder_of_something_else_is_refused_and_left_alone(tmp_path):
+    (tmp_path / "d").mkdir()
+    (tmp_path / "d" / "thesis.tex").write_text("precious")
+    with pytest.raises(UsageError, match="no dataset"):
+        made(tmp_path / "d", 3)
+    assert contents(tmp_path / "d") == {"thesis.tex": b"precious"}
+    with pytest.raises(UsageError, match="is a file"):
+        made(tmp_path / "d" / "thesis.tex", 3)
+
+
+def test_two_generators_do_not_meet(tmp_path):
+    (tmp_path / "d").mkdir()
+    with locked(tmp_path / "d"), pytest.raises(LockedError, match="another internav-gen"):
+        made(tmp_path / "d", 3)
+    assert made(tmp_path / "d", 3).scenes == 3
+
+
+def test_a_full_disk_loses_nothing(tmp_path):
+    out = tmp_path / "d"
+    with pytest.raises(InternavError, match="No space left on device") as caught:
+        made(out, 12, workers=1, full=8)
+    assert caught.value.exit_code == 1
+    made(out, 12)
+    assert not set(journal(out)) & {0, 1, 2, 3}
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root writes everywhere")
+def test_a_read_only_folder(tmp_path):
+    (tmp_path / "d").mkdir(mode=0o555)
+    with pytest.raises(InternavError, match="cannot write to"):
+        made(tmp_path / "d", 3)
+
+
+@pytest.mark.parametrize(("scenes", "workers"), [(0, 1), (-1, 1), (10**7, 1), (1, -1)])
+def test_counts_that_cannot_be_meant(tmp_path, scenes, workers):
+    with pytest.raises(UsageError):
+        made(tmp_path / "d", scenes, workers=workers)
+    assert not (tmp_path / "d").exists()
