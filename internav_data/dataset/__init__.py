@@ -4,6 +4,12 @@ from internav_data.dataset.commit import Identity, assemble, done_scenes, identi
 from internav_data.dataset.decode import from_table
 from internav_data.dataset.digest import logical_digest
 from internav_data.dataset.encode import to_table
+from internav_data.dataset.jsonschemas import (
+    schema_folder,
+    schema_text,
+    schemas,
+    write_schemas,
+)
 from internav_data.dataset.loader import Dataset, load_dataset
 from internav_data.dataset.manifest import (
     DataFile,
@@ -15,6 +21,7 @@ from internav_data.dataset.manifest import (
     write_manifest,
 )
 from internav_data.dataset.parquet import FileInfo, read_table, write_parquet
+from internav_data.dataset.stats import compute_stats
 from internav_data.dataset.tables import (
     ASSETS,
     EPISODES,
@@ -47,6 +54,7 @@ __all__ = [
     "SceneState",
     "TableSpec",
     "assemble",
+    "compute_stats",
     "done_scenes",
     "finished_scenes",
     "from_table",
@@ -59,10 +67,14 @@ __all__ = [
     "read_manifest",
     "read_scene_work",
     "read_table",
+    "schema_folder",
+    "schema_text",
+    "schemas",
     "to_table",
     "work_dir",
     "write_manifest",
     "write_parquet",
     "write_quarantine",
     "write_scene_work",
+    "write_schemas",
 ]

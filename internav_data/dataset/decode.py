@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import pyarrow as pa
 
-from internav_data.dataset.nodes import Coordinates, Leaf, Node, Sequence
+from internav_data.dataset.nodes import Coordinates, Keyed, Leaf, Node, Sequence
 from internav_data.records.errors import ValidationError
 
 if TYPE_CHECKING:
@@ -170,6 +170,8 @@ def cursor(node: Node, array: pa.Array) -> Cursor:
         return _ListCursor(node.item, array)
     if isinstance(node, Coordinates):
         return _StructCursor(tuple, list(node.names), [node.leaf] * len(node.names), array)
+    if isinstance(node, Keyed):
+        raise TypeError("a mapping has no columns")
     fields = node.fields
     return _StructCursor(node.cls, [f.name for f in fields], [f.node for f in fields], array)
 

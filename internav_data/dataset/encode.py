@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 import pyarrow as pa
 
-from internav_data.dataset.nodes import Coordinates, Leaf, Node, Record, Sequence
+from internav_data.dataset.nodes import Coordinates, Keyed, Leaf, Node, Record, Sequence
 from internav_data.dataset.tables import TableSpec, arrow_type
 from internav_data.records.errors import ValidationError
 
@@ -65,6 +65,8 @@ def _encode(node: Node, values: list[Any], path: str, *, nullable: bool) -> pa.A
             for k, name in enumerate(node.names)
         ]
         return _struct(node, parts, mask)
+    if isinstance(node, Keyed):
+        raise TypeError(f"column {path}: a mapping has no columns")
     parts = [
         _encode(
             field.node,
@@ -135,5 +137,7 @@ def _zero(node: Node, nullable: bool) -> Any:  # noqa: ANN401 - a value of any c
         return (_ZEROS.get(node.leaf.kind, 0),) * len(node.names)
     if isinstance(node, Sequence):
         return ()
+    if isinstance(node, Keyed):
+        return {}
     values = {f.name: _zero(f.node, f.nullable) for f in node.fields}
     return node.cls(**values)

@@ -8,8 +8,8 @@ schemas, digests) walks this tree.
 
 from __future__ import annotations
 
+import collections.abc
 import dataclasses
-import functools
 import types
 import typing
 from dataclasses import dataclass
@@ -75,7 +75,14 @@ class Record:
     fields: tuple[Field, ...]
 
 
-Node: TypeAlias = Leaf | Coordinates | Sequence | Record
+@dataclass(frozen=True, slots=True)
+class Keyed:
+    """A mapping by name, of `item`s or (None) of anything: in JSON files, never in tables."""
+
+    item: Node | None
+
+
+Node: TypeAlias = Leaf | Coordinates | Sequence | Record | Keyed
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +95,9 @@ class Field:
     unit: str | None
 
 
-@functools.cache
+_known: dict[type[Any], Record] = {}
+
+
 def record_node(cls: type[Any]) -> Record:
     """Return the shape of a dataclass; fields left out of comparison are not stored.
 
@@ -98,10 +107,11 @@ def record_node(cls: type[Any]) -> Record:
         A type hint that has no place in a table.
 
     """
-    hints = typing.get_type_hints(cls)
-    return Record(
-        cls, tuple(_field(f.name, hints[f.name]) for f in dataclasses.fields(cls) if f.compare)
-    )
+    if cls not in _known:
+        hints = typing.get_type_hints(cls)
+        fields = (_field(f.name, hints[f.name]) for f in dataclasses.fields(cls) if f.compare)
+        _known[cls] = Record(cls, tuple(fields))
+    return _known[cls]
 
 
 def _field(name: str, hint: object) -> Field:
@@ -119,6 +129,9 @@ def _node(name: str, hint: object) -> Node:
         return record_node(hint)
     if typing.get_origin(hint) is tuple:
         return _tuple_node(name, typing.get_args(hint))
+    if typing.get_origin(hint) is collections.abc.Mapping:
+        value = typing.get_args(hint)[1]
+        return Keyed(None if value is Any else _node(name, value))
     return _leaf(name, hint)
 
 

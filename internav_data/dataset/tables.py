@@ -6,13 +6,12 @@
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import pyarrow as pa
 
-from internav_data.dataset.nodes import Coordinates, Field, Leaf, Node, Record, record_node
+from internav_data.dataset.nodes import Coordinates, Field, Keyed, Leaf, Node, Record, record_node
 from internav_data.records import Asset, Episode, House
 
 R = TypeVar("R")
@@ -44,19 +43,22 @@ class TableSpec(Generic[R]):
     @property
     def node(self) -> Record:
         """The shape of one row."""
-        return record_node(self.cls)  # type: ignore[arg-type] # classes are hashable
+        return record_node(self.cls)
 
     @property
     def schema(self) -> pa.Schema:
         """The Arrow schema of the table: every field that cannot be None is not nullable."""
-        return arrow_schema(self.cls)  # type: ignore[arg-type] # as above
+        return arrow_schema(self.cls)
 
 
-@functools.cache
+_known: dict[type[Any], pa.Schema] = {}
+
+
 def arrow_schema(cls: type[Any]) -> pa.Schema:
     """Return the Arrow schema of a dataclass."""
-    node = record_node(cls)  # type: ignore[arg-type] # classes are hashable
-    return pa.schema([arrow_field(field) for field in node.fields])
+    if cls not in _known:
+        _known[cls] = pa.schema([arrow_field(field) for field in record_node(cls).fields])
+    return _known[cls]
 
 
 def arrow_field(field: Field) -> pa.Field:
@@ -73,6 +75,8 @@ def arrow_type(node: Node) -> pa.DataType:
         return pa.struct([pa.field(name, leaf, nullable=False) for name in node.names])
     if isinstance(node, Record):
         return pa.struct([arrow_field(field) for field in node.fields])
+    if isinstance(node, Keyed):
+        raise TypeError("a mapping has no columns")
     return pa.list_(pa.field("element", arrow_type(node.item), nullable=False))
 
 

@@ -1,0 +1,147 @@
+"""The dataset card: README.md with the YAML front matter that Hugging Face reads."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+from internav_data.dataset.jsonschemas import descriptions
+from internav_data.dataset.nodes import Coordinates, Field, Keyed, Leaf, Node, Record
+from internav_data.dataset.tables import EPISODES, SCENES, TableSpec
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from internav_data.dataset.manifest import Manifest
+    from internav_data.dataset.stats import Stats
+
+_SIZES = (
+    *((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K")),
+    *((1_000_000, "100K<n<1M"), (10_000_000, "1M<n<10M")),
+)
+
+
+def card_text(manifest: Manifest, stats: Stats) -> str:
+    """Return README.md of a dataset."""
+    parts = (
+        _front_matter(manifest),
+        _summary(manifest, stats),
+        _table2(stats),
+        _use(),
+        "## Columns of an episode\n\n" + _columns(EPISODES),
+        "## Columns of a scene\n\n" + _columns(SCENES),
+        _origin(manifest),
+    )
+    return "\n".join(part.strip() + "\n" for part in parts)
+
+
+def _front_matter(manifest: Manifest) -> str:
+    episodes = sum(count.episodes for count in manifest.counts.values())
+    size = next((name for most, name in _SIZES if episodes < most), "n>10M")
+    lines = [
+        "---",
+        "pretty_name: Interactive navigation episodes",
+        f"size_categories: [{json.dumps(size)}]",
+        "task_categories: [robotics, reinforcement-learning]",
+        "tags: [embodied-ai, interactive-navigation, indoor-scenes, procedural-generation]",
+        "configs:",
+    ]
+    for table in ("episodes", "scenes"):
+        lines += [f"- config_name: {table}"] + ["  default: true"] * (table == "episodes")
+        lines.append("  data_files:")
+        for split in manifest.counts:
+            if manifest.of(table, split):
+                lines += [f"  - split: {split}", f"    path: data/{table}/{split}-*.parquet"]
+    lines += ["- config_name: assets", "  data_files: data/assets.parquet", "---"]
+    return "\n".join(lines)
+
+
+def _summary(manifest: Manifest, stats: Stats) -> str:
+    splits = ", ".join(
+        f"{count.episodes:,} {split} ({count.scenes:,} scenes)"
+        for split, count in manifest.counts.items()
+    )
+    share = f"{100 * stats.sealed_share_of_blocked:.1f} %"
+    return f"""
+# Interactive navigation episodes
+
+{stats.episodes:,} tasks in {stats.scenes:,} generated houses: {splits}. In each, an agent (a disc
+of 0.2 m radius) is to reach a goal while obstacles, settled by physics, block the way
+({stats.modes["blocked"]:,} episodes) or lengthen it ({stats.modes["lengthened"]:,}). Of the
+blocked ones {share} let nothing through off the 0.25 m lattice either (`sealed`).
+
+Metres, kilograms, seconds, degrees; right-handed, z up, yaw 0 along +x, counter-clockwise;
+quaternions are (x, y, z, w). `schemas/` holds a JSON Schema of each row, `stats.json` more figures,
+`manifest.json` every file with its sha256.
+"""
+
+
+def _table2(stats: Stats) -> str:
+    lines = [
+        "| rooms | share | obstacles | distance, m | rooms on the way |",
+        "|---|---|---|---|---|",
+    ]
+    lines += [
+        f"| {row.rooms} | {100 * row.ratio:.1f} % | {row.obstacle_num:.2f} | "
+        f"{row.distance_m:.2f} | {row.cross_room_num:.2f} |"
+        for row in stats.table2
+    ]
+    return "\n".join(lines)
+
+
+def _use() -> str:
+    return """
+## Use
+
+```python
+from internav_data import load_dataset
+
+ds = load_dataset("path/to/this/folder", split="train", filters=[("room_count", ">=", 4)])
+episode = ds[0]
+house = ds.scene(episode.scene_id)
+```
+
+It is plain Parquet: `datasets.load_dataset("path/to/this/folder", "episodes")`,
+`duckdb.sql("from 'data/episodes/*.parquet'")`, `polars.read_parquet("data/episodes/*.parquet")`.
+"""
+
+
+def _columns(spec: TableSpec[Any]) -> str:
+    notes = descriptions(spec.cls)
+    lines = ["| column | type | unit | what it is |", "|---|---|---|---|"]
+    for field in spec.node.fields:
+        note = " ".join(notes.get(field.name, "").split()).replace("|", "\\|")
+        lines.append(f"| `{field.name}` | {_type(field)} | {field.unit or ''} | {note} |")
+    return "\n".join(lines)
+
+
+def _type(field: Field) -> str:
+    return _node_type(field.node) + (", may be null" if field.nullable else "")
+
+
+def _node_type(node: Node) -> str:
+    if isinstance(node, Leaf):
+        return " or ".join(node.choices) or node.kind
+    if isinstance(node, Coordinates):
+        return "{" + ", ".join(node.names) + "}"
+    if isinstance(node, Record):
+        return "{" + ", ".join(field.name for field in node.fields) + "}"
+    if isinstance(node, Keyed):
+        return "mapping"
+    return f"list of {_node_type(node.item)}"
+
+
+def _origin(manifest: Manifest) -> str:
+    config = json.dumps(manifest.config, indent=1, sort_keys=True, ensure_ascii=False)
+    return f"""
+## Origin
+
+Generated by {manifest.generator} {manifest.generator_version} with seed {manifest.seed}, catalogue
+version {manifest.catalogue_version} (`{manifest.catalogue_digest[:16]}`), and this configuration;
+the same again gives the same data. {len(manifest.quarantined)} of {manifest.scenes:,} scenes could
+not be built within the stated bounds and are left out (`manifest.json` names them).
+
+```json
+{config}
+```
+"""
