@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from internav_data.geometry import round_m, yaw_quaternion
+from internav_data.houses.choice import clear_area_m2
 from internav_data.houses.fitting import (
     RADIUS_M,
     SPACING_M,
@@ -16,6 +17,7 @@ from internav_data.houses.fitting import (
     first_fit,
     turned,
 )
+from internav_data.houses.plan import clear_size_m
 from internav_data.houses.standards import DOOR_CLEAR_CM, HALF_WALL_CM
 
 if TYPE_CHECKING:
@@ -60,6 +62,9 @@ class RoomState:
     type: str
     inner: Floats
     area_m2: float
+    """Between the wall faces."""
+    short_m: float
+    """Shorter side of the largest rectangle in the room, between wall faces."""
     edges: tuple[Edge, ...]
     solids: Floats
     keeps: Floats
@@ -275,7 +280,8 @@ def room_state(
         room,
         name,
         inner,
-        plan.area_cm2(room) / 1e4,
+        clear_area_m2(plan, room),
+        clear_size_m(plan.main_rectangle(room))[0],
         _edges(plan.polygon(frozenset({room})), mine),
         np.zeros((CAPACITY, 6)),
         np.zeros((CAPACITY, 6)),

@@ -67,7 +67,7 @@ def _times(rule: Rule, picker: Picker, area_m2: float, density: float) -> int:
 
 def _furnish_room(state: RoomState, types: frozenset[str], picker: Picker, density: float) -> None:
     width, depth = float(state.inner[2] - state.inner[0]), float(state.inner[3] - state.inner[1])
-    place = Place(state.area_m2, min(width, depth), max(width, depth), types)
+    place = Place(state.area_m2, state.short_m, max(width, depth), types)
     found = True
     for rule in RULES[state.type]:
         times = _times(rule, picker, state.area_m2, density)

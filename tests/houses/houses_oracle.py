@@ -151,6 +151,40 @@ def check_things(house):
                 assert pa.intersection(pb).area < 1e-6, (house.things[a], house.things[b])
 
 
+def widest_rectangle(polygon, least_area):
+    """Largest short side of a rectangle of at least an area inside a rectilinear polygon."""
+    xs = sorted({x for x, _ in polygon.exterior.coords})
+    ys = sorted({y for _, y in polygon.exterior.coords})
+    grown = polygon.buffer(1e-6, join_style="mitre")
+    best = 0.0
+    for x0, x1 in itertools.combinations(xs, 2):
+        for y0, y1 in itertools.combinations(ys, 2):
+            if (x1 - x0) * (y1 - y0) >= least_area and grown.covers(box(x0, y0, x1, y1)):
+                best = max(best, min(x1 - x0, y1 - y0))
+    return best
+
+
+def check_realistic(house):
+    """The stated minima of real homes, between wall faces."""
+    habitable = {"bedroom", "dining", "kitchen", "living", "office", "studio"}
+    for room in house.rooms:
+        clear = clear_polygon(room)
+        assert clear.geom_type == "Polygon", room
+        assert 2.4 <= room.ceiling_m <= 3.2
+        if room.type in habitable:
+            assert clear.area >= 6.5, room
+            assert widest_rectangle(clear, 0.0) >= 2.13 - 1e-9, room
+        if room.type == "hall":
+            assert widest_rectangle(clear, 0.0) >= 0.91, room
+            assert not clear.buffer(-0.455).is_empty, room
+        beds = [t for t in house.things if t.room == room.room_id and t.type == "Bed"]
+        if room.type == "bedroom" and any(house.assets[t.asset_id].size[0] >= 1.3 for t in beds):
+            assert clear.area >= 11.5, room
+            assert widest_rectangle(clear, 0.0) >= 2.75 - 1e-9, room
+    for door in house.doors:
+        assert 0.77 <= door.width_m <= 0.96, door
+
+
 def blocked_area(house):
     """Union of everything in the disc's way."""
     solids = [
