@@ -3,6 +3,7 @@
 from internav_data.navigation.agent import CLEARANCE_M, RADIUS_M, SPACING_M, TOLERANCE_M
 from internav_data.navigation.lattice import Lattice
 from internav_data.navigation.rooms import PATHS_AT_MOST, node_paths, room_of, room_paths
+from internav_data.navigation.wayfinder import WayFinder
 
 __all__ = [
     "CLEARANCE_M",
@@ -11,6 +12,7 @@ __all__ = [
     "SPACING_M",
     "TOLERANCE_M",
     "Lattice",
+    "WayFinder",
     "node_paths",
     "room_of",
     "room_paths",

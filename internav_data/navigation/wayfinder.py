@@ -1,0 +1,170 @@
+"""Any-angle distances: the shortest way of the agent's disc, off the grid and exact."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from internav_data.geometry import Polygons, house_footprints
+from internav_data.navigation import arcs as arc_kernels
+from internav_data.navigation import links
+from internav_data.navigation.agent import CLEARANCE_M
+from internav_data.navigation.drawing import drawn
+from internav_data.navigation.scene import boxes_of, point_clear, scene_of
+from internav_data.navigation.search import Query, search
+from internav_data.navigation.tangents import tangents_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from internav_data.records import House, Vec2
+
+    Floats = NDArray[np.float64]
+
+REMEMBERED = 256
+"""So many clear ways are kept: episodes ask again and again about the same start and goal."""
+_ASIDE = np.array([7.548776662466927e-8, 5.698402909980532e-8])
+"""Clear ways are shifted by this before crossings are counted, so that no corner lies on them:
+stored positions are multiples of 0.1 mm, these are not, and 0.1 um crosses nothing by itself."""
+_NOTHING = Polygons.of([])
+
+
+class WayFinder:
+    """Shortest ways of the disc among convex polygons, with obstacles that come and go.
+
+    What belongs to the house alone (free arcs, tangents, clusters) is worked out once.
+
+    Parameters
+    ----------
+    polygons : Polygons
+        What always stands in the way.
+    """
+
+    def __init__(self, polygons: Polygons) -> None:
+        self._scene = scene_of(polygons, CLEARANCE_M)
+        self._arcs: Floats = arc_kernels.free_arcs(
+            *self._scene[:3], _NOTHING.vertices, _NOTHING.offsets, np.empty((0, 4)), CLEARANCE_M
+        )
+        self._tangents = tangents_of(self._scene, self._arcs, CLEARANCE_M)
+        self._labels = links.clusters(*self._scene[:3], 2.0 * CLEARANCE_M)
+        self._clear_ways: dict[tuple[float, float, float, float], tuple[float, Floats]] = {}
+
+    @staticmethod
+    def of(house: House) -> WayFinder:
+        """Prepare a house: its walls and furniture, no obstacles.
+
+        Walls must close its outline (entrances are closed): a way could lead outside otherwise.
+        """
+        return WayFinder(house_footprints(house))
+
+    @staticmethod
+    def of_polygons(polygons: Polygons) -> WayFinder:
+        """Prepare any convex polygons."""
+        return WayFinder(polygons)
+
+    def distance(self, p: Vec2, q: Vec2, obstacles: Polygons | None = None) -> float | None:
+        """Length of the shortest way between two points, metres; None where they are sealed off.
+
+        Parameters
+        ----------
+        p, q : (2,) float
+            Positions of the disc's middle, anywhere.
+        obstacles : Polygons, optional
+            Convex polygons that stand in the way besides the house.
+        """
+        length, _ = self._way(p, q, obstacles)
+        return None if math.isinf(length) else length
+
+    def path(self, p: Vec2, q: Vec2, obstacles: Polygons | None = None) -> Floats | None:
+        """Points (n, 2) along the shortest way, turns as chords of at most 10 degrees.
+
+        None where the two points are sealed off from each other.
+        """
+        length, points = self._way(p, q, obstacles)
+        return None if math.isinf(length) else points.copy()
+
+    def sealed(self, p: Vec2, q: Vec2, obstacles: Polygons | None = None) -> bool:
+        """Whether no way of the disc leads from p to q, on the lattice or off it: exact.
+
+        A point where the disc cannot stand is sealed off from everything.
+        """
+        obstacles = _NOTHING if obstacles is None else obstacles
+        boxes = boxes_of(obstacles.vertices, obstacles.offsets)
+        return self._sealed(p, q, obstacles, boxes)
+
+    def can_stand(self, p: Vec2, obstacles: Polygons | None = None) -> bool:
+        """Whether the disc can stand at a point."""
+        obstacles = _NOTHING if obstacles is None else obstacles
+        boxes = boxes_of(obstacles.vertices, obstacles.offsets)
+        return self._stands(p, obstacles, boxes)
+
+    def _stands(self, p: Vec2, obstacles: Polygons, boxes: Floats) -> bool:
+        x, y = float(p[0]), float(p[1])
+        return bool(
+            point_clear(*self._scene[:3], x, y, CLEARANCE_M)
+            and point_clear(obstacles.vertices, obstacles.offsets, boxes, x, y, CLEARANCE_M)
+        )
+
+    def _sealed(self, p: Vec2, q: Vec2, obstacles: Polygons, boxes: Floats) -> bool:
+        if not (self._stands(p, obstacles, boxes) and self._stands(q, obstacles, boxes)):
+            return True
+        length, points = self._clear_way(p, q)
+        if math.isinf(length) or not len(boxes):
+            return math.isinf(length)
+        return bool(
+            links.closes(
+                points + _ASIDE,
+                *self._scene[:3],
+                self._labels,
+                obstacles.vertices,
+                obstacles.offsets,
+                boxes,
+                2.0 * CLEARANCE_M,
+            )
+        )
+
+    def _way(self, p: Vec2, q: Vec2, obstacles: Polygons | None) -> tuple[float, Floats]:
+        obstacles = _NOTHING if obstacles is None else obstacles
+        boxes = boxes_of(obstacles.vertices, obstacles.offsets)
+        if self._sealed(p, q, obstacles, boxes):
+            return math.inf, np.empty((0, 2))
+        if not len(boxes):
+            return self._clear_way(p, q)
+        return self._search(p, q, obstacles, boxes)
+
+    def _clear_way(self, p: Vec2, q: Vec2) -> tuple[float, Floats]:
+        key = (float(p[0]), float(p[1]), float(q[0]), float(q[1]))
+        found = self._clear_ways.get(key)
+        if found is None:
+            found = self._search(p, q, _NOTHING, np.empty((0, 4)))
+            if len(self._clear_ways) >= REMEMBERED:
+                self._clear_ways.clear()
+            self._clear_ways[key] = found
+        return found
+
+    def _search(self, p: Vec2, q: Vec2, obstacles: Polygons, boxes: Floats) -> tuple[float, Floats]:
+        own = self._arcs
+        vertices, offsets = obstacles.vertices, obstacles.offsets
+        shadow_starts, shadows = arc_kernels.shadows_on(own, vertices, offsets, boxes, CLEARANCE_M)
+        arcs = own
+        if len(boxes):
+            new = arc_kernels.free_arcs(vertices, offsets, boxes, *self._scene[:3], CLEARANCE_M)
+            arcs = np.concatenate((own, new))
+        query = Query(
+            len(own),
+            arcs,
+            vertices,
+            offsets,
+            boxes,
+            shadow_starts,
+            shadows,
+            np.array(p, dtype=np.float64),
+            np.array(q, dtype=np.float64),
+            CLEARANCE_M,
+        )
+        length, rows, slots = search(self._scene, self._tangents, query)
+        if math.isinf(length):
+            return math.inf, np.empty((0, 2))
+        return float(length), drawn(rows, slots, arcs, CLEARANCE_M)
