@@ -47,16 +47,29 @@ def read_polygon(value: object, name: str) -> list[Corner]:
                 f"{LARGEST_CM // 100} m"
             )
         corners.append((round(entry[0] * 100), round(entry[1] * 100)))
-    if corners[0] == corners[-1]:
-        corners.pop()
+    corners = [c for k, c in enumerate(corners) if c != corners[k - 1]]
+    if len(corners) < 4:  # noqa: PLR2004 - a rectangle has four
+        raise Complaint(f"room '{name}': 'polygon' needs four or more different corners")
     for (ax, ay), (bx, by) in itertools.pairwise([*corners, corners[0]]):
         if (ax == bx) == (ay == by):
             raise Complaint(
                 f"room '{name}': the side from ({ax / 100}, {ay / 100}) to ({bx / 100}, "
                 f"{by / 100}) is not along x or y; walls are rectilinear"
             )
+    count = len(corners)
+    corners = [
+        c
+        for k, c in enumerate(corners)
+        if not _straight(corners[k - 1], c, corners[(k + 1) % count])
+    ]
     _simple(corners, name)
     return corners
+
+
+def _straight(a: Corner, b: Corner, c: Corner) -> bool:
+    """Whether a way goes straight on at b (and not back)."""
+    (ux, uy), (vx, vy) = (b[0] - a[0], b[1] - a[1]), (c[0] - b[0], c[1] - b[1])
+    return ux * vy == uy * vx and ux * vx + uy * vy > 0
 
 
 def _simple(corners: Sequence[Corner], name: str) -> None:
