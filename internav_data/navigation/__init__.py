@@ -2,7 +2,7 @@
 
 from internav_data.navigation.agent import CLEARANCE_M, RADIUS_M, SPACING_M, TOLERANCE_M
 from internav_data.navigation.lattice import Lattice
-from internav_data.navigation.rooms import PATHS_AT_MOST, node_paths, room_of, room_paths
+from internav_data.navigation.rooms import PATHS_AT_MOST, node_paths, room_of, room_paths, rooms_of
 from internav_data.navigation.wayfinder import WayFinder
 
 __all__ = [
@@ -16,4 +16,5 @@ __all__ = [
     "node_paths",
     "room_of",
     "room_paths",
+    "rooms_of",
 ]

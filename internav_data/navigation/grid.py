@@ -139,11 +139,17 @@ def close_outside(  # noqa: C901 - nodes, then edges
 
 @njit(cache=True)
 def _spread(
-    blockers: Counts, steps: Counts, queue: Counts, first: int, value: int, stride: int
-) -> int:
+    blockers: Counts,
+    steps: Counts,
+    queue: Counts,
+    first: int,
+    value: int,
+    stride: int,
+    until: int,
+) -> None:
     """Flood from one node over open edges; each node gets its source's value + stride.
 
-    Returns how many nodes were reached; they are the head of `queue`, nearest first.
+    Stops early once node `until` has its value; -1 floods all.
     """
     ny = blockers.shape[2]
     east = blockers[EAST].ravel()
@@ -154,6 +160,8 @@ def _spread(
     head, tail = 0, 1
     while head < tail:
         k = queue[head]
+        if k == until:
+            return
         head += 1
         following = flat[k] + stride
         # k - ny and k - 1 wrap round before the first node: see the module's docstring.
@@ -173,7 +181,6 @@ def _spread(
             flat[k - 1] = following
             queue[tail] = k - 1
             tail += 1
-    return tail
 
 
 @njit(cache=True)
@@ -182,8 +189,19 @@ def steps_to(blockers: Counts, i: int, j: int) -> Counts:
     nx, ny = blockers.shape[1], blockers.shape[2]
     steps = np.full((nx, ny), -1, dtype=np.int32)
     if blockers[NODE, i, j] == 0:
-        _spread(blockers, steps, np.empty(nx * ny, dtype=np.int32), i * ny + j, 0, 1)
+        _spread(blockers, steps, np.empty(nx * ny, dtype=np.int32), i * ny + j, 0, 1, -1)
     return steps
+
+
+@njit(cache=True)
+def steps_between(blockers: Counts, i: int, j: int, a: int, b: int) -> int:
+    """Count steps from node (i, j) to node (a, b); -1 where cut off."""
+    nx, ny = blockers.shape[1], blockers.shape[2]
+    steps = np.full((nx, ny), -1, dtype=np.int32)
+    if blockers[NODE, i, j] == 0 and blockers[NODE, a, b] == 0:
+        queue = np.empty(nx * ny, dtype=np.int32)
+        _spread(blockers, steps, queue, i * ny + j, 0, 1, a * ny + b)
+    return steps[a, b]
 
 
 @njit(cache=True)
@@ -195,7 +213,7 @@ def components(blockers: Counts) -> Counts:
     count = 0
     for k in range(nx * ny):
         if blockers[NODE, k // ny, k % ny] == 0 and labels[k // ny, k % ny] < 0:
-            _spread(blockers, labels, queue, k, count, 0)
+            _spread(blockers, labels, queue, k, count, 0, -1)
             count += 1
     return labels
 

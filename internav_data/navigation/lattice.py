@@ -112,6 +112,13 @@ class Lattice:
         steps: NDArray[np.int32] = grid.steps_to(self._blockers, i, j)
         return steps
 
+    def distance(self, start: tuple[int, int], goal: tuple[int, int]) -> int | None:
+        """Count steps between two nodes; None where there is no way."""
+        self._check(*start)
+        self._check(*goal)
+        steps = int(grid.steps_between(self._blockers, *start, *goal))
+        return None if steps < 0 else steps
+
     def components(self) -> NDArray[np.int32]:
         """Label every node's component, (nx, ny), in order of first nodes; -1 where blocked."""
         labels: NDArray[np.int32] = grid.components(self._blockers)
@@ -123,6 +130,7 @@ class Lattice:
         Among shortest paths, one that goes straight on as long as that is shortest.
         """
         self._check(*start)
+        self._check(*goal)
         steps = self.distances(*goal)
         if steps[start] < 0:
             return None

@@ -7,10 +7,14 @@ from itertools import islice, pairwise, product
 from math import prod
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from internav_data.records import OUTSIDE, NodePath
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
+
+    from numpy.typing import NDArray
 
     from internav_data.records import House, Vec2
 
@@ -42,6 +46,18 @@ def room_of(house: House, x: float, y: float) -> int:
         if _contains(room.polygon, x, y):
             return room.room_id
     return OUTSIDE
+
+
+def rooms_of(house: House, points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the same for many points (n, 2) at once, shape (n,) int64."""
+    x, y = points[:, 0], points[:, 1]
+    found = np.full(len(points), OUTSIDE, dtype=np.int64)
+    for room in reversed(house.rooms):
+        odd = np.zeros(len(points), dtype=np.bool_)
+        for a, b in zip((room.polygon[-1], *room.polygon[:-1]), room.polygon, strict=True):
+            odd ^= ((a[1] > y) != (b[1] > y)) & (b[0] > x)
+        found[odd] = room.room_id
+    return found
 
 
 def _neighbours(house: House) -> dict[int, list[int]]:
