@@ -11,7 +11,9 @@ import sys
 import time
 from collections import defaultdict
 from dataclasses import replace
+from pathlib import Path
 from statistics import mean, median
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +21,12 @@ from internav_data.catalog import catalogue
 from internav_data.geometry import footprint
 from internav_data.houses import HouseConfig, build_house
 from internav_data.navigation import room_of
+
+if TYPE_CHECKING:
+    from internav_data.records import House, Room
+
+Result = dict[str, dict[str, dict[str, float]]]
+"""Figures by name, by room type or count, and by kind of average."""
 
 MEASURED = {
     "paper": {
@@ -41,17 +49,17 @@ MEASURED = {
 BUDGET_MS = {2: 20, 4: 40, 8: 80}
 
 
-def size_class(rooms):
+def size_class(rooms: int) -> str:
     return "1-2" if rooms <= 2 else "3-5" if rooms <= 5 else "6-10"
 
 
-def shape_of(room):
+def shape_of(room: Room) -> float:
     xs, ys = [p[0] for p in room.polygon], [p[1] for p in room.polygon]
     w, h = max(xs) - min(xs), max(ys) - min(ys)
     return max(w, h) / min(w, h)
 
 
-def covered(house, room):
+def covered(house: House, room: Room) -> float:
     """Floor area under things (bounding boxes of footprints), m2."""
     total = 0.0
     for thing in house.things:
@@ -63,8 +71,8 @@ def covered(house, room):
     return total
 
 
-def room_steps(house, a, b):
-    """Number of rooms on the shortest room path."""
+def room_steps(house: House, a: int, b: int) -> int | None:
+    """Count the rooms on the shortest room path."""
     seen, ring, steps = {a}, {a}, 1
     while b not in seen:
         ring = {
@@ -80,7 +88,7 @@ def room_steps(house, a, b):
     return steps
 
 
-def ways(house, rng, draws=12):
+def ways(house: House, rng: np.random.Generator, draws: int = 12) -> list[tuple[float, int]]:
     """Random lattice ways between rooms (inside one for one-room houses): metres, rooms."""
     lattice = house.lattice()
     components = lattice.components()
@@ -96,10 +104,10 @@ def ways(house, rng, draws=12):
                 if steps * 0.25 >= 2.0:
                     out.append((steps * 0.25, room_steps(house, rooms[a], rooms[b])))
                     break
-    return out, len(nodes)
+    return out
 
 
-def survey(config, scenes, seed):
+def survey(config: HouseConfig, scenes: int, seed: int) -> Result:
     assets = catalogue()
     build_house(seed, 0, config, assets)
     table = defaultdict(lambda: defaultdict(list))
@@ -131,7 +139,7 @@ def survey(config, scenes, seed):
             table["things on the floor by type"][room.type].append(standing)
             table["doors a room by type"][room.type].append(degree)
             table["L-shaped share by type"][room.type].append(len(room.polygon) > 4)
-        for metres, passed in ways(house, rng)[0]:
+        for metres, passed in ways(house, rng):
             table["lattice distance by class (m)"][size_class(rooms)].append(metres)
             table["rooms on the way by class"][size_class(rooms)].append(passed)
     return {
@@ -149,7 +157,7 @@ def survey(config, scenes, seed):
     }
 
 
-def show(preset, result):
+def show(preset: str, result: Result) -> None:
     print(f"\n=== {preset} ===")
     for name, rows in result.items():
         print(f"\n{name}")
@@ -161,7 +169,7 @@ def show(preset, result):
         print(f"  {name}: {value}")
 
 
-def levers(pairs):
+def levers(pairs: list[str]) -> dict[str, Any]:
     out = {}
     for text in pairs:
         name, _, value = text.partition("=")
@@ -170,7 +178,7 @@ def levers(pairs):
     return out
 
 
-def main():
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scenes", type=int, default=300)
     parser.add_argument("--seed", type=int, default=0)
@@ -185,8 +193,8 @@ def main():
         show(preset, results[preset])
     print(f"\nbudget, ms per house by rooms: {BUDGET_MS}")
     if arguments.out:
-        with open(arguments.out, "w", encoding="utf-8") as file:
-            json.dump({"measured": MEASURED, "houses": results}, file, indent=1)
+        text = json.dumps({"measured": MEASURED, "houses": results}, indent=1)
+        Path(arguments.out).write_text(text, encoding="utf-8")
     return 0
 
 

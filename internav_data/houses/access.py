@@ -39,10 +39,10 @@ _COST: Mapping[tuple[str, str], float] = {
     ("bedroom", "kitchen"): 4.5,
     ("bedroom", "living"): 3.0,
     ("bedroom", "studio"): 3.0,
-    ("dining", "hall"): 1.0,
+    ("dining", "hall"): 1.6,
     ("dining", "kitchen"): 0.5,
     ("dining", "living"): 0.6,
-    ("hall", "kitchen"): 1.0,
+    ("hall", "kitchen"): 1.5,
     ("hall", "living"): 0.5,
     ("hall", "office"): 2.0,
     ("hall", "storage"): 2.0,
@@ -139,7 +139,7 @@ def _ensuite(
 ) -> tuple[int, int] | None:
     """Of several bathrooms, one may belong to a bedroom: (bathroom, bedroom)."""
     bathrooms = [k for k, name in enumerate(types) if name == "bathroom"]
-    if len(bathrooms) < 2 or float(rng.random()) < 0.3:  # noqa: PLR2004 - one bath is for all
+    if len(bathrooms) < 2 or float(rng.random()) < 0.15:  # noqa: PLR2004 - one bath is for all
         return None
     found = [
         (a, b) if types[a] == "bathroom" else (b, a)

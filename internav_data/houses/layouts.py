@@ -166,7 +166,7 @@ def spine(specs: Sequence[RoomSpec], rng: Generator) -> Layout:
     hall = next(k for k, spec in enumerate(specs) if spec.type == "hall")
     rest = [k for k in range(len(specs)) if k != hall]
     end: list[int] = []
-    if len(rest) > 3 and float(rng.random()) < 0.7:  # noqa: PLR2004 - four rooms have an end to spare
+    if len(rest) > 3 and float(rng.random()) < 0.85:  # noqa: PLR2004 - four rooms have an end to spare
         reach = 1 + int(float(rng.random()) * 3)
         end = [k for name in _LIVING for k in rest if specs[k].type == name][:reach]
         if len(rest) - len(end) < 2:  # noqa: PLR2004 - a hall serves two rooms at least
