@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from internav_data.records import Asset, House, Pose, Vec2
+    from internav_data.records import Asset, House, Pose, Vec2, Wall
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
@@ -205,11 +205,11 @@ def footprint(asset: Asset, pose: Pose) -> Polygons:
     return Polygons(vertices, offsets)
 
 
-def wall_footprints(house: House) -> Polygons:
+def wall_footprints(walls: Iterable[Wall]) -> Polygons:
     """Rectangles of the walls that stand in the agent's way (lintels hang above it)."""
     return Polygons.of(
         [(w.x_min, w.y_min), (w.x_max, w.y_min), (w.x_max, w.y_max), (w.x_min, w.y_max)]
-        for w in house.walls
+        for w in walls
         if w.z_min < HIGHEST_M and w.z_max > LOWEST_M
     )
 
@@ -217,7 +217,7 @@ def wall_footprints(house: House) -> Polygons:
 def house_footprints(house: House) -> Polygons:
     """Walls, then every thing in order: all that stands in the agent's way without obstacles."""
     things = (footprint(house.assets[t.asset_id], t.pose) for t in house.things)
-    return Polygons.joined([wall_footprints(house), *things])
+    return Polygons.joined([wall_footprints(house.walls), *things])
 
 
 @njit(cache=True)

@@ -9,7 +9,6 @@ each asset is one OBJ file of convex groups (any number of parts), written once 
 from __future__ import annotations
 
 import atexit
-import ctypes
 import math
 import os
 import sys
@@ -33,18 +32,16 @@ if TYPE_CHECKING:
 
 
 def _import_quietly() -> ModuleType:
-    """Import pybullet without the line it prints on stdout, which belongs to users' data."""
-    sys.stdout.flush()
-    kept = os.dup(1)
+    """Import pybullet without the line about its build time that it prints on stderr."""
+    sys.stderr.flush()
+    kept = os.dup(2)
     with Path(os.devnull).open("wb") as nowhere:
-        os.dup2(nowhere.fileno(), 1)
+        os.dup2(nowhere.fileno(), 2)
         try:
-            module = import_module("pybullet")
-            ctypes.CDLL(None).fflush(None)  # the line waits in C's own buffer
+            return import_module("pybullet")
         finally:
-            os.dup2(kept, 1)
+            os.dup2(kept, 2)
             os.close(kept)
-    return module
 
 
 pybullet: Any = _import_quietly()

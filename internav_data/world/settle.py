@@ -12,7 +12,7 @@ from internav_data.records import Pose
 from internav_data.world.setting import UPRIGHT, Body, Setting
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from internav_data.records import Asset
     from internav_data.world.setting import Engine, Rest
@@ -41,7 +41,7 @@ def settle(
     asset: Asset,
     pose: Pose,
     clearance_m: float,
-    neighbours: Sequence[Body],
+    neighbours: Callable[[], Sequence[Body]],
 ) -> Settled:
     """Let a thing fall 1 cm onto the floor at an upright pose.
 
@@ -56,14 +56,14 @@ def settle(
     clearance_m
         Distance in the plane from its footprint to everything else, metres.
     neighbours
-        What can be touched, things and walls; looked at only when the free fall reaches farther
-        than the clearance.
+        Gathers what can be touched, things and walls; called only when the free fall reaches
+        farther than the clearance.
 
     """
-    engine = _engine()
+    engine = engine_of_this_process()
     rest = _settle_alone(asset, engine)
     if rest.reach_m + MARGIN_M > clearance_m:
-        rest = engine.settle(_setting(asset, pose, neighbours))
+        rest = engine.settle(_setting(asset, pose, neighbours()))
     return _judged(pose, rest)
 
 
@@ -118,7 +118,8 @@ def _judged(pose: Pose, rest: Rest) -> Settled:
     return Settled(settled, round(rest.seconds, 6), round(rest.penetration_m, 6), refusal)
 
 
-def _engine() -> Engine:
+def engine_of_this_process() -> Engine:
+    """Return the physics engine, connected at first use."""
     from internav_data.world.bullet import bullet  # noqa: PLC0415 - pybullet is imported when used
 
     return bullet()

@@ -1,0 +1,214 @@
+"""House to episodes: start and goal, obstacles, and every predicate judged on stored values."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from internav_data.episodes.config import EpisodeConfig
+from internav_data.episodes.site import Site
+from internav_data.episodes.spawn import Way, spawn, steps_between
+from internav_data.geometry import Polygons, round_m
+from internav_data.navigation import SPACING_M, node_paths
+from internav_data.records import (
+    Episode,
+    Goal,
+    Mode,
+    Obstacle,
+    Physics,
+    Purpose,
+    Start,
+    generator,
+)
+from internav_data.records.errors import QuarantineError
+from internav_data.world import engine_of_this_process
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.random import Generator
+
+    from internav_data.episodes.spawn import Spawned
+    from internav_data.records import Asset, House
+
+PAIRS = 64
+"""Pairs of nodes drawn for one start and goal; most are far enough apart and in two rooms."""
+QUARTER_TURNS = (0, 90, 180, 270)
+
+
+def build_episodes(
+    house: House,
+    count: int,
+    pool: Sequence[Asset],
+    config: EpisodeConfig | None = None,
+    *,
+    first: int = 0,
+    attempt: int = 0,
+) -> tuple[Episode, ...]:
+    """Make the episodes first … first + count - 1 of a house.
+
+    Each is a pure function of the house, its index and the attempt: none depends on the others.
+
+    Parameters
+    ----------
+    house
+        A furnished house.
+    count, first
+        How many episodes, and the index of the first.
+    pool
+        Assets to draw obstacles from, in a fixed order.
+    config
+        Settings; the calibrated defaults where None.
+    attempt
+        Sub-seed: 0 unless an earlier attempt at the scene failed.
+
+    Raises
+    ------
+    QuarantineError
+        An episode cannot be made within the stated bounds.
+
+    """
+    config = config or EpisodeConfig()
+    site = Site.of(house)
+    return tuple(
+        _build_episode(site, index, pool, config, attempt) for index in range(first, first + count)
+    )
+
+
+def mode_of(scene: int, index: int) -> Mode:
+    """Blocked and lengthened by turns, so that any part of the data holds both evenly."""
+    return "blocked" if (scene + index) % 2 == 0 else "lengthened"
+
+
+def _build_episode(
+    site: Site, index: int, pool: Sequence[Asset], config: EpisodeConfig, attempt: int
+) -> Episode:
+    house = site.house
+    for draw in range(config.redraws):
+        place = generator(house.seed, Purpose.EPISODE, house.scene, attempt, index, draw)
+        way = _draw_way(site, mode_of(house.scene, index), config, place)
+        if way is None:
+            continue
+        rng = generator(house.seed, Purpose.SPAWN, house.scene, attempt, index, draw)
+        if spawn(way, pool, rng):
+            yaw_deg = QUARTER_TURNS[int(place.integers(4))]
+            return _recorded(way, index, yaw_deg)
+    raise QuarantineError(
+        f"{house.scene_id}, episode {index}: no start and goal could be "
+        f"{mode_of(house.scene, index)} in {config.redraws} draws; "
+        "raise episodes.max_obstacles or episodes.redraws, or furnish less"
+    )
+
+
+def _draw_way(site: Site, mode: Mode, config: EpisodeConfig, rng: Generator) -> Way | None:
+    """Draw a start and a goal, in two rooms where there are two; None if all are too close."""
+    one_room = len(site.house.rooms) == 1
+    pairs = rng.integers(max(1, len(site.nodes)), size=(PAIRS, 2)) if len(site.nodes) else []
+    for first, second in pairs:
+        if (site.rooms[first] == site.rooms[second]) != one_room:
+            continue
+        clear_m = site.ways.distance(_point(_node(site, first)), _point(_node(site, second)))
+        if clear_m is not None and round_m(clear_m) >= config.least_clear_m:
+            return _begin(site, mode, config, int(first), int(second), round_m(clear_m))
+    return None
+
+
+def _begin(
+    site: Site, mode: Mode, config: EpisodeConfig, first: int, second: int, clear_m: float
+) -> Way | None:
+    """Gather what is known about a start and a goal before anything is spawned."""
+    start, goal = _node(site, first), _node(site, second)
+    here, there = _point(start), _point(goal)
+    clear_steps = steps_between(site.lattice, start, goal)
+    if clear_steps is None:
+        return None
+    rooms, cut = site.room_paths(int(site.rooms[first]), int(site.rooms[second]))
+    nodes, nodes_cut = node_paths(site.house, here, there, rooms)
+    return Way(
+        site=site,
+        config=config,
+        mode=mode,
+        start=start,
+        goal=goal,
+        start_room=int(site.rooms[first]),
+        goal_room=int(site.rooms[second]),
+        room_paths=rooms,
+        room_paths_cut=cut,
+        node_paths=nodes,
+        node_paths_cut=nodes_cut,
+        lattice=site.lattice.copy(),
+        clear_m=clear_m,
+        clear_steps=clear_steps,
+        steps=clear_steps,
+    )
+
+
+def _node(site: Site, index: int) -> tuple[int, int]:
+    i, j = site.nodes[index]
+    return int(i), int(j)
+
+
+def _point(node: tuple[int, int]) -> tuple[float, float]:
+    return SPACING_M * node[0], SPACING_M * node[1]
+
+
+def _recorded(way: Way, index: int, yaw_deg: int) -> Episode:
+    """Write down a finished way; its predicates are judged on the rounded poses."""
+    house = way.site.house
+    here, there = _point(way.start), _point(way.goal)
+    obstacles = Polygons.joined(o.footprint for o in way.obstacles)
+    way_m = way.site.ways.distance(here, there, obstacles)
+    return Episode(
+        episode_id=f"{house.scene_id}/{index:04d}",
+        scene_id=house.scene_id,
+        split=house.split,
+        index=index,
+        seed=house.seed,
+        room_count=len(house.rooms),
+        mode=way.mode,
+        sealed=way_m is None,
+        rooms_on_way=len(way.room_paths[0]),
+        obstacle_count=len(way.obstacles),
+        clear_m=way.clear_m,
+        clear_steps=way.clear_steps,
+        way_m=None if way_m is None else round_m(way_m),
+        steps=way.steps,
+        start=Start(*way.start, *here, yaw_deg, way.start_room),
+        goal=Goal(*way.goal, *there, way.goal_room),
+        room_paths=way.room_paths,
+        room_paths_cut=way.room_paths_cut,
+        node_paths=way.node_paths,
+        node_paths_cut=way.node_paths_cut,
+        obstacles=tuple(_obstacle(o) for o in way.obstacles),
+        expert=None,
+        physics=_physics(way),
+    )
+
+
+def _obstacle(spawned: Spawned) -> Obstacle:
+    asset, pose = spawned.asset, spawned.settled.pose
+    return Obstacle(
+        asset_id=asset.asset_id,
+        type=asset.type,
+        x=pose.x,
+        y=pose.y,
+        z=pose.z,
+        quaternion=pose.quaternion,
+        mass_kg=asset.mass_kg,
+        friction=asset.friction,
+        pushable=asset.pushable,
+        pickable=asset.pickable,
+        segment=spawned.segment,
+        settle_s=spawned.settled.seconds,
+        settle_penetration_m=spawned.settled.penetration_m,
+        outcomes=None,
+    )
+
+
+def _physics(way: Way) -> Physics:
+    engine = engine_of_this_process()
+    return Physics(
+        engine=engine.name,
+        build=engine.build,
+        settle_s=max(o.settled.seconds for o in way.obstacles),
+        penetration_m=max(o.settled.penetration_m for o in way.obstacles),
+    )

@@ -1,0 +1,68 @@
+"""A house as episodes see it: what all its episodes share, worked out once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from internav_data.geometry import Polygons, house_footprints
+from internav_data.navigation import Lattice, WayFinder, room_of, room_paths
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from internav_data.records import House, Vec2
+
+
+@dataclass(slots=True)
+class Site:
+    """A furnished house with its lattice, its ways and the nodes where agents can be put."""
+
+    house: House
+    footprints: Polygons
+    """All that stands in the house, walls first."""
+    lattice: Lattice
+    """Of the house without obstacles. Never changed: copy it."""
+    ways: WayFinder
+    nodes: NDArray[np.int64]
+    """Free nodes of the largest component, shape (n, 2), in order of i, then j."""
+    rooms: NDArray[np.int64]
+    """Room of each node, shape (n,)."""
+    _ways_between: dict[tuple[Vec2, Vec2], tuple[Vec2, ...]] = field(default_factory=dict)
+    _room_paths: dict[tuple[int, int], tuple[tuple[tuple[int, ...], ...], bool]] = field(
+        default_factory=dict
+    )
+
+    @staticmethod
+    def of(house: House) -> Site:
+        """Work out what the episodes of a house share."""
+        lattice = Lattice.of(house)
+        components = lattice.components()
+        sizes = np.bincount(components[components >= 0].ravel(), minlength=1)
+        nodes = np.argwhere(components == int(np.argmax(sizes)))
+        rooms = [room_of(house, 0.25 * int(i), 0.25 * int(j)) for i, j in nodes]
+        return Site(
+            house=house,
+            footprints=house_footprints(house),
+            lattice=lattice,
+            ways=WayFinder.of(house),
+            nodes=nodes.astype(np.int64),
+            rooms=np.array(rooms, dtype=np.int64),
+        )
+
+    def way_between(self, first: Vec2, second: Vec2) -> tuple[Vec2, ...]:
+        """Points of the any-angle way in the house without obstacles; () when there is none."""
+        key = (first, second)
+        if key not in self._ways_between:
+            way = self.ways.path(first, second)
+            self._ways_between[key] = () if way is None else tuple((x, y) for x, y in way.tolist())
+        return self._ways_between[key]
+
+    def room_paths(self, first: int, second: int) -> tuple[tuple[tuple[int, ...], ...], bool]:
+        """All room paths between two rooms, and whether there were more than are listed."""
+        key = (first, second)
+        if key not in self._room_paths:
+            self._room_paths[key] = room_paths(self.house, first, second)
+        return self._room_paths[key]

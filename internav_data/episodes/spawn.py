@@ -1,0 +1,196 @@
+"""Spawning: obstacles on the way until it is blocked or longer (paper, section 5.1)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import lru_cache
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from internav_data.geometry import (
+    Polygons,
+    clearance,
+    footprint,
+    round_m,
+    wall_footprints,
+    yaw_quaternion,
+)
+from internav_data.navigation import room_of
+from internav_data.records import Pose
+from internav_data.world import Body, settle, wall_body
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.random import Generator
+
+    from internav_data.episodes.config import EpisodeConfig
+    from internav_data.episodes.site import Site
+    from internav_data.navigation import Lattice
+    from internav_data.records import Asset, Mode, NodePath, Vec2
+    from internav_data.world import Settled
+
+YAW_STEP_DEG = 15
+NEAR_M = 0.5
+"""What is farther away than this cannot be touched while a thing settles."""
+
+
+@dataclass(frozen=True, slots=True)
+class Spawned:
+    """An obstacle at rest: its footprint is the one that a reader of the file will derive."""
+
+    asset: Asset
+    settled: Settled
+    segment: int
+    footprint: Polygons
+
+
+@dataclass(slots=True)
+class Way:
+    """One attempt: a start, a goal, and the obstacles so far."""
+
+    site: Site
+    config: EpisodeConfig
+    mode: Mode
+    start: tuple[int, int]
+    goal: tuple[int, int]
+    start_room: int
+    goal_room: int
+    room_paths: tuple[tuple[int, ...], ...]
+    room_paths_cut: bool
+    node_paths: tuple[NodePath, ...]
+    node_paths_cut: bool
+    lattice: Lattice
+    """With the obstacles so far."""
+    clear_m: float
+    clear_steps: int
+    steps: int | None
+    obstacles: list[Spawned] = field(default_factory=list)
+
+    @property
+    def done(self) -> bool:
+        """Whether the mode's condition holds."""
+        if self.mode == "blocked":
+            return self.steps is None
+        return self.steps is not None and self.steps > self.clear_steps
+
+
+@lru_cache(maxsize=16384)
+def _standing(asset: Asset, yaw_deg: int) -> Polygons:
+    """Footprint of an upright asset at the origin: screens spots before the exact test."""
+    return footprint(asset, Pose(0.0, 0.0, 0.0, yaw_quaternion(yaw_deg)))
+
+
+def spawn(way: Way, pool: Sequence[Asset], rng: Generator) -> bool:
+    """Put obstacles on a way until its mode's condition holds.
+
+    Returns
+    -------
+    bool
+        False when the spots or the obstacles ran out: draw a new start and goal.
+
+    """
+    most = way.config.most_obstacles(len(way.site.house.rooms))
+    for _ in range(way.config.spots):
+        if way.done:
+            return True
+        if len(way.obstacles) == most:
+            return False
+        _try_spot(way, pool, rng)
+    return way.done
+
+
+def _try_spot(way: Way, pool: Sequence[Asset], rng: Generator) -> None:
+    """Draw an asset and a spot, and keep it where nothing speaks against it.
+
+    Each spot takes the same number of draws, whatever becomes of it.
+    """
+    asset = pool[int(rng.integers(len(pool)))]
+    path = way.node_paths[int(rng.integers(len(way.node_paths)))]
+    segment = int(rng.integers(len(path.points) - 1))
+    along, sideways = float(rng.random()), float(rng.standard_normal()) * way.config.sideways_m
+    yaw_deg = YAW_STEP_DEG * int(rng.integers(360 // YAW_STEP_DEG))
+    spot = _spot(way.site, path.points[segment], path.points[segment + 1], along, sideways)
+    if spot is None:
+        return
+    pose = Pose(round_m(spot[0]), round_m(spot[1]), 0.0, yaw_quaternion(yaw_deg))
+    gap = way.config.gap_m
+    standing = _standing(asset, yaw_deg)
+    shifted = Polygons(standing.vertices + np.array([pose.x, pose.y]), standing.offsets)
+    if _distance(way, shifted, gap) < gap:
+        return
+    settled = settle(asset, pose, gap, lambda: _near(way, shifted))
+    if settled.refusal:
+        return
+    exact = footprint(asset, settled.pose)
+    if _distance(way, exact, gap) <= 0.0:
+        return
+    _place(way, Spawned(asset, settled, segment, exact))
+
+
+def _spot(
+    site: Site, first: Vec2, second: Vec2, along: float, sideways: float
+) -> tuple[float, float] | None:
+    """Point at a share of the way's length, moved sideways within its room."""
+    points = site.way_between(first, second)
+    left = along * sum(math.dist(a, b) for a, b in pairwise(points))
+    for a, b in pairwise(points):
+        leg = math.dist(a, b)
+        if left <= leg and leg > 0.0:
+            ux, uy = (b[0] - a[0]) / leg, (b[1] - a[1]) / leg
+            x, y = a[0] + left * ux, a[1] + left * uy
+            spot = (x - sideways * uy, y + sideways * ux)
+            return spot if room_of(site.house, *spot) == room_of(site.house, x, y) else None
+        left -= leg
+    return None
+
+
+def _distance(way: Way, polygons: Polygons, stop_at: float) -> float:
+    """Distance to the house and to the other obstacles, at most `stop_at`."""
+    near = clearance(polygons, way.site.footprints, stop_at)
+    for other in way.obstacles:
+        near = min(near, clearance(polygons, other.footprint, stop_at))
+    return near
+
+
+def _place(way: Way, spawned: Spawned) -> None:
+    """Keep an obstacle unless it stands over start or goal or cuts a way to be lengthened."""
+    handle = way.lattice.add(spawned.footprint)
+    free = way.lattice.free
+    steps = steps_between(way.lattice, way.start, way.goal)
+    cuts = steps is None and way.mode == "lengthened"
+    if not free[way.start] or not free[way.goal] or cuts:
+        way.lattice.remove(handle)
+        return
+    way.obstacles.append(spawned)
+    way.steps = steps
+
+
+def steps_between(lattice: Lattice, start: tuple[int, int], goal: tuple[int, int]) -> int | None:
+    """Lattice distance between two nodes; None when cut off."""
+    steps = int(lattice.distances(*goal)[start])
+    return None if steps < 0 else steps
+
+
+def _near(way: Way, here: Polygons) -> list[Body]:
+    """Things, obstacles and walls near a spot, as fixed bodies."""
+    house = way.site.house
+    bodies = [
+        Body(house.assets[thing.asset_id], thing.pose, moves=False)
+        for thing in house.things
+        if _is_near(here, footprint(house.assets[thing.asset_id], thing.pose))
+    ]
+    bodies += [
+        Body(other.asset, other.settled.pose, moves=False)
+        for other in way.obstacles
+        if _is_near(here, other.footprint)
+    ]
+    bodies += [wall_body(wall) for wall in house.walls if _is_near(here, wall_footprints([wall]))]
+    return bodies
+
+
+def _is_near(here: Polygons, there: Polygons) -> bool:
+    return clearance(here, there, NEAR_M) < NEAR_M
