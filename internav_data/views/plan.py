@@ -35,6 +35,7 @@ _ENTRANCE: RGB = (176, 62, 48)
 _LABEL: RGB = (70, 66, 62)
 _MARGIN_M = 0.75
 _WALL_M = 0.12
+_RUG_M = 0.05
 _OVERHEAD_M = 1.95
 """What hangs wholly above this is left out: it would hide what stands below."""
 
@@ -98,7 +99,7 @@ def paint_house(canvas: Canvas, house: House, on_way: Collection[int] | None = N
     ]
     solid = [_rectangle(w) for w in house.walls if w.z_min < HIGHEST_M and w.z_max > HIGHEST_M]
     _shadow(canvas, solid, 0.09, 0.34)
-    _shadow(canvas, [o.plan for o in seen if o.top_m > 0.05], 0.05, 0.30)
+    _shadow(canvas, [o.plan for o in seen if o.top_m > _RUG_M], 0.05, 0.30)
     paint(canvas, seen, line_px=1.0, colour=None)
     for wall in house.walls:
         if wall.z_min < HIGHEST_M and wall.z_max <= HIGHEST_M:
@@ -202,13 +203,15 @@ def paint_labels(canvas: Canvas, house: House, taken: Sequence[Floats]) -> None:
     taken
         Further shapes (n, 2) to stay clear of.
     """
-    busy = [
-        o.plan
+    seen = [
+        o
         for thing in house.things
         for o in outlines(house.assets[thing.asset_id], thing.pose)
-        if o.top_m > 0.05
+        if o.low_m < _OVERHEAD_M
     ]
-    blocked = canvas.mask([*busy, *taken])
+    blocked = canvas.mask([*(o.plan for o in seen if o.top_m > _RUG_M), *taken])
+    rugs = canvas.mask([o.plan for o in seen if o.top_m <= _RUG_M])
+    blocked = np.maximum(blocked, rugs // 2)
     for room in house.rooms:
         _label_room(canvas, room, blocked)
 
@@ -217,10 +220,11 @@ def _label_room(canvas: Canvas, room: Room, blocked: Image) -> None:
     name, area = room.type.replace("_", " "), f"{room.area_m2:.1f} m2"
     xs, ys = [p[0] for p in room.polygon], [p[1] for p in room.polygon]
     window = canvas.window((min(xs), min(ys)), (max(xs), max(ys)))
-    free = (canvas.mask([room.polygon])[window] > 127) & (blocked[window] == 0)
+    inside = canvas.mask([room.polygon])[window] > 127
+    free = np.where(inside, 1.0 - blocked[window].astype(np.float32) / 255.0, 0.0)
     x, y = canvas.metres(window)
     height = 9.5
-    while height > 6.0 and canvas.text_width(name, height) > 0.8 * (max(xs) - min(xs)):
+    while height > 5.5 and canvas.text_width(name, height) > 0.8 * (max(xs) - min(xs)):
         height -= 0.5
     size = (
         max(canvas.text_width(name, height), canvas.text_width(area, height * 0.8)),

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 PUSHABLE: RGB = (255, 211, 38)
 PICKABLE: RGB = (255, 238, 130)
 FIXED: RGB = (228, 150, 20)
+_RIM: RGB = (48, 36, 8)
 START: RGB = (40, 148, 84)
 GOAL: RGB = (36, 104, 214)
 _PATH: RGB = (150, 70, 150)
@@ -148,16 +149,19 @@ def _outlines(obstacle: Obstacle, assets: Mapping[str, Asset]) -> list[Outline]:
 
 def _paint_obstacle(canvas: Canvas, obstacle: Obstacle, parts: list[Outline]) -> None:
     colour = _colour(obstacle)
+    low, high = _extent(parts)
+    if float((high - low).max()) < _SMALL_M:
+        middle = (float(low[0] + high[0]) / 2.0, float(low[1] + high[1]) / 2.0)
+        canvas.disc(middle, 0.16, _RIM, 3.0)
+        canvas.disc(middle, 0.16, colour, 1.4)
+        for part in parts:
+            canvas.fill(part.plan, colour)
+        return
     for part in parts:  # a dark rim around the whole thing
-        canvas.line(part.plan, (48, 36, 8), 3.4, closed=True)
+        canvas.line(part.plan, _RIM, 3.4, closed=True)
     paint(canvas, parts, line_px=0.8, colour=colour)
     if _kind(obstacle) == "fixed":
         _hatch(canvas, parts)
-    low, high = _extent(parts)
-    if float((high - low).max()) < _SMALL_M:
-        middle = (low + high) / 2.0
-        canvas.disc((float(middle[0]), float(middle[1])), 0.16, (48, 36, 8), 2.6)
-        canvas.disc((float(middle[0]), float(middle[1])), 0.16, colour, 1.2)
 
 
 def _hatch(canvas: Canvas, parts: list[Outline]) -> None:
