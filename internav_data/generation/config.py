@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from internav_data.episodes.config import EpisodeConfig
-from internav_data.generation.values import from_mapping, plain, updated
+from internav_data.generation.values import from_mapping, nested, plain, updated
 from internav_data.houses.config import HouseConfig
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from internav_data.records import Split
 
@@ -94,8 +94,14 @@ def identity_digest(identity: dict[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def load_config(path: Path | None = None, overrides: Iterable[str] = ()) -> GenerationConfig:
-    """Read a config from a TOML file and `a.b=c` overrides; what neither names is the default.
+def load_config(
+    path: Path | None = None,
+    overrides: Iterable[str] = (),
+    options: Mapping[str, Any] | None = None,
+) -> GenerationConfig:
+    """Read a config: a TOML file, then options by dotted key, then `a.b=c` overrides.
+
+    What none of them names is the default.
 
     Paths inside the file are relative to the file.
 
@@ -109,6 +115,8 @@ def load_config(path: Path | None = None, overrides: Iterable[str] = ()) -> Gene
     if path is not None:
         config = from_mapping(config, _read(path), str(path), COMMAND_LINE_ONLY)
         config = _beside(config, path.parent)
+    for key, value in (options or {}).items():
+        config = from_mapping(config, nested(key, value), "option")
     for override in overrides:
         config = updated(config, override, COMMAND_LINE_ONLY)
     return config

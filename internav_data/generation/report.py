@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 from internav_data.generation.progress import clock
@@ -32,6 +32,10 @@ class Report:
     def exit_code(self) -> int:
         """0, or 4 when scenes are missing."""
         return QuarantineError.exit_code if self.quarantined else 0
+
+    def plain(self) -> dict[str, object]:
+        """Return it for programs."""
+        return asdict(self) | {"out": str(self.out)}
 
 
 def summary(report: Report) -> str:

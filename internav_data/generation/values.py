@@ -82,9 +82,13 @@ def updated(config: C, assignment: str, elsewhere: Sequence[str] = ()) -> C:
         raise UsageError(f"{where}: expected KEY=VALUE, as in --set house.scale=1.1")
     hint = _hint_of(config, key)
     value: Any = text if hint is not None and _is_text(hint) else _parsed(text)
-    for name in reversed(key.split(".")):
-        value = {name: value}
-    return from_mapping(config, value, where, elsewhere)
+    return from_mapping(config, nested(key, value), where, elsewhere)
+
+
+def nested(key: str, value: Any) -> dict[str, Any]:  # noqa: ANN401 - any value
+    """Return a value under its dotted key: a.b and c give {"a": {"b": c}}."""
+    first, dot, rest = key.partition(".")
+    return {first: nested(rest, value) if dot else value}
 
 
 def known_keys(config: DataclassInstance, prefix: str = "") -> list[str]:

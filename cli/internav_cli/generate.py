@@ -1,0 +1,100 @@
+"""`internav-gen generate`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+from internav_cli.options import JSON, config_from, config_options, positive, progress
+
+
+@click.command(
+    "generate",
+    epilog="""\b
+Examples:
+  internav-gen generate --out data/paper                      the paper's 12,000 scenes
+  internav-gen generate --out data/demo --scenes 120 --episodes-per-scene 10
+  internav-gen generate --out data/demo --scenes 240          extends it
+  internav-gen generate --out data/flats --rooms kitchen,living,bedroom:2 --preset realistic
+  internav-gen generate --dry-run --workers 8                 how long, how large
+  internav-gen generate --scene 17 --episode 3                one episode again, as JSON
+  internav-gen generate --print-config > mine.toml            all settings, to be changed
+
+Run again on an unfinished folder it continues; a kill loses nothing but the scenes
+under way. Any number of workers gives the same bytes.""",
+)
+@click.option("--out", type=click.Path(path_type=Path), help="The dataset's folder.")
+@click.option("--scenes", type=int, default=12_000, show_default=True, callback=positive)
+@click.option("--episodes-per-scene", type=int, help="A tenth of it in test scenes.  [default: 50]")
+@click.option("--workers", type=int, callback=positive, help="Processes.  [default: one a core]")
+@config_options
+@click.option(
+    "--unseen-assets",
+    is_flag=True,
+    default=None,
+    help="Each split draws its obstacles from its own share of the assets.",
+)
+@click.option("--dry-run", is_flag=True, help="Tell time and size; write nothing.")
+@click.option("--print-config", is_flag=True, help="Print all settings as TOML and stop.")
+@click.option("--scene", type=int, help="Make this scene only and print it as JSON.")
+@click.option("--episode", type=int, help="With --scene: this episode only.")
+@JSON
+def command(
+    *,
+    out: Path | None,
+    scenes: int,
+    episodes_per_scene: int | None,
+    workers: int | None,
+    unseen_assets: bool | None,
+    dry_run: bool,
+    print_config: bool,
+    scene: int | None,
+    episode: int | None,
+    as_json: bool,
+    **settings: Any,  # noqa: ANN401 - the options of config_from
+) -> int:
+    """Make a dataset of houses and episodes in the folder --out."""
+    config = config_from(
+        **settings,
+        episodes_per_scene=episodes_per_scene,
+        episodes__unseen_assets=unseen_assets,
+    )
+    if print_config:
+        from internav_data.generation.toml import config_toml
+
+        click.echo(config_toml(config), nl=False)
+        return 0
+    if scene is not None:
+        from internav_data.generation.again import scene_again
+
+        text, verdict = scene_again(config, scene, episode, out)
+        click.echo(text)
+        click.echo(verdict, err=True)
+        return 0
+    if episode is not None:
+        raise click.UsageError("--episode needs --scene: say which scene it belongs to")
+    if dry_run:
+        from internav_data.generation.forecast import forecast
+
+        told = forecast(config, scenes, workers or 0, progress())
+        click.echo(told.to_json() if as_json else told.summary())
+        return 0
+    if out is None:
+        raise click.UsageError("say where to put the dataset: --out DIR")
+    return _generate(out, config, scenes, workers or 0, as_json=as_json)
+
+
+def _generate(out: Path, config: Any, scenes: int, workers: int, *, as_json: bool) -> int:  # noqa: ANN401
+    from internav_data.generation import generate
+    from internav_data.generation.report import summary
+
+    report = generate(out, config, scenes, workers, progress())
+    click.echo(summary(report), err=True)
+    for scene_id, reason in report.quarantined:
+        click.echo(f"quarantined {scene_id}: {reason}", err=True)
+    if as_json:
+        click.echo(json.dumps(report.plain()))
+    return report.exit_code

@@ -1,0 +1,122 @@
+"""`internav-gen`: finds the command, and turns every error into one line and an exit code."""
+
+from __future__ import annotations
+
+import importlib
+import shlex
+import sys
+import traceback
+
+import click
+
+COMMANDS = {
+    "generate": "Make a dataset from a seed; continue or extend one.",
+    "validate": "Prove a dataset right, or say what in it is wrong.",
+    "stats": "Tell what a dataset is like, beside the paper's Table 2.",
+    "show": "Draw a house or an episode from above as a PNG.",
+    "schema": "Print the JSON Schemas of every row and file.",
+    "assets": "List what can stand in a house or on a way.",
+    "doctor": "Look for what keeps this machine from generating.",
+    "warmup": "Compile the numba kernels now rather than at first use.",
+}
+INTERRUPTED = 130
+
+
+class LazyGroup(click.Group):
+    """Imports a command's module when it is called, so that help is fast."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
+        """Return the commands in the order in which people meet them."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        """Return a command by its name."""
+        if cmd_name not in COMMANDS:
+            return None
+        module = importlib.import_module(f"internav_cli.{cmd_name}")
+        command: click.Command = module.command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """List the commands without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.group(
+    cls=LazyGroup,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="""\b
+Examples:
+  internav-gen generate --out data/demo --scenes 120
+  internav-gen validate data/demo
+  internav-gen show data/demo --scene 17 --episode 3 --out picture.png
+
+\b
+Shell completion (bash; zsh and fish likewise):
+  eval "$(_INTERNAV_GEN_COMPLETE=bash_source internav-gen)"
+
+\b
+Exit codes: 0 good, 1 error, 2 usage, 3 validation failed, 4 finished with
+quarantined scenes, 5 corrupt data, 130/143 interrupted.""",
+)
+@click.option("--debug", is_flag=True, help="Show the traceback of an error.")
+@click.version_option(package_name="internav-data", prog_name="internav-gen")
+def cli(*, debug: bool) -> None:
+    """Interactive-navigation episodes with physical truth: from a seed to Parquet shards."""
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line and exit with its code."""
+    given = sys.argv[1:] if arguments is None else arguments
+    debug = bool(given) and given[0] == "--debug"
+    try:
+        result = cli.main(given, prog_name="internav-gen", standalone_mode=False)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        sys.stdout = None  # who read our output has gone: nothing is left to flush at the end
+        sys.exit(0)
+    except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - every one becomes one line
+        if debug:
+            traceback.print_exc()
+        sys.exit(_told(error, given))
+    sys.exit(result if isinstance(result, int) else 0)
+
+
+def _told(error: BaseException, given: list[str]) -> int:
+    """Say on stderr what went wrong and return the exit code."""
+    from internav_data.records.errors import InternavError
+
+    if isinstance(error, click.exceptions.NoArgsIsHelpError):
+        error.show()
+        return error.exit_code
+    if isinstance(error, KeyboardInterrupt | click.Abort):
+        return _say("interrupted", INTERRUPTED)
+    if isinstance(error, click.ClickException):
+        return _say(_with_help(error), error.exit_code)
+    if isinstance(error, InternavError):
+        signum = getattr(error, "signum", 0)
+        return _say(str(error), 128 + signum if signum else error.exit_code)
+    return _say(_unforeseen(error, given), 1)
+
+
+def _unforeseen(error: BaseException, given: list[str]) -> str:
+    if isinstance(error, OSError):
+        where = f" ({error.filename})" if error.filename else ""
+        return f"{error.strerror or error}{where}"
+    if isinstance(error, ModuleNotFoundError):
+        hint = "install everything with `pip install 'internav-data[all]'`"
+        return f"{error.name} is missing: {hint}; `internav-gen doctor` tells more"
+    again = shlex.join(["internav-gen", "--debug", *given])
+    return f"{type(error).__name__}: {error}; this is a bug: `{again}` shows where"
+
+
+def _with_help(error: click.ClickException) -> str:
+    context = getattr(error, "ctx", None)
+    hint = f" (see `{context.command_path} --help`)" if context is not None else ""
+    return f"{error.format_message()}{hint}"
+
+
+def _say(text: str, code: int) -> int:
+    click.echo(f"internav-gen: {' '.join(text.split())}", err=True)
+    return code

@@ -1,0 +1,101 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from internav_data.generation import GenerationConfig, Progress
+
+F = TypeVar("F", bound="Callable[..., Any]")
+
+DATASET = click.argument("dataset", type=click.Path(path_type=Path))
+JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on stdout.")
+
+_CONFIG = (
+    click.option(
+        "--config",
+        "config_file",
+        type=click.Path(path_type=Path),
+        help="TOML file with any of the settings that --print-config lists.",
+    ),
+    click.option(
+        "--set",
+        "overrides",
+        multiple=True,
+        metavar="KEY=VALUE",
+        help="One setting, as in --set house.scale=1.1; wins over the file.  [repeatable]",
+    ),
+    click.option("--seed", type=int, help="Every random number derives from it.  [default: 0]"),
+    click.option(
+        "--preset",
+        type=click.Choice(["paper", "realistic"]),
+        help="Generous rooms calibrated to the paper, or those of real homes.  [default: paper]",
+    ),
+    click.option(
+        "--rooms",
+        metavar="ROOMS",
+        help="A count (4), a range (2-5) or a programme (kitchen,living,bedroom:2).",
+    ),
+    click.option("--floor-plan", metavar="FILE", help="A floor plan of your own (TOML or JSON)."),
+    click.option(
+        "--assets",
+        "folders",
+        multiple=True,
+        metavar="DIR",
+        help="A folder of your own meshes that join the catalogue.  [repeatable]",
+    ),
+)
+
+
+def config_options(command: F) -> F:
+    """Add the options that make a config."""
+    for option in reversed(_CONFIG):
+        command = option(command)
+    return command
+
+
+def config_from(
+    config_file: Path | None = None,
+    overrides: tuple[str, ...] = (),
+    seed: int | None = None,
+    preset: str | None = None,
+    rooms: str | None = None,
+    floor_plan: str | None = None,
+    folders: tuple[str, ...] = (),
+    **more: Any,  # noqa: ANN401 - further settings by key, __ for a dot
+) -> GenerationConfig:
+    """Return the config that the options describe: file, then options, then --set."""
+    from internav_data.generation import load_config
+
+    options = {
+        "seed": seed,
+        "house.preset": preset,
+        "house.rooms": rooms,
+        "house.floor_plan": floor_plan,
+        "assets": list(folders) or None,
+    } | {key.replace("__", "."): value for key, value in more.items()}
+    chosen = {key: value for key, value in options.items() if value is not None}
+    config = load_config(config_file, overrides, chosen)
+    config.check()
+    return config
+
+
+def progress() -> Progress:
+    """Return a progress that tells on stderr."""
+    from internav_data.generation import Progress
+
+    return Progress(sys.stderr)
+
+
+def positive(_context: click.Context, parameter: click.Parameter, value: int | None) -> int | None:
+    """Refuse counts below one."""
+    if value is not None and value < 1:
+        raise click.BadParameter(f"{value}: ask for 1 or more", param=parameter)
+    return value

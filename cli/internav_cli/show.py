@@ -1,0 +1,79 @@
+"""`internav-gen show`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from internav_cli.options import config_from, config_options, positive
+
+if TYPE_CHECKING:
+    from internav_data.generation import GenerationConfig
+
+
+@click.command(
+    "show",
+    epilog="""\b
+Examples:
+  internav-gen show data/demo --scene 17 --out house.png
+  internav-gen show data/demo --scene 17 --episode 3 --out episode.png
+  internav-gen show --seed 7 --scene 3 --rooms 6 --out fresh.png       no dataset needed""",
+)
+@click.argument("dataset", type=click.Path(path_type=Path), required=False)
+@click.option("--scene", type=int, default=0, show_default=True, help="Index of the scene.")
+@click.option("--episode", type=int, help="Draw this episode; the bare house without.")
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="The PNG to write.")
+@click.option("--pixels", type=int, default=900, show_default=True, callback=positive)
+@config_options
+def command(
+    *,
+    dataset: Path | None,
+    scene: int,
+    episode: int | None,
+    out: Path,
+    pixels: int,
+    **settings: Any,  # noqa: ANN401 - the options of config_from
+) -> int:
+    """Draw a scene or an episode of DATASET, or of a fresh seed, from above."""
+    from internav_data.views import draw_episode, draw_house, write_png
+
+    if dataset is not None and any(settings.values()):
+        raise click.UsageError("options of a config are for fresh houses: leave DATASET out")
+    if scene < 0 or (episode is not None and episode < 0):
+        raise click.UsageError("--scene and --episode count from 0")
+    if dataset is not None:
+        house, task, assets = _stored(dataset, scene, episode)
+    else:
+        house, task, assets = _fresh(config_from(**settings), scene, episode)
+    if task is None:
+        picture = draw_house(house, pixels=pixels)
+    else:
+        picture = draw_episode(house, task, assets, pixels=pixels)
+    write_png(out, picture)
+    click.echo(f"wrote {out}", err=True)
+    return 0
+
+
+def _stored(dataset: Path, scene: int, episode: int | None) -> tuple[Any, Any, Any]:
+    from internav_data.dataset import load_dataset
+    from internav_data.records.errors import UsageError
+
+    scene_id = f"scene-{scene:06d}"
+    data = load_dataset(dataset)
+    house = data.scene(scene_id)
+    if episode is None:
+        return house, None, None
+    filters = [("scene_id", "=", scene_id), ("index", "=", episode)]
+    found = load_dataset(dataset, filters=filters)
+    if not len(found):
+        raise UsageError(f"{dataset}: {scene_id} has no episode {episode}")
+    return house, found[0], data.assets
+
+
+def _fresh(config: GenerationConfig, scene: int, episode: int | None) -> tuple[Any, Any, Any]:
+    from internav_data.generation.again import made_again
+
+    made = made_again(config, scene, episode)
+    return made.house, made.episodes[-1] if episode is not None else None, made.assets

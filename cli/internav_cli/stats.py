@@ -1,0 +1,69 @@
+"""`internav-gen stats`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from internav_cli.options import DATASET, JSON
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@click.command(
+    "stats",
+    epilog="""\b
+Examples:
+  internav-gen stats data/demo
+  internav-gen stats data/demo --split test --json""",
+)
+@DATASET
+@click.option("--split", type=click.Choice(["train", "val", "test"]), help="This split only.")
+@JSON
+def command(*, dataset: Path, split: str | None, as_json: bool) -> int:
+    """Tell what DATASET is like: the columns of the paper's Table 2 and more."""
+    from internav_data.dataset import compute_stats
+
+    stats = compute_stats(dataset, split)
+    if as_json:
+        import json
+
+        click.echo(json.dumps(stats, indent=2))
+        return 0
+    click.echo(f"{stats['scenes']} scenes, {stats['episodes']} episodes")
+    for line in table2_lines(stats):
+        click.echo(line)
+    blocked, sealed = stats["modes"].get("blocked", 0), stats["sealed"]
+    click.echo(
+        f"blocked {blocked}, lengthened {stats['modes'].get('lengthened', 0)}; sealed {sealed} "
+        f"({stats['sealed_share_of_blocked']:.1%} of the blocked)"
+    )
+    click.echo(
+        f"obstacles: {stats['obstacles_pushable']} pushable, {stats['obstacles_pickable']} "
+        f"pickable, {stats['obstacles_fixed']} fixed"
+    )
+    click.echo(
+        f"clear_m: {_spread(stats['clear_m'])}; clear_steps: {_spread(stats['clear_steps'])}"
+    )
+    if stats["quarantined"]:
+        click.echo(f"quarantined scenes: {stats['quarantined']}")
+    return 0
+
+
+def table2_lines(stats: dict[str, Any]) -> list[str]:
+    """Return Table 2 of the paper, its figures in brackets beside the dataset's."""
+    columns = ("ratio", "obstacle_num", "distance_m", "cross_room_num")
+    titles = ("share", "obstacles", "distance m", "rooms on way")
+    lines = [f"{'rooms':<6}{'episodes':>9}" + "".join(f"{title:>20}" for title in titles)]
+    for row in stats["table2"]:
+        cells = [f"{row[name]:.3f} ({row['paper'][name]:.3f})" for name in columns]
+        lines.append(
+            f"{row['rooms']:<6}{row['episodes']:>9}" + "".join(f"{cell:>20}" for cell in cells)
+        )
+    return [*lines, "in brackets: Table 2 of the paper"]
+
+
+def _spread(figures: dict[str, float]) -> str:
+    return f"{figures['least']:g} - {figures['most']:g}, mean {figures['mean']:.2f}"

@@ -1,0 +1,61 @@
+"""`internav-gen validate`."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from internav_cli.options import DATASET, JSON, positive
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+LEVELS = ("files", "schema", "geometry")
+
+
+@click.command(
+    "validate",
+    epilog="""\b
+Examples:
+  internav-gen validate data/demo
+  internav-gen validate data/demo --level files         hashes and checksums only
+  internav-gen validate data/paper --sample 300 --workers 2
+
+Exit code 3 when something in the dataset is not true, 5 when it cannot be read.""",
+)
+@DATASET
+@click.option(
+    "--level",
+    type=click.Choice(LEVELS),
+    default="geometry",
+    show_default=True,
+    help="Each level runs those before it.",
+)
+@click.option("--sample", type=int, callback=positive, help="Geometry of so many scenes only.")
+@click.option("--workers", type=int, callback=positive, help="Processes.  [default: one a core]")
+@JSON
+def command(
+    *,
+    dataset: Path,
+    level: Any,  # noqa: ANN401 - one of LEVELS, by click
+    sample: int | None,
+    workers: int | None,
+    as_json: bool,
+) -> int:
+    """Prove DATASET right by independent, slower ways, or say what in it is wrong."""
+    from internav_data.generation.run import cores
+    from internav_data.records.errors import ValidationError
+    from internav_data.verification import validate
+
+    tell = _tell if sys.stderr.isatty() else None
+    findings = validate(dataset, level, sample, workers or cores(), tell)
+    if tell is not None:
+        click.echo("\r\033[K", nl=False, err=True)
+    click.echo(findings.to_json() if as_json else findings.summary())
+    return 0 if findings.ok else ValidationError.exit_code
+
+
+def _tell(level: str, done: int, total: int) -> None:
+    click.echo(f"\r\033[K{level}: {done}/{total}", nl=False, err=True)

@@ -1,0 +1,22 @@
+"""`internav-gen warmup`."""
+
+from __future__ import annotations
+
+import click
+
+
+@click.command(
+    "warmup",
+    epilog="""\b
+Examples:
+  internav-gen warmup          once after installing, or while building a container""",
+)
+def command() -> int:
+    """Compile the numba kernels now, rather than when they are first used."""
+    from internav_data.generation.environment import warm_up
+    from internav_data.generation.progress import clock
+
+    click.echo("compiling numba kernels: about a minute the first time", err=True)
+    seconds = warm_up()
+    click.echo(f"ready after {clock(seconds)}; the compiled kernels are cached", err=True)
+    return 0

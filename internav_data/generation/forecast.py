@@ -1,0 +1,151 @@
+"""How long a dataset will take and how large it will be: measured on a few of its scenes."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from internav_data.generation.progress import Progress, clock
+from internav_data.generation.run import check_counts, cores
+from internav_data.generation.scenes import asset_folders, build_scene
+from internav_data.houses.splits import split_of_scene
+from internav_data.records.errors import QuarantineError
+
+if TYPE_CHECKING:
+    from internav_data.catalog import Catalogue
+    from internav_data.generation.config import GenerationConfig
+    from internav_data.records import Episode, House
+
+SAMPLE_SCENES = 12
+"""Scenes made for a forecast. The quota gives them the room counts of the whole within 5 %."""
+SAMPLE_EPISODES = 10
+MEGABYTE = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """What a run would take. Seconds are this machine's, side by side with nothing else."""
+
+    scenes: int
+    episodes: int
+    workers: int
+    seconds: float
+    bytes: int
+    episodes_per_second: float
+    sampled_scenes: int
+    sampled_episodes: int
+    quarantined_share: float
+
+    def summary(self) -> str:
+        """Return it as people read it."""
+        return (
+            f"{self.scenes} scenes, {self.episodes} episodes: about {clock(self.seconds)} with "
+            f"{self.workers} workers ({self.episodes_per_second:.1f} episodes/s), "
+            f"{self.bytes / MEGABYTE:.1f} MB; from {self.sampled_episodes} episodes of "
+            f"{self.sampled_scenes} scenes"
+        )
+
+    def to_json(self) -> str:
+        """Return it for programs."""
+        return json.dumps(dataclasses.asdict(self))
+
+
+@dataclass(slots=True)
+class _Sample:
+    houses: list[House]
+    episodes: list[Episode]
+    house_s: float
+    episode_s: float
+    failed: int
+
+
+def forecast(
+    config: GenerationConfig, scenes: int, workers: int = 0, progress: Progress | None = None
+) -> Forecast:
+    """Make some scenes in memory and tell what all would take; nothing is kept.
+
+    Raises
+    ------
+    UsageError
+        Counts or a config that cannot be meant.
+    QuarantineError
+        Not one scene of the sample could be made.
+
+    """
+    check_counts(scenes, workers)
+    config.check()
+    (progress or Progress()).say(f"making up to {SAMPLE_SCENES} scenes to measure")
+    sample = _sample(config, range(min(scenes, SAMPLE_SCENES)))
+    made, tried = len(sample.houses), len(sample.houses) + sample.failed
+    share = made / tried
+    episodes = sum(config.episodes_of(split_of_scene(scene)) for scene in range(scenes))
+    workers = workers or cores()
+    at_once = min(workers, cores(), scenes)
+    alone = scenes * sample.house_s / made + episodes * sample.episode_s / len(sample.episodes)
+    size = _bytes(sample, scenes, episodes)
+    return Forecast(
+        scenes=scenes,
+        episodes=round(episodes * share),
+        workers=workers,
+        seconds=round(alone / at_once, 3),
+        bytes=round(size * share),
+        episodes_per_second=round(episodes * share / (alone / at_once), 3),
+        sampled_scenes=made,
+        sampled_episodes=len(sample.episodes),
+        quarantined_share=round(1.0 - share, 6),
+    )
+
+
+def _sample(config: GenerationConfig, scenes: range) -> _Sample:
+    from internav_data.catalog import catalogue  # noqa: PLC0415 - imported when used
+
+    known = catalogue(asset_folders(config))
+    sample = _Sample([], [], 0.0, 0.0, 0)
+    count = min(config.episodes_per_scene, SAMPLE_EPISODES)
+    reason = ""
+    for scene in scenes:
+        if not sample.houses:
+            # The first one compiles kernels and fills caches: made once unmeasured.
+            reason = _tried(scene, config, known, 1) or reason
+        began = time.perf_counter()
+        try:
+            build_scene(scene, config, known, episodes=1)
+            between = time.perf_counter()
+            built = build_scene(scene, config, known, episodes=1 + count)
+        except QuarantineError as error:
+            sample.failed += 1
+            reason = str(error)
+            continue
+        ended = time.perf_counter()
+        # The second has `count` episodes more than the first: what differs is their cost.
+        episodes_s = max(0.0, (ended - between) - (between - began))
+        sample.episode_s += episodes_s / count * len(built.episodes)
+        sample.house_s += max(0.0, (ended - between) - episodes_s / count * len(built.episodes))
+        sample.houses.append(built.house)
+        sample.episodes += built.episodes
+    if not sample.houses:
+        raise QuarantineError(f"none of {sample.failed} scenes could be made: {reason}")
+    return sample
+
+
+def _tried(scene: int, config: GenerationConfig, known: Catalogue, episodes: int) -> str:
+    try:
+        build_scene(scene, config, known, episodes=episodes)
+    except QuarantineError as error:
+        return str(error)
+    return ""
+
+
+def _bytes(sample: _Sample, scenes: int, episodes: int) -> float:
+    """Return how large the tables of a whole dataset would be."""
+    from internav_data.dataset import EPISODES, SCENES, write_parquet  # noqa: PLC0415 - as above
+
+    with tempfile.TemporaryDirectory() as folder:
+        houses = write_parquet(Path(folder) / "scenes.parquet", sample.houses, SCENES)
+        tasks = write_parquet(Path(folder) / "episodes.parquet", sample.episodes, EPISODES)
+    return scenes * houses.bytes / houses.rows + episodes * tasks.bytes / tasks.rows
