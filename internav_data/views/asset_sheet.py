@@ -29,6 +29,8 @@ _LABEL_PX = 26
 _INK, _FAINT, _GAP = (52, 56, 62), (120, 124, 130), (226, 226, 222)
 _FROM_ABOVE_DEG = 50.0
 _FLAT = ("Rug",)
+_LONG = 1.5
+"""Things so much wider than high are shown one fewer a cell."""
 
 
 def _chosen(assets: Sequence[Asset], count: int) -> list[Asset]:
@@ -68,7 +70,8 @@ def draw_assets(
 def _cell(type_: str, assets: Sequence[Asset], width: int, height: int, count: int) -> Image:
     import cv2  # noqa: PLC0415 - imported when used
 
-    picture = draw_assets(_chosen(assets, count), width, height - _LABEL_PX)
+    long = assets[0].size[0] > _LONG * assets[0].size[2]
+    picture = draw_assets(_chosen(assets, count - 1 if long else count), width, height - _LABEL_PX)
     cell = np.empty((height, width, 3), np.uint8)
     cell[:] = (247, 247, 245)
     cell[_LABEL_PX:] = picture

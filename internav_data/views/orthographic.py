@@ -23,11 +23,13 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Image = NDArray[np.uint8]
 
-_CREASE = math.cos(math.radians(40.0))
-"""Faces of one part that meet at less than 40 degrees are shaded as one curved surface."""
+_CREASE = math.cos(math.radians(50.0))
+"""Faces of one part that meet at less than 50 degrees are shaded as one curved surface."""
 _FLOOR_REACH_M = 3.0
-_AMBIENT, _DIFFUSE = 0.5, 0.62
-_SHADOW = 0.55
+_AMBIENT, _DIFFUSE = 0.56, 0.6
+_LIGHT_DEG = (-38.0, 57.0)
+"""The light's yaw beside the viewer's, and its pitch."""
+_SHADOW = 0.5
 """How much of the direct light is left in shadow."""
 _BIAS_M = 0.004
 
@@ -215,7 +217,7 @@ def _shade(
                     if inside and shadow[r, c] < at[2] - bias * (3.0 - 2.0 * facing):
                         hidden += 1.0 / 25.0
             if t >= floor_from:
-                value = 1.0 - 0.26 * hidden
+                value = 1.0 - 0.2 * hidden
             else:
                 direct = facing * (1.0 - (1.0 - left) * hidden)
                 value = ambient * (0.84 + 0.16 * nz) + diffuse * direct
@@ -245,7 +247,7 @@ def draw_surface(surface: Surface, view: View) -> Image:
     weights = np.zeros((height, width, 2))
     _rasterise(seen, np.full((height, width), np.inf), owner, weights)
     lit, shadow = _shadow_map(surface, whole, view)
-    light = -_view(view.yaw_deg - 52.0, 54.0)[2]
+    light = -_view(view.yaw_deg + _LIGHT_DEG[0], _LIGHT_DEG[1])[2]
     out = np.empty((height, width, 3))
     out[:] = view.background
     settings = np.array([_AMBIENT, _DIFFUSE, _SHADOW, _BIAS_M])
@@ -269,7 +271,7 @@ def draw_surface(surface: Surface, view: View) -> Image:
 
 def _shadow_map(surface: Surface, whole: Surface, view: View) -> tuple[Floats, Floats]:
     """See the things from the light: all corners in its pixels, and how far light gets."""
-    axes = _view(view.yaw_deg - 52.0, 54.0)
+    axes = _view(view.yaw_deg + _LIGHT_DEG[0], _LIGHT_DEG[1])
     low, high = surface.corners.min(axis=(0, 1)), surface.corners.max(axis=(0, 1))
     reach = float(np.linalg.norm(high - low)) / 2.0 + 1e-3
     size = max(64, min(1400, round(reach * 2.0 * view.pixels_per_m * view.oversample)))

@@ -151,28 +151,15 @@ def lettuce(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     leaves = 6
     for k in range(leaves):
         turn = math.radians(360 / leaves * k + dice.between(-8, 8))
-        wide, tall = math.radians(36), dice.between(0.84, 1.0)
-        shade = green.shade(dice.between(0.85, 1.12))
+        tall = dice.between(0.86, 1.0)
 
-        def at(r: float, angle: float, z: float) -> tuple[float, float, float]:
+        def at(r: float, aside: float, z: float, turn: float = turn) -> tuple[float, float, float]:
+            angle = turn + math.radians(aside)
             return (r * x * math.cos(angle), r * y * math.sin(angle), z * h)
 
-        s.hull(
-            [
-                at(r, turn + a * wide * f, z * tall)
-                for r, f, z in (
-                    (0.5, 0.7, 0.02),
-                    (0.9, 1.0, 0.36),
-                    (1.0, 0.9, 0.7),
-                    (0.78, 0.7, 0.72),
-                )
-                for a in (-1, 1)
-            ]
-            + [
-                at(0.86, turn, 1.0 * tall),
-                at(1.0, turn, 0.4),
-                at(0.6, turn, 0.0),
-                at(0.7, turn, 0.9 * tall),
-            ],
-            shade,
-        )
+        pairs = ((0.48, 30, 0.0), (0.86, 42, 0.22), (1.0, 40, 0.5), (0.9, 38, 0.76 * tall))
+        corners = [at(r, side * a, z) for r, a, z in pairs for side in (-1, 1)]
+        corners += [at(0.72, side * 24, 0.95 * tall) for side in (-1, 1)]
+        corners += [at(0.96, 0, 0.24), at(1.0, 0, 0.5), at(0.94, 0, 0.78 * tall)]
+        corners += [at(0.6, 0, tall), at(0.5, 0, 0.3)]
+        s.hull(corners, green.shade(dice.between(0.84, 1.14)))

@@ -87,13 +87,6 @@ def _shell_chair(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     s.taper(
         ((-x, x), (0.8 * y, 0.93 * y), middle - 0.01), ((-0.7 * x, 0.7 * x), (0.9 * y, y), h), shell
     )
-    for sx in (-1, 1):
-        s.box(
-            (sx * x - 0.016, sx * x + 0.016),
-            (0.3 * y, 0.88 * y),
-            (seat, seat + 0.32 * (h - seat)),
-            shell.shade(0.95),
-        )
 
 
 def arm_chair(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:

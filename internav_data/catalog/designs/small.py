@@ -252,7 +252,7 @@ def _open_wall(s: Sketch, size: tuple[float, float, float], cy: float, paint: Pa
 def garbage_can(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     """Draw a bin: tapered with a lid, pedal bin, or an open basket."""
     paint, x, y = dice.pick((dice.plastic(), STEEL, IRON)), w / 2, d / 2
-    style = dice.pick(("lid", "pedal", "open"))
+    style = dice.pick(("lid", "pedal", "open", "pedal"))
     if style == "pedal":
         s.box((-0.12 * x, 0.12 * x), (-y, -0.8 * y), (0.03 * h, 0.06 * h), BLACK)
         s.cylinder((-x, x), (-0.9 * y, y), (0, 0.08 * h), BLACK)
