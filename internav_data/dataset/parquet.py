@@ -94,7 +94,9 @@ def write_table(path: Path, table: pa.Table, spec: TableSpec[Any]) -> FileInfo:
 def group_bounds(table: pa.Table) -> list[tuple[int, int]]:
     """Return the rows [start, stop) of each row group: whole scenes, at least the stated many."""
     rows = table.num_rows
-    if "scene_id" not in table.column_names or not rows:
+    if not rows:
+        return []
+    if "scene_id" not in table.column_names:
         return [(0, rows)]
     scenes = one_array(table.column("scene_id")).dictionary_encode().indices.to_numpy()
     starts = [0, *(np.flatnonzero(np.diff(scenes)) + 1).tolist(), rows]

@@ -1,0 +1,280 @@
+"""Readers see a finished dataset or none, whatever is interrupted, extended or asked again."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+import strategies
+
+from internav_data.dataset import (
+    Identity,
+    assemble,
+    commit,
+    done_scenes,
+    files,
+    finished_scenes,
+    has_manifest,
+    load_dataset,
+    open_work,
+    read_manifest,
+    read_scene_work,
+    shards,
+    write_quarantine,
+    write_scene_work,
+)
+from internav_data.dataset.work import scene_file
+from internav_data.records import Asset, Episode, House
+from internav_data.records.errors import CorruptDataError, UsageError
+
+IDENTITY = Identity("test", "1", 7, 1, "0" * 64, {"house": {"scale": 1.5}, "list": [1, 2]})
+ASSETS = [strategies.plain(Asset, asset_id=name) for name in ("b", "a")]
+
+
+@pytest.fixture(autouse=True)
+def without_waiting_for_the_disk(request, monkeypatch):
+    if "full_disk" not in request.node.name:
+        monkeypatch.setattr(files, "sync", lambda _: None)
+
+
+def split_of(scene):
+    return ("val", "test", "train")[min(scene % 120, 2)]
+
+
+def build(out, scenes, episodes=2, identity=IDENTITY, quarantined=()):
+    work = open_work(out, identity)
+    for scene in scenes:
+        split, scene_id = split_of(scene), f"scene-{scene:06d}"
+        if scene in quarantined:
+            write_quarantine(work, scene, "too small", split=split, attempts=3)
+            continue
+        house = strategies.plain(House, scene_id=scene_id, scene=scene, split=split)
+        rows = [
+            strategies.plain(
+                Episode,
+                episode_id=f"{scene_id}/{index:04d}",
+                scene_id=scene_id,
+                split=split,
+                index=index,
+                room_count=1 + scene % 10,
+            )
+            for index in range(episodes)
+        ]
+        write_scene_work(work, scene, house, rows, redraws={"spot": 1})
+
+
+def tree(folder):
+    return {
+        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+@pytest.fixture
+def few_scenes_a_shard(monkeypatch):
+    monkeypatch.setattr(shards, "SCENES_PER_SHARD", {"episodes": 24, "scenes": 50})
+
+
+def test_shards_are_of_the_stated_sizes_and_names(tmp_path):
+    build(tmp_path, range(300), 1)
+    manifest = assemble(tmp_path, IDENTITY, ASSETS, 300)
+    rows = {f.path: f.rows for f in manifest.files}
+    assert rows == {
+        "data/episodes/train-00000-of-00002.parquet": 240,
+        "data/episodes/train-00001-of-00002.parquet": 54,
+        "data/episodes/val-00000-of-00001.parquet": 3,
+        "data/episodes/test-00000-of-00001.parquet": 3,
+        "data/scenes/train-00000-of-00001.parquet": 294,
+        "data/scenes/val-00000-of-00001.parquet": 3,
+        "data/scenes/test-00000-of-00001.parquet": 3,
+        "data/assets.parquet": 2,
+    }
+    assert not (tmp_path / ".work").exists()
+    for file in manifest.files:
+        data = (tmp_path / file.path).read_bytes()
+        assert (len(data), hashlib.sha256(data).hexdigest()) == (file.bytes, file.sha256)
+
+
+def test_same_bytes_in_any_order_of_work(tmp_path):
+    trees = []
+    for order in (range(40), reversed(range(40))):
+        out = tmp_path / str(len(trees))
+        build(out, order)
+        assemble(out, IDENTITY, ASSETS if trees else ASSETS[::-1], 40)
+        trees.append(tree(out))
+    assert trees[0] == trees[1]
+
+
+@pytest.mark.usefixtures("few_scenes_a_shard")
+def test_extended_is_what_is_built_at_once(tmp_path):
+    once, grown = tmp_path / "once", tmp_path / "grown"
+    build(once, range(130), quarantined={5, 90})
+    assemble(once, IDENTITY, ASSETS, 130)
+    for low, high in ((0, 10), (10, 31), (31, 100), (100, 130)):
+        build(grown, range(low, high), quarantined={5, 90})
+        assemble(grown, IDENTITY, ASSETS, high)
+    assert tree(once) == tree(grown)
+    manifest = read_manifest(grown)
+    assert [q.scene for q in manifest.quarantined] == [5, 90]
+    assert manifest.redraws == {"spot": 128}
+    assert done_scenes(grown) == frozenset(range(130))
+
+
+@pytest.mark.usefixtures("few_scenes_a_shard")
+def test_extending_in_different_steps_to_the_same_scenes_is_the_same(tmp_path):
+    build(tmp_path, range(60))
+    assemble(tmp_path, IDENTITY, ASSETS, 60)
+    before = tree(tmp_path)
+    open_work(tmp_path, IDENTITY)
+    assemble(tmp_path, IDENTITY, ASSETS, 60)
+    assert tree(tmp_path) == before
+
+
+class _KilledError(Exception):
+    pass
+
+
+@pytest.mark.parametrize("first", [0, 10])
+def test_killed_anywhere_readers_are_safe_and_the_next_call_finishes(tmp_path, monkeypatch, first):
+    monkeypatch.setattr(shards, "SCENES_PER_SHARD", {"episodes": 8, "scenes": 20})
+    wanted, begun = tmp_path / "wanted", tmp_path / "begun"
+    build(wanted, range(20))
+    assemble(wanted, IDENTITY, ASSETS, 20)
+    if first:
+        build(begun, range(first))
+        assemble(begun, IDENTITY, ASSETS, first)
+    build(begun, range(first, 20))
+    real = {name: getattr(Path, name) for name in ("replace", "unlink")}
+    left = 0
+
+    def counted(name):
+        def step(*args, **kwargs):
+            nonlocal left
+            if left == 0:
+                raise _KilledError
+            left -= 1
+            return real[name](*args, **kwargs)
+
+        return step
+
+    for deadline in range(first % 3, 200, 3):
+        out = shutil.copytree(begun, tmp_path / f"out-{deadline}")
+        killed = False
+        with monkeypatch.context() as patch:
+            left = deadline
+            for name in real:
+                patch.setattr(Path, name, counted(name))
+            try:
+                assemble(out, IDENTITY, ASSETS, 20)
+            except _KilledError:
+                killed = True
+        assert has_manifest(out) or not first
+        if has_manifest(out):
+            ids = [episode.episode_id for episode in load_dataset(out)]
+            assert len(ids) in {2 * first, 40}
+            assert len(set(ids)) == len(ids)
+        if not killed:
+            break
+        open_work(out, IDENTITY)
+        assert done_scenes(out) == frozenset(range(20))
+        assemble(out, IDENTITY, ASSETS, 20)
+        assert tree(out) == tree(wanted)
+    assert not killed
+    assert deadline > 20
+
+
+def test_missing_scene_is_named(tmp_path):
+    build(tmp_path, [0, 1, 3])
+    with pytest.raises(CorruptDataError, match="first 2"):
+        assemble(tmp_path, IDENTITY, ASSETS, 4)
+    assert not has_manifest(tmp_path)
+
+
+def test_scene_without_episodes_is_kept(tmp_path):
+    build(tmp_path, range(3), episodes=0)
+    assert assemble(tmp_path, IDENTITY, ASSETS, 3).counts["train"].scenes == 1
+    build(tmp_path, range(3, 6))
+    assemble(tmp_path, IDENTITY, ASSETS, 6)
+    assert len(load_dataset(tmp_path)) == 6
+
+
+def test_damaged_work_counts_as_not_done(tmp_path):
+    build(tmp_path, range(4))
+    work = tmp_path / ".work"
+    assert set(finished_scenes(work)) == set(range(4))
+    path = scene_file(work, 2)
+    data = path.read_bytes()
+    for at in range(0, len(data), 97):
+        path.write_bytes(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :])
+        assert set(finished_scenes(work)) == {0, 1, 3}
+        with pytest.raises(CorruptDataError):
+            read_scene_work(work, 2)
+    path.write_bytes(data[:-5])
+    assert set(finished_scenes(work, range(3))) == {0, 1}
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"seed": 8}, "seed: there 7, asked for 8"),
+        ({"config": {"house": {"scale": 2.0}, "list": [1, 2]}}, "config.house.scale"),
+        ({"catalogue_digest": "1" * 64}, "catalogue_digest"),
+    ],
+)
+def test_another_configuration_is_refused(tmp_path, change, named):
+    other = Identity(**{**{f: getattr(IDENTITY, f) for f in IDENTITY.__slots__}, **change})
+    build(tmp_path, range(2))
+    with pytest.raises(UsageError, match=named):
+        open_work(tmp_path, other)
+    assemble(tmp_path, IDENTITY, ASSETS, 2)
+    before = tree(tmp_path)
+    with pytest.raises(UsageError, match=named):
+        open_work(tmp_path, other)
+    assert tree(tmp_path) == before
+
+
+def test_tuples_in_a_configuration_are_lists_on_disk(tmp_path):
+    values = {f: getattr(IDENTITY, f) for f in IDENTITY.__slots__}
+    same = Identity(**{**values, "config": {"house": {"scale": 1.5}, "list": (1, 2)}})
+    build(tmp_path, range(2))
+    assemble(tmp_path, IDENTITY, ASSETS, 2)
+    open_work(tmp_path, same)
+
+
+def test_foreign_folder_and_file_are_refused_untouched(tmp_path):
+    (tmp_path / "thesis.tex").write_text("years of work")
+    with pytest.raises(UsageError, match="no dataset"):
+        open_work(tmp_path, IDENTITY)
+    assert tree(tmp_path).keys() == {"thesis.tex"}
+    with pytest.raises(UsageError, match="is a file"):
+        open_work(tmp_path / "thesis.tex", IDENTITY)
+
+
+def test_full_disk_leaves_the_old_file(tmp_path, monkeypatch):
+    path = tmp_path / "x"
+    files.write_atomically(path, b"old")
+
+    def full(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space"):
+        files.write_atomically(path, b"new")
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_link_or_copy_where_links_are_not_allowed(tmp_path, monkeypatch):
+    source, target = tmp_path / "a", tmp_path / "b"
+    source.write_bytes(b"1")
+
+    def refuse(*_):
+        raise OSError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "link", refuse)
+    commit.link_or_copy(source, target)
+    assert target.read_bytes() == b"1"
