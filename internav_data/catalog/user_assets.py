@@ -1,13 +1,197 @@
-"""A user's own meshes (placeholder until the reader is written)."""
+"""A user's own meshes: read by trimesh, cut into convex parts by coacd, fitted to the frame.
+
+Every error names the file and says what to do. Files are bounded before they are read, and
+nothing outside the folder is opened: materials and textures a mesh names are not looked up.
+"""
 
 from __future__ import annotations
-from typing import TYPE_CHECKING
+
+import io
+import math
+import re
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from internav_data.catalog.convex import convex_pieces
+from internav_data.catalog.user_manifest import MESH_SUFFIXES, MeshNote, read_notes
+from internav_data.records import Asset, Part
+from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
     from pathlib import Path
-    from internav_data.records import Asset
+
+    from numpy.typing import NDArray
+
+    from internav_data.records import RGB, Vec3
+
+    Floats = NDArray[np.float64]
+
+MOST_BYTES = 64_000_000
+MOST_FACES = 400_000
+MOST_FILES = 5_000
+LARGEST_M, SMALLEST_M = 5.0, 0.01
+_DENSITY_KG_M3 = 200.0
+_GREY: RGB = (168, 164, 156)
+_GRID_M = 2e-4
 
 
 def load_user_assets(directory: Path) -> tuple[Asset, ...]:
-    """Read."""
-    raise NotImplementedError(directory)
+    """Read every mesh of a folder as an obstacle asset, sorted by asset_id.
+
+    Parameters
+    ----------
+    directory
+        Holds GLB, OBJ, STL, PLY or OFF files, and perhaps `assets.toml`
+        (`internav_data.catalog.user_manifest` says what may stand in it). Subfolders are not read.
+
+    Returns
+    -------
+    tuple
+        One asset a file, `asset_id` its type and the file's name: `Duck_user_duck`.
+
+    Raises
+    ------
+    UsageError
+        Names the file that cannot be used, why, and what to do.
+    """
+    if not directory.is_dir():
+        raise UsageError(f"{directory}: not a folder; --assets wants a folder of meshes")
+    paths = sorted(p for p in directory.iterdir() if p.suffix.lower() in MESH_SUFFIXES)
+    if not paths:
+        raise UsageError(f"{directory}: holds no mesh; put {', '.join(MESH_SUFFIXES)} files there")
+    if len(paths) > MOST_FILES:
+        raise UsageError(
+            f"{directory}: {len(paths)} meshes, at most {MOST_FILES}; split the folder"
+        )
+    notes = read_notes(directory, tuple(path.name for path in paths))
+    assets: dict[str, tuple[Asset, Path]] = {}
+    for path in paths:
+        if notes[path.name].ignore:
+            continue
+        asset = _asset(path, notes[path.name])
+        if asset.asset_id in assets:
+            raise UsageError(
+                f"{path}: would be named {asset.asset_id!r} as is {assets[asset.asset_id][1].name}; "
+                "rename one of them"
+            )
+        assets[asset.asset_id] = (asset, path)
+    return tuple(assets[asset_id][0] for asset_id in sorted(assets))
+
+
+def _asset(path: Path, note: MeshNote) -> Asset:
+    vertices, faces, colour = _read(path)
+    up = note.up or ("y" if path.suffix.lower() == ".glb" else "z")
+    points = vertices * note.scale
+    if up == "y":
+        points = np.column_stack([points[:, 0], -points[:, 2], points[:, 1]])
+    extent = np.ptp(points, axis=0)
+    largest = float(extent.max())
+    if not SMALLEST_M <= largest <= LARGEST_M:
+        guess = 10.0 ** round(math.log10(0.5 / largest)) if largest > 0.0 else 1.0
+        raise UsageError(
+            f"{path}: its longest side is {largest:.4g} m, expected {SMALLEST_M} to {LARGEST_M} m; "
+            f"set scale in assets.toml (perhaps {note.scale * guess:g}: are its units millimetres?)"
+        )
+    pieces = convex_pieces(path, points, faces, note.max_parts)
+    parts, size = _fitted(path, pieces, colour)
+    volume = sum(piece.volume for piece in pieces)
+    mass = note.mass_kg if note.mass_kg is not None else max(0.01, _DENSITY_KG_M3 * volume)
+    stem = re.sub(r"[^A-Za-z0-9]+", "_", path.stem).strip("_") or "mesh"
+    type_ = note.type or "".join(word[:1].upper() + word[1:] for word in stem.split("_"))
+    return Asset(
+        asset_id=f"{type_}_user_{stem}",
+        type=type_,
+        size=size,
+        mass_kg=float(f"{mass:.3g}"),
+        friction=round(float(note.friction), 2),
+        pushable=(not note.pickable) if note.pushable is None else note.pushable,
+        pickable=note.pickable,
+        spawnable=True,
+        blocks=True,
+        parts=parts,
+    )
+
+
+def _read(path: Path) -> tuple[Floats, NDArray[np.int64], RGB]:
+    """Read vertices (n, 3), triangles (m, 3) and a mean colour, bounded and from memory."""
+    if path.is_symlink() or not path.is_file():
+        raise UsageError(f"{path}: not a plain file; copy the mesh itself into the folder")
+    size = path.stat().st_size
+    if not 0 < size <= MOST_BYTES:
+        raise UsageError(
+            f"{path}: {size} bytes, expected 1 to {MOST_BYTES}; export it again with fewer triangles"
+        )
+    import trimesh  # noqa: PLC0415 - 0.6 s, only for users with meshes
+
+    try:
+        # From memory and without a resolver: nothing that the file refers to is opened.
+        loaded: Any = trimesh.load(
+            io.BytesIO(path.read_bytes()), file_type=path.suffix[1:].lower(), resolver=None
+        )
+        mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
+        vertices = np.asarray(mesh.vertices, dtype=np.float64)
+        faces = np.asarray(mesh.faces, dtype=np.int64)
+    except Exception as error:
+        # Readers of broken files fail in every way there is: all mean the same to the user.
+        text = str(error).splitlines()[0][:120] if str(error) else type(error).__name__
+        raise UsageError(
+            f"{path}: cannot be read as a mesh ({text}); export it again as GLB, OBJ or STL"
+        ) from error
+    if len(faces) == 0 or len(vertices) == 0:
+        raise UsageError(f"{path}: holds no triangles; export a mesh, not points or curves")
+    if len(faces) > MOST_FACES:
+        raise UsageError(f"{path}: {len(faces)} triangles, at most {MOST_FACES}; simplify it")
+    if not np.isfinite(vertices).all():
+        raise UsageError(f"{path}: has corners that are not numbers; export it again")
+    return vertices, faces, _mean_colour(mesh)
+
+
+def _mean_colour(mesh: Any) -> RGB:  # noqa: ANN401 - trimesh is imported when used
+    """Mean of the material's or the faces' colours, grey where there are none."""
+    try:
+        visual = mesh.visual
+        if not getattr(visual, "defined", False):
+            return _GREY
+        red, green, blue = (int(c) for c in np.atleast_1d(visual.main_color)[:3])
+    except (AttributeError, ValueError, TypeError, KeyError, IndexError):
+        return _GREY  # a colour is not worth refusing a mesh
+    return (red, green, blue)
+
+
+def _fitted(path: Path, pieces: list[Any], colour: RGB) -> tuple[tuple[Part, ...], Vec3]:
+    """Centre pieces on x = y = 0 and z = 0, in stored numbers, the box exact."""
+    corners = np.vstack([piece.corners for piece in pieces])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    steps = np.maximum(2, 2 * np.rint((high - low) / (2.0 * _GRID_M)).astype(np.int64))
+    start = np.array([-steps[0] // 2, -steps[1] // 2, 0])
+    parts = []
+    for piece in pieces:
+        share = (piece.corners - low) / np.maximum(high - low, 1e-12)
+        grid = np.unique(np.rint(share * steps).astype(np.int64) + start, axis=0)
+        if len(grid) < 4 or np.linalg.matrix_rank(grid - grid[0]) < 3:  # noqa: PLR2004 - solid
+            continue
+        middle = grid.min(axis=0) + grid.max(axis=0)
+        local = 2 * grid - middle
+        extent = 2 * np.ptp(grid, axis=0)
+        parts.append(
+            Part(
+                shape="hull",
+                centre=_metres(middle),
+                size=_metres(extent),
+                rotation=(0.0, 0.0, 0.0, 1.0),
+                corners=tuple(_metres(corner) for corner in local),
+                colour=colour,
+                material="plastic",
+            )
+        )
+    size = _metres(2 * steps)
+    if not parts:
+        raise UsageError(f"{path}: encloses no volume at 0.1 mm; give it thickness")
+    return tuple(parts), size
+
+
+def _metres(steps: NDArray[np.int64]) -> Vec3:
+    """Steps of 0.1 mm in metres."""
+    x, y, z = (int(step) / 10_000 for step in steps)
+    return (x, y, z)

@@ -1,0 +1,130 @@
+"""Cutting a mesh into convex pieces of few corners."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from internav_data.records.errors import UsageError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
+
+MOST_CORNERS = 32
+"""Corners of a piece: footprints and Bullet slow down beyond."""
+_CONVEX_SHARE = 0.97
+"""A mesh that fills that much of its hull is taken for convex, and not cut."""
+_THRESHOLD = 0.08
+"""coacd's concavity at which it stops cutting."""
+_SMALLEST_SHARE = 1e-3
+"""Pieces that are smaller than this share of the whole are crumbs."""
+_THINNEST_M = 1e-3
+_SEED = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Piece:
+    """A convex piece: corners (n, 3) with n <= 32, metres, and its volume, m³."""
+
+    corners: Floats
+    volume: float
+
+
+def convex_pieces(path: Path, vertices: Floats, faces: Ints, most: int) -> list[Piece]:
+    """Cut a mesh into at most `most` convex pieces, largest first.
+
+    The same mesh gives the same pieces: coacd's seed is fixed and pieces are ordered by volume.
+
+    Raises
+    ------
+    UsageError
+        When the mesh encloses no volume, or coacd cannot cut it.
+    """
+    whole = _piece(vertices)
+    extent = np.ptp(vertices, axis=0)
+    if whole is None or extent.min() < _THINNEST_M:
+        raise UsageError(
+            f"{path}: encloses no volume (it is flat: {' x '.join(f'{e:.4g}' for e in extent)} m); "
+            "give it at least 1 mm of thickness"
+        )
+    import trimesh  # noqa: PLC0415 - only for users with meshes
+
+    mesh = trimesh.Trimesh(vertices, faces, process=True)
+    solid = bool(mesh.is_watertight) and abs(float(mesh.volume)) >= _CONVEX_SHARE * whole.volume
+    if solid or most == 1:
+        return [whole]
+    pieces = [piece for points in _cut(path, mesh, most) if (piece := _piece(points)) is not None]
+    total = sum(piece.volume for piece in pieces)
+    if total <= 0.0:
+        raise UsageError(f"{path}: encloses no volume; close its surface or give it thickness")
+    kept = [piece for piece in pieces if piece.volume >= _SMALLEST_SHARE * total]
+    kept.sort(key=lambda piece: (-piece.volume, piece.corners.min(axis=0).tolist()))
+    return kept[:most]
+
+
+def _cut(path: Path, mesh: Any, most: int) -> list[Floats]:  # noqa: ANN401 - trimesh
+    try:
+        import coacd  # noqa: PLC0415 - only for users with meshes
+    except ImportError as error:
+        raise UsageError(
+            f"{path}: is not convex and cutting it needs coacd; "
+            "pip install 'internav-data[meshes]', or set max_parts = 1"
+        ) from error
+    coacd.set_log_level("error")
+    try:
+        parts = coacd.run_coacd(
+            coacd.Mesh(np.asarray(mesh.vertices), np.asarray(mesh.faces)),
+            threshold=_THRESHOLD,
+            max_convex_hull=most,
+            preprocess_resolution=30,
+            resolution=1000,
+            mcts_nodes=10,
+            mcts_iterations=40,
+            mcts_max_depth=2,
+            seed=_SEED,
+        )
+    except Exception as error:
+        raise UsageError(
+            f"{path}: cannot be cut into convex parts ({error}); close its surface, or set "
+            "max_parts = 1 to take its convex hull"
+        ) from error
+    return [np.asarray(points, dtype=np.float64) for points, _ in parts]
+
+
+def _piece(points: Floats) -> Piece | None:
+    """Hull of points with few corners; None where they enclose nothing."""
+    from scipy.spatial import ConvexHull, QhullError  # noqa: PLC0415 - only for users with meshes
+
+    try:
+        hull = ConvexHull(points)
+        corners = _fewer(points[np.sort(hull.vertices)])
+        volume = float(ConvexHull(corners).volume)
+    except (QhullError, ValueError):
+        return None
+    return Piece(corners, volume) if volume > 0.0 else None
+
+
+def _fewer(corners: Floats) -> Floats:
+    """Choose the corners that keep most of a hull.
+
+    The extremes of the axes come first, so that the bounding box stays, then always the corner
+    that lies farthest from those chosen.
+    """
+    if len(corners) <= MOST_CORNERS:
+        return corners
+    chosen = list(dict.fromkeys(int(k) for k in (*corners.argmin(axis=0), *corners.argmax(axis=0))))
+    distance = np.full(len(corners), np.inf)
+    for k in chosen:
+        distance = np.minimum(distance, ((corners - corners[k]) ** 2).sum(axis=1))
+    while len(chosen) < MOST_CORNERS:
+        k = int(distance.argmax())
+        chosen.append(k)
+        distance = np.minimum(distance, ((corners - corners[k]) ** 2).sum(axis=1))
+    return corners[sorted(chosen)]

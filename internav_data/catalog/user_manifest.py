@@ -1,0 +1,137 @@
+"""A user's `assets.toml`: what the meshes of a folder are.
+
+Tables: `[default]` holds for every mesh, `["duck.obj"]` for one file. Keys of both:
+
+- `type`: name of the type, letters and digits; the file's own name by default
+- `mass_kg`: above 0; by default 200 kg for each cubic metre of the convex parts
+- `friction`: 0 to 2, default 0.6
+- `pushable`, `pickable`: at most one of them; by default pushable
+- `scale`: metres for each unit of the file, default 1
+- `up`: which axis points up in the file, "y" or "z"; by default y for GLB and glTF, z for others
+- `max_parts`: at most so many convex parts, 1 to 32, default 12
+
+Without the file, every mesh gets the defaults. `ignore = true` leaves a file out.
+"""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
+
+from internav_data.records.errors import UsageError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+MANIFEST = "assets.toml"
+MESH_SUFFIXES = (".glb", ".obj", ".stl", ".ply", ".off")
+_LARGEST_MANIFEST = 1_000_000
+_MOST_PARTS = 32
+_LARGEST_FRICTION = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class MeshNote:
+    """What a user says about one mesh; None where the reader decides."""
+
+    type: str | None = None
+    mass_kg: float | None = None
+    friction: float = 0.6
+    pushable: bool | None = None
+    pickable: bool = False
+    scale: float = 1.0
+    up: str | None = None
+    max_parts: int = 12
+    ignore: bool = False
+
+
+_KINDS: dict[str, tuple[type, ...]] = {
+    "type": (str,),
+    "mass_kg": (int, float),
+    "friction": (int, float),
+    "pushable": (bool,),
+    "pickable": (bool,),
+    "scale": (int, float),
+    "up": (str,),
+    "max_parts": (int,),
+    "ignore": (bool,),
+}
+
+
+def read_notes(directory: Path, names: tuple[str, ...]) -> dict[str, MeshNote]:
+    """Read the notes on the named files of a folder.
+
+    Raises
+    ------
+    UsageError
+        When assets.toml is broken, or names an unknown key or a file that is not there.
+    """
+    path = directory / MANIFEST
+    if not path.exists():
+        return {name: MeshNote() for name in names}
+    tables = _parsed(path)
+    default = _note(path, "default", tables.pop("default", {}), MeshNote())
+    for name in tables:
+        if name not in names:
+            raise UsageError(
+                f"{path}: [{name!r}] names no mesh in this folder"
+                f"{_nearest(name, (*names, 'default'))}; write default or a file's name, quoted"
+            )
+    return {name: _note(path, name, tables.get(name, {}), default) for name in names}
+
+
+def _parsed(path: Path) -> dict[str, Any]:
+    try:
+        if path.is_symlink() or path.stat().st_size > _LARGEST_MANIFEST:
+            raise UsageError(f"{path}: must be a plain file of less than 1 MB")
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise UsageError(f"{path}: cannot be read as TOML ({error}); mend that line") from error
+
+
+def _nearest(name: str, known: tuple[str, ...]) -> str:
+    close = difflib.get_close_matches(name, known, n=1)
+    return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+def _note(path: Path, name: str, table: object, default: MeshNote) -> MeshNote:
+    if not isinstance(table, dict):
+        raise UsageError(f'{path}: {name!r} must be a table, as ["{name}"]')
+    known = tuple(field.name for field in fields(MeshNote))
+    for key, value in table.items():
+        if key not in known:
+            raise UsageError(
+                f"{path}: unknown key {key!r} in [{name!r}]{_nearest(key, known)}; "
+                f"known: {', '.join(known)}"
+            )
+        kinds = _KINDS[key]
+        if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):
+            expected = " or ".join(kind.__name__ for kind in kinds)
+            raise UsageError(f"{path}: {key} of [{name!r}] must be {expected}, not {value!r}")
+    note = replace(default, **table)
+    if table.get("pickable") and "pushable" not in table:
+        note = replace(note, pushable=False)
+    _check(path, name, note)
+    return note
+
+
+def _check(path: Path, name: str, note: MeshNote) -> None:
+    def must(good: bool, text: str) -> None:
+        if not good:
+            raise UsageError(f"{path}: {text} in [{name!r}]")
+
+    must(
+        note.mass_kg is None or 0.0 < note.mass_kg < 1e5,
+        f"mass_kg must lie above 0, not {note.mass_kg}",
+    )  # noqa: E501, PLR2004
+    must(0.0 <= note.friction <= _LARGEST_FRICTION, f"friction must be 0 to 2, not {note.friction}")
+    must(0.0 < note.scale < 1e6, f"scale must lie above 0, not {note.scale}")  # noqa: PLR2004
+    must(note.up in {None, "y", "z"}, f'up must be "y" or "z", not {note.up!r}')
+    must(1 <= note.max_parts <= _MOST_PARTS, f"max_parts must be 1 to 32, not {note.max_parts}")
+    must(not (note.pushable and note.pickable), "pushable and pickable exclude each other: choose")
+    must(
+        note.type is None or (note.type.isascii() and note.type.isalnum()),
+        f"type must be letters and digits, not {note.type!r}",
+    )
