@@ -61,9 +61,7 @@ def load_user_assets(directory: Path) -> tuple[Asset, ...]:
     if not paths:
         raise UsageError(f"{directory}: holds no mesh; put {', '.join(MESH_SUFFIXES)} files there")
     if len(paths) > MOST_FILES:
-        raise UsageError(
-            f"{directory}: {len(paths)} meshes, at most {MOST_FILES}; split the folder"
-        )
+        raise UsageError(f"{directory}: {len(paths)} meshes, at most {MOST_FILES}; split it")
     notes = read_notes(directory, tuple(path.name for path in paths))
     assets: dict[str, tuple[Asset, Path]] = {}
     for path in paths:
@@ -120,7 +118,7 @@ def _read(path: Path) -> tuple[Floats, NDArray[np.int64], RGB]:
     size = path.stat().st_size
     if not 0 < size <= MOST_BYTES:
         raise UsageError(
-            f"{path}: {size} bytes, expected 1 to {MOST_BYTES}; export it again with fewer triangles"
+            f"{path}: {size} bytes, expected 1 to {MOST_BYTES}; export fewer triangles"
         )
     import trimesh  # noqa: PLC0415 - 0.6 s, only for users with meshes
 
@@ -192,6 +190,6 @@ def _fitted(path: Path, pieces: list[Any], colour: RGB) -> tuple[tuple[Part, ...
 
 
 def _metres(steps: NDArray[np.int64]) -> Vec3:
-    """Steps of 0.1 mm in metres."""
+    """Turn steps of 0.1 mm into metres."""
     x, y, z = (int(step) / 10_000 for step in steps)
     return (x, y, z)

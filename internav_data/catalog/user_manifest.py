@@ -30,6 +30,7 @@ MESH_SUFFIXES = (".glb", ".obj", ".stl", ".ply", ".off")
 _LARGEST_MANIFEST = 1_000_000
 _MOST_PARTS = 32
 _LARGEST_FRICTION = 2.0
+_HEAVIEST_KG = 1e5
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,10 +123,8 @@ def _check(path: Path, name: str, note: MeshNote) -> None:
         if not good:
             raise UsageError(f"{path}: {text} in [{name!r}]")
 
-    must(
-        note.mass_kg is None or 0.0 < note.mass_kg < 1e5,
-        f"mass_kg must lie above 0, not {note.mass_kg}",
-    )  # noqa: E501, PLR2004
+    mass = note.mass_kg
+    must(mass is None or 0.0 < mass < _HEAVIEST_KG, f"mass_kg must lie above 0, not {mass}")
     must(0.0 <= note.friction <= _LARGEST_FRICTION, f"friction must be 0 to 2, not {note.friction}")
     must(0.0 < note.scale < 1e6, f"scale must lie above 0, not {note.scale}")  # noqa: PLR2004
     must(note.up in {None, "y", "z"}, f'up must be "y" or "z", not {note.up!r}')

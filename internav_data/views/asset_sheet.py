@@ -34,7 +34,7 @@ _LONG = 1.5
 
 
 def _chosen(assets: Sequence[Asset], count: int) -> list[Asset]:
-    """Some assets of a type, evenly from the first to the last."""
+    """Choose some assets of a type, evenly from the first to the last."""
     if len(assets) <= count:
         return list(assets)
     return [assets[round(k * (len(assets) - 1) / (count - 1))] for k in range(count)]

@@ -18,7 +18,7 @@ from internav_data.catalog import part_triangles
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from internav_data.records import Asset, RGB, Vec3
+    from internav_data.records import RGB, Asset, Vec3
 
     Floats = NDArray[np.float64]
     Image = NDArray[np.uint8]
@@ -98,7 +98,7 @@ def asset_surface(asset: Asset) -> Surface:
         cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         areas = np.linalg.norm(cross, axis=1)
         # A sliver of a triangulated flat face has no direction of its own and nothing to show.
-        keep = areas > 1e-12  # noqa: PLR2004
+        keep = areas > 1e-12
         cross, areas, corners, faces = cross[keep], areas[keep], corners[keep], faces[keep]
         normals = cross / areas[:, None]
         colours = np.tile(np.array(part.colour, np.float64), (len(faces), 1))
@@ -181,7 +181,6 @@ def _floor_mesh(centre: Vec3, colour: RGB) -> Surface:
 def _shade(
     owner: NDArray[np.int32],
     weights: Floats,
-    corners: Floats,
     lit: Floats,
     normals: Floats,
     colours: Floats,
@@ -254,7 +253,6 @@ def draw_surface(surface: Surface, view: View) -> Image:
     _shade(
         owner,
         weights,
-        seen,
         lit,
         whole.normals,
         whole.colours,
@@ -265,8 +263,9 @@ def draw_surface(surface: Surface, view: View) -> Image:
         out,
     )
     k = view.oversample
-    blocks = out.reshape(view.height, k, view.width, k, 3).mean(axis=(1, 3))
-    return np.rint(blocks).astype(np.uint8)
+    blocks: Floats = out.reshape(view.height, k, view.width, k, 3).mean(axis=(1, 3))
+    image: Image = np.rint(blocks).astype(np.uint8)
+    return image
 
 
 def _shadow_map(surface: Surface, whole: Surface, view: View) -> tuple[Floats, Floats]:

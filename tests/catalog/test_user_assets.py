@@ -1,0 +1,184 @@
+from __future__ import annotations
+
+import shutil
+import struct
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from internav_data.catalog import catalogue, load_user_assets, split_of_asset, user_assets
+from internav_data.geometry import asset_bounds
+from internav_data.records.errors import UsageError
+
+pybullet_data = pytest.importorskip("pybullet_data")
+DATA = Path(pybullet_data.getDataPath())
+
+
+def folder(tmp_path, name="thing.obj", toml="", mesh=None):
+    import trimesh
+
+    mesh = trimesh.creation.box((0.4, 0.6, 0.8)) if mesh is None else mesh
+    if isinstance(mesh, bytes):
+        (tmp_path / name).write_bytes(mesh)
+    else:
+        mesh.export(tmp_path / name)
+    if toml:
+        (tmp_path / "assets.toml").write_text(toml)
+    return tmp_path
+
+
+def check(asset):
+    low, high = asset_bounds(asset)
+    w, d, h = asset.size
+    np.testing.assert_allclose(low, (-w / 2, -d / 2, 0.0), atol=1e-6)
+    np.testing.assert_allclose(high, (w / 2, d / 2, h), atol=1e-6)
+    assert all(len(p.corners) <= 32 for p in asset.parts)
+    assert all(v == round(v, 4) for p in asset.parts for c in p.corners for v in c)
+
+
+@pytest.mark.parametrize("suffix", ["obj", "stl", "glb", "ply"])
+def test_a_box_is_one_part(tmp_path, suffix):
+    toml = '[default]\nmass_kg = 3\nup = "z"\n["thing.%s"]\nfriction = 0.5\npickable = true\n'
+    (asset,) = load_user_assets(folder(tmp_path, f"thing.{suffix}", toml % suffix))
+    check(asset)
+    assert asset.asset_id == "Thing_user_thing"
+    assert asset.size == (0.4, 0.6, 0.8)
+    assert len(asset.parts) == 1
+    assert (asset.mass_kg, asset.friction) == (3.0, 0.5)
+    assert (asset.pushable, asset.pickable, asset.spawnable) == (False, True, True)
+
+
+def test_up_and_scale(tmp_path):
+    toml = '[default]\nup = "y"\nscale = 0.5\ntype = "Block"\n'
+    (asset,) = load_user_assets(folder(tmp_path, toml=toml))
+    assert asset.size == (0.2, 0.4, 0.3)
+    assert asset.asset_id == "Block_user_thing"
+    assert asset.pushable
+    assert split_of_asset(asset) in {"train", "val", "test"}
+
+
+def test_joins_the_catalogue(tmp_path):
+    joined = catalogue((folder(tmp_path),))
+    assert len(joined.spawnable) == 656
+    assert joined.digest != catalogue().digest
+    assert "Thing_user_thing" in joined.assets
+
+
+def test_a_table_is_cut_into_parts_the_same_each_time(tmp_path):
+    import trimesh
+
+    pieces = [trimesh.creation.box((1, 0.6, 0.05)).apply_translation((0, 0, 0.7))]
+    for x in (-0.45, 0.45):
+        for y in (-0.25, 0.25):
+            leg = trimesh.creation.box((0.06, 0.06, 0.7)).apply_translation((x, y, 0.34))
+            pieces.append(leg)
+    mesh = trimesh.util.concatenate(pieces)
+    where = folder(tmp_path, mesh=mesh)
+    (first,), (second,) = load_user_assets(where), load_user_assets(where)
+    assert first == second
+    assert 4 <= len(first.parts) <= 12
+    check(first)
+
+
+@pytest.mark.parametrize(
+    ("toml", "words"),
+    [
+        ("[default]\nmas_kg = 2\n", ("mas_kg", "mass_kg")),
+        ("[default]\nmass_kg = 0\n", ("mass_kg", "above 0")),
+        ("[default]\nmass_kg = nan\n", ("mass_kg",)),
+        ("[default]\nmass_kg = true\n", ("mass_kg", "float")),
+        ("[default]\nfriction = 3\n", ("friction", "0 to 2")),
+        ("[default]\nup = 'x'\n", ("up",)),
+        ("[default]\nmax_parts = 0\n", ("max_parts",)),
+        ("[default]\npushable = true\npickable = true\n", ("exclude",)),
+        ("[default]\ntype = '../x'\n", ("type",)),
+        ('["thin.obj"]\nmass_kg = 1\n', ("thin.obj", "thing.obj")),
+        ('["../secret.obj"]\nmass_kg = 1\n', ("secret.obj",)),
+        ("default = 3\n", ("table",)),
+        ("[default\n", ("TOML",)),
+        ("[default]\nscale = 1000\n", ("longest side", "scale")),
+        ("[default]\nscale = 0.001\n", ("longest side", "scale")),
+    ],
+)
+def test_what_is_wrong_in_the_toml_is_named(tmp_path, toml, words):
+    with pytest.raises(UsageError) as caught:
+        load_user_assets(folder(tmp_path, toml=toml))
+    assert all(word in str(caught.value) for word in words)
+    assert str(tmp_path) in str(caught.value)
+
+
+FLAT = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n"
+HUGE = b"\0" * 80 + struct.pack("<I", 4_000_000_000)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("broken.glb", b"not a mesh at all", "cannot be read"),
+        ("empty.obj", b"", "0 bytes"),
+        ("points.obj", b"v 0 0 0\nv 1 1 1\n", ""),
+        ("flat.obj", FLAT, "no volume"),
+        ("cut.stl", HUGE, ""),
+        ("nan.obj", b"v nan 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 2 3 4\n", ""),
+    ],
+)
+def test_a_broken_file_is_named(tmp_path, name, content, words):
+    with pytest.raises(UsageError) as caught:
+        load_user_assets(folder(tmp_path, name, mesh=content))
+    assert name in str(caught.value)
+    assert words in str(caught.value)
+
+
+def test_a_large_file_is_refused_before_it_is_read(tmp_path, monkeypatch):
+    monkeypatch.setattr(user_assets, "MOST_BYTES", 100)
+    with pytest.raises(UsageError, match="fewer triangles"):
+        load_user_assets(folder(tmp_path))
+
+
+def test_links_out_of_the_folder_are_refused(tmp_path):
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    (inner / "link.obj").symlink_to(folder(tmp_path) / "thing.obj")
+    with pytest.raises(UsageError, match="plain file"):
+        load_user_assets(inner)
+
+
+def test_no_folder_and_no_mesh(tmp_path):
+    with pytest.raises(UsageError, match="not a folder"):
+        load_user_assets(tmp_path / "missing")
+    with pytest.raises(UsageError, match="holds no mesh"):
+        load_user_assets(tmp_path)
+
+
+def test_two_files_of_one_name(tmp_path):
+    folder(tmp_path)
+    with pytest.raises(UsageError, match="rename"):
+        load_user_assets(folder(tmp_path, "thing.stl"))
+
+
+def objects(count):
+    found = sorted(DATA.glob("random_urdfs/*/*.obj"))
+    return found[:: len(found) // count][:count]
+
+
+@pytest.mark.parametrize("path", [DATA / "cube.obj", DATA / "duck_vhacd.obj", *objects(2)])
+def test_real_meshes(tmp_path, path):
+    shutil.copy(path, tmp_path)
+    toml = f"[default]\nscale = {0.3 if path.parent == DATA else 1.0}\n"
+    (tmp_path / "assets.toml").write_text(toml)
+    (asset,) = load_user_assets(tmp_path)
+    check(asset)
+
+
+@pytest.mark.slow
+def test_a_hundred_real_meshes(tmp_path):
+    for path in objects(100):
+        shutil.copy(path, tmp_path)
+    started = time.perf_counter()
+    assets = load_user_assets(tmp_path)
+    assert len(assets) == 100
+    assert time.perf_counter() - started < 600
+    for asset in assets:
+        check(asset)
