@@ -101,7 +101,8 @@ class Sight:
         open_ = shapely.covers(self.floor, shapely.linestrings(np.stack([a, b], axis=1)))
         lengths = np.linalg.norm(a - b, axis=1)
         self.graph.add_weighted_edges_from(
-            (int(m), int(n), float(d)) for (m, n), d in zip(pairs[open_], lengths[open_], strict=True)
+            (int(m), int(n), float(d))
+            for (m, n), d in zip(pairs[open_], lengths[open_], strict=True)
         )
 
     def _tangent(self, ray: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -56,7 +56,15 @@ def catalogue() -> tuple[Asset, ...]:
             spawnable=True,
             blocks=True,
             parts=tuple(
-                Part("box", _point(rng, 1, 3), _point(rng, 1, 3), (0.0, 0.0, 0.0, 1.0), (), (9, 9, 9), "wood")
+                Part(
+                    "box",
+                    _point(rng, 1, 3),
+                    _point(rng, 1, 3),
+                    (0.0, 0.0, 0.0, 1.0),
+                    (),
+                    (9, 9, 9),
+                    "wood",
+                )
                 for _ in range(4)
             ),
         )
@@ -73,17 +81,34 @@ def _house(scene: int, rng: np.random.Generator, assets: tuple[Asset, ...]) -> H
     wide = math.ceil(math.sqrt(count))
     cells = [(k % wide * 5.0, k // wide * 5.0) for k in range(count)]
     rooms = tuple(
-        Room(k, "bedroom", ((x, y), (x + 5, y), (x + 5, y + 5), (x, y + 5)), 25.0, 2.6, "oak", "paint")
+        Room(
+            k,
+            "bedroom",
+            ((x, y), (x + 5, y), (x + 5, y + 5), (x, y + 5)),
+            25.0,
+            2.6,
+            "oak",
+            "paint",
+        )
         for k, (x, y) in enumerate(cells)
     )
     doors = []
     for a in range(count):
         for b in range(a + 1, count):
             dx, dy = cells[b][0] - cells[a][0], cells[b][1] - cells[a][1]
-            if dx + dy == 5 and dx >= 0 and dy >= 0 and (rng.random() < 0.6 or b == a + 1 or dx == 0):
+            if (
+                dx + dy == 5
+                and dx >= 0
+                and dy >= 0
+                and (rng.random() < 0.6 or b == a + 1 or dx == 0)
+            ):
                 along = round(float(rng.uniform(1, 4)), 2)
-                x, y = (cells[b][0], cells[b][1] + along) if dx else (cells[b][0] + along, cells[b][1])
-                doors.append(Door(len(doors), (a, b), "single", x, y, 90.0 if dx else 0.0, 1.0, 2.1, True))
+                x, y = (
+                    (cells[b][0], cells[b][1] + along) if dx else (cells[b][0] + along, cells[b][1])
+                )
+                doors.append(
+                    Door(len(doors), (a, b), "single", x, y, 90.0 if dx else 0.0, 1.0, 2.1, True)
+                )
     things = tuple(
         _thing(n, int(rng.integers(count)), rng, assets[int(rng.integers(len(assets)))])
         for n in range(6 * count)

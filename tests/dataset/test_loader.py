@@ -1,0 +1,233 @@
+"""Episodes by number, filtered, as columns, and in other libraries' hands."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from internav_data.dataset import EPISODES, load_dataset, locate, read_manifest
+from internav_data.dataset import from_table as records_of
+from internav_data.records import Episode, House
+from internav_data.records.errors import UsageError
+
+
+@pytest.fixture(scope="module")
+def ds(dataset_folder):
+    return load_dataset(dataset_folder)
+
+
+@pytest.fixture(scope="module")
+def everything(ds):
+    return records_of(ds.to_table(), EPISODES)
+
+
+def test_every_way_of_reading_gives_the_same(ds, everything):
+    assert len(ds) == len(everything) == 130 * 6
+    assert list(ds) == everything
+    assert [ds[i] for i in range(len(ds))] == everything
+    assert ds[:] == everything
+    assert ds.__getitems__([5, 1, 700]) == [everything[k] for k in (5, 1, 700)]
+    assert isinstance(ds[np.int64(3)], Episode)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.slices(130 * 6))
+def test_slices_are_those_of_a_list(ds, everything, cut):
+    assert ds[cut] == everything[cut]
+
+
+@pytest.mark.parametrize("number", [780, -781, 10**9])
+def test_beyond_the_end(ds, number):
+    with pytest.raises(IndexError):
+        ds[number]
+
+
+def test_rows_are_sorted_within_a_split(ds):
+    for split in ("train", "val", "test"):
+        keys = [(e.scene_id, e.index) for e in load_dataset(ds.path, split)]
+        assert keys == sorted(keys)
+        assert len(keys) == ds.manifest.counts[split].episodes
+
+
+CONDITIONS = st.sampled_from(
+    [
+        ("room_count", ">=", 4),
+        ("room_count", "in", [1, 3]),
+        ("mode", "==", "blocked"),
+        ("sealed", "==", True),
+        ("clear_m", "<", 9.5),
+        ("steps", ">", 30),
+        ("scene_id", "!=", "scene-000002"),
+        ("mode", "not in", ["blocked"]),
+    ]
+)
+_OPS = {
+    ">=": lambda a, b: a is not None and a >= b,
+    ">": lambda a, b: a is not None and a > b,
+    "<": lambda a, b: a is not None and a < b,
+    "==": lambda a, b: a == b,
+    "!=": lambda a, b: a != b,
+    "in": lambda a, b: a in b,
+    "not in": lambda a, b: a not in b,
+}
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(CONDITIONS, min_size=1, max_size=3), st.sampled_from([None, "train", "val"]))
+def test_filters_keep_what_python_would(ds, everything, filters, split):
+    def keep(episode):
+        return split in (None, episode.split) and all(
+            _OPS[op](getattr(episode, name), value) for name, op, value in filters
+        )
+
+    kept = load_dataset(ds.path, split, filters=filters)
+    expected = [episode for episode in everything if keep(episode)]
+    assert len(kept) == len(expected)
+    assert list(kept) == expected
+    assert records_of(kept.to_table(), EPISODES) == expected
+    if expected:
+        assert kept[-1] == expected[-1]
+
+
+def test_a_choice_of_conditions(ds, everything):
+    kept = load_dataset(ds.path, filters=[[("index", "==", 0)], [("index", "==", 3)]])
+    assert list(kept) == [episode for episode in everything if episode.index in (0, 3)]
+
+
+@pytest.mark.parametrize(
+    "filters",
+    [
+        [("rooms_count", ">", 1)],
+        [("room_count", "~", 1)],
+        [("room_count", ">", "four")],
+        [("obstacles", "==", 1)],
+        [],
+        [("room_count", ">")],
+        "room_count > 4",
+        [7],
+    ],
+)
+def test_impossible_filters_say_what_is_expected(ds, filters):
+    with pytest.raises(UsageError, match="expected|did you mean"):
+        load_dataset(ds.path, filters=filters)
+
+
+def test_unknown_split_and_column(ds):
+    with pytest.raises(UsageError, match="training"):
+        load_dataset(ds.path, split="training")
+    with pytest.raises(UsageError, match="did you mean 'obstacles'"):
+        load_dataset(ds.path, columns=["obstacle"])
+
+
+def test_columns_give_dictionaries(ds, everything):
+    part = load_dataset(ds.path, "val", columns=["obstacles", "clear_m"])
+    expected = [e for e in everything if e.split == "val"]
+    rows = [{"obstacles": e.obstacles, "clear_m": e.clear_m} for e in expected]
+    assert list(part) == rows
+    assert part[3] == rows[3]
+    assert part.to_table().column_names == ["obstacles", "clear_m"]
+    assert list(part.iterable(shuffle=False)) == rows
+
+
+def test_scene_comes_with_its_assets(ds):
+    for episode in ds[::97]:
+        house = ds.scene(episode.scene_id)
+        assert isinstance(house, House)
+        assert house.scene_id == episode.scene_id
+        assert len(house.rooms) == episode.room_count
+        assert {t.asset_id for t in house.things} <= house.assets.keys()
+        assert {o.asset_id for o in episode.obstacles} <= ds.assets.keys()
+        assert ds.scene(episode.scene_id) is house
+    with pytest.raises(UsageError, match="scene-17"):
+        ds.scene("scene-17")
+    assert len(ds.scene_ids) == 130
+
+
+def test_pickled_by_path(ds):
+    some = load_dataset(ds.path, "train", filters=[("room_count", ">", 2)])
+    some[0]
+    data = pickle.dumps(some)
+    assert len(data) < 1000
+    again = pickle.loads(data)  # noqa: S301 - our own
+    assert list(again) == list(some)
+    assert again.fingerprint == some.fingerprint
+
+
+def test_pandas_has_the_scalars(ds, everything):
+    frame = ds.to_pandas()
+    assert frame["clear_m"].tolist() == [e.clear_m for e in everything]
+    assert frame["steps"].isna().sum() == sum(e.steps is None for e in everything)
+    assert "obstacles" not in frame
+
+
+def test_row_groups_end_where_scenes_end(dataset_folder):
+    import pyarrow.parquet as pq
+
+    for file in read_manifest(dataset_folder).of("episodes"):
+        parquet = pq.ParquetFile(locate(dataset_folder, file))
+        seen: set[str] = set()
+        for group in range(parquet.num_row_groups):
+            ids = set(parquet.read_row_group(group, columns=["scene_id"])["scene_id"].to_pylist())
+            assert not ids & seen
+            seen |= ids
+        rows = [parquet.metadata.row_group(k).num_rows for k in range(parquet.num_row_groups)]
+        assert all(400 <= count < 400 + 6 for count in rows[:-1])
+
+
+def test_memory_held_is_bounded(ds, monkeypatch):
+    from internav_data.dataset import shelf
+
+    some = load_dataset(ds.path)
+    monkeypatch.setattr(shelf, "_CACHED_BYTES", 1)
+    for number in (0, 779, 400, 1, 778):
+        some[number]
+        assert len(some.shelf._groups) == 1
+
+
+def test_duckdb_reads_it(dataset_folder, everything):
+    import duckdb
+
+    found = duckdb.sql(
+        f"select count(*), sum(len(obstacles)), sum(list_sum([o.mass_kg for o in obstacles])), "  # noqa: S608
+        f"sum(start.x) from '{dataset_folder}/data/episodes/*.parquet'"
+    ).fetchall()[0]
+    assert found == (
+        len(everything),
+        sum(len(e.obstacles) for e in everything),
+        pytest.approx(sum(o.mass_kg for e in everything for o in e.obstacles)),
+        pytest.approx(sum(e.start.x for e in everything)),
+    )
+
+
+def test_polars_reads_it(dataset_folder, everything):
+    import polars as pl
+
+    frame = pl.read_parquet(f"{dataset_folder}/data/episodes/*.parquet")
+    by_id = {e.episode_id: e for e in everything}
+    for row in frame.sample(20, seed=1).iter_rows(named=True):
+        episode = by_id[row["episode_id"]]
+        assert row["expert"]["actions"] == list(episode.expert.actions)
+        assert row["room_paths"] == [list(path) for path in episode.room_paths]
+        assert [o["quaternion"]["w"] for o in row["obstacles"]] == [
+            o.quaternion[3] for o in episode.obstacles
+        ]
+
+
+def test_pandas_reads_every_file(dataset_folder):
+    import pandas as pd
+
+    for file in read_manifest(dataset_folder).files:
+        assert len(pd.read_parquet(dataset_folder / file.path)) == file.rows
+
+
+def test_numbers_of_a_row_are_plain_python(ds):
+    episode = ds[0]
+    assert type(episode.clear_m) is float
+    assert type(episode.index) is int
+    assert type(episode.sealed) is bool
+    assert type(episode.obstacles[0].quaternion) is tuple
+    assert type(episode.expert.actions[0]) is int

@@ -1,0 +1,66 @@
+"""What an import costs: the package nothing, the loader numpy and pyarrow."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+HEAVY = {"pybullet", "torch", "numba", "cv2", "shapely", "networkx", "scipy", "trimesh", "coacd"}
+HEAVY |= {"pandas", "matplotlib", "click", "duckdb", "polars", "gymnasium"}
+
+
+def modules_after(code: str) -> set[str]:
+    script = f"import sys\n{code}\nprint(*sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=120
+    )
+    return {name.split(".")[0] for name in done.stdout.splitlines()[-1].split()}
+
+
+def test_import_needs_the_standard_library_alone():
+    before = modules_after("import typing, importlib")
+    new = modules_after("import internav_data") - before
+    assert new - sys.stdlib_module_names == {"internav_data"}
+
+
+def test_loader_needs_numpy_and_pyarrow_alone():
+    before = modules_after("import typing, importlib, numpy, pyarrow, pyarrow.parquet")
+    new = modules_after("from internav_data import load_dataset") - before
+    assert not new & HEAVY
+    third_party = {name for name in new - sys.stdlib_module_names if name[0] != "_"}
+    assert third_party == {"internav_data"}
+
+
+def test_reading_imports_nothing_heavy(tmp_path, hand_house, hand_episode):
+    from internav_data.dataset import (
+        Identity,
+        assemble,
+        open_work,
+        write_quarantine,
+        write_scene_work,
+    )
+
+    out = tmp_path / "d"
+    identity = Identity("test", "1", 0, 1, "0", {})
+    write_scene_work(open_work(out, identity), 3, hand_house, [hand_episode])
+    for scene in range(3):
+        write_quarantine(out / ".work", scene, "none", split="train", attempts=1)
+    assemble(out, identity, tuple(hand_house.assets.values()), 4)
+    code = f"""
+from internav_data import load_dataset
+ds = load_dataset({str(out)!r}, filters=[("index", ">=", 0)])
+assert list(ds) == list(ds.iterable()) == [ds[0]]
+assert ds.scene(ds[0].scene_id).assets
+assert len(ds.to_table()) == 1
+"""
+    assert not modules_after(code) & HEAVY
+
+
+def test_facade_names_what_it_has():
+    import internav_data
+
+    assert set(internav_data.__all__) <= set(dir(internav_data))
+    with pytest.raises(AttributeError, match="no_such_name"):
+        internav_data.no_such_name  # noqa: B018 - the access is the test
