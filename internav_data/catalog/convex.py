@@ -83,11 +83,11 @@ def _cut(path: Path, mesh: Any, most: int) -> list[Floats]:  # noqa: ANN401 - tr
             coacd.Mesh(np.asarray(mesh.vertices), np.asarray(mesh.faces)),
             threshold=_THRESHOLD,
             max_convex_hull=most,
-            preprocess_resolution=30,
-            resolution=1000,
-            mcts_nodes=10,
-            mcts_iterations=40,
-            mcts_max_depth=2,
+            preprocess_resolution=20,
+            resolution=300,
+            mcts_nodes=6,
+            mcts_iterations=6,
+            mcts_max_depth=1,
             seed=_SEED,
         )
     except Exception as error:

@@ -70,8 +70,8 @@ def load_user_assets(directory: Path) -> tuple[Asset, ...]:
         asset = _asset(path, notes[path.name])
         if asset.asset_id in assets:
             raise UsageError(
-                f"{path}: would be named {asset.asset_id!r} as is {assets[asset.asset_id][1].name}; "
-                "rename one of them"
+                f"{path}: would be named {asset.asset_id!r}, as "
+                f"{assets[asset.asset_id][1].name} is; rename one of them"
             )
         assets[asset.asset_id] = (asset, path)
     return tuple(assets[asset_id][0] for asset_id in sorted(assets))

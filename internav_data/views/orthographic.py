@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _CREASE = math.cos(math.radians(50.0))
 """Faces of one part that meet at less than 50 degrees are shaded as one curved surface."""
 _FLOOR_REACH_M = 3.0
-_AMBIENT, _DIFFUSE = 0.56, 0.6
+_AMBIENT, _DIFFUSE = 0.64, 0.52
 _LIGHT_DEG = (-38.0, 57.0)
 """The light's yaw beside the viewer's, and its pitch."""
 _SHADOW = 0.5
@@ -219,7 +219,7 @@ def _shade(
                 value = 1.0 - 0.2 * hidden
             else:
                 direct = facing * (1.0 - (1.0 - left) * hidden)
-                value = ambient * (0.84 + 0.16 * nz) + diffuse * direct
+                value = ambient * (0.9 + 0.1 * nz) + diffuse * direct
             for axis in range(3):
                 out[row, column, axis] = min(255.0, colours[t, axis] * value)
 

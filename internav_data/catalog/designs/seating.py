@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 def chair(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     """Draw a dining chair: legs, seat and back."""
     seat = min(0.46, 0.56 * h)
-    style = dice.pick(("slats", "spindles", "panel", "padded", "shell"))
+    shallow = d < 0.6  # a moulded seat that deep would be a lounger
+    style = dice.pick(("slats", "spindles", "panel", "padded", *(("shell",) if shallow else ())))
     if style == "shell":
         _shell_chair(s, w, d, h, dice)
         return
