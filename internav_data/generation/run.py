@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -109,10 +110,11 @@ def generate(
             raise UsageError(f"{out} is a file: give a folder that is new, empty or a dataset")
         out.mkdir(parents=True, exist_ok=True)
         with locked(out):
+            _forget_idle_work(out)
             work = open_work(out, identity)
             done = _done_before(out, scenes)
             plan = _Plan(config, scenes, tuple(k for k in range(scenes) if k not in done))
-            recipe = Recipe(setup, ScenePayload(config, str(work)))
+            recipe = Recipe(setup, ScenePayload(config, assets, str(work)))
             with Interrupts() as stop, Crew(workers or cores(), recipe, stop) as crew:
                 _make(crew, plan, progress, work)
                 if stop():
@@ -200,37 +202,46 @@ def _make(crew: Crew, plan: _Plan, progress: Progress, work: Path) -> None:
             split = split_of_scene(scene)
             write_quarantine(work, scene, result.reason, split=split, attempts=ATTEMPTS)
         progress.scene(episodes, expected=plan.expected(scene))
-        if progress.quarantined == progress.scenes >= HOPELESS:
-            raise QuarantineError(_hopeless(progress.scenes, result.reason))
+        if not before and progress.quarantined == progress.scenes >= HOPELESS:
+            raise _hopeless(work.parent, progress.scenes, result.reason)
     progress.end()
 
 
 def _assembled(
     out: Path, identity: Identity, assets: Catalogue, scenes: int, progress: Progress
 ) -> Manifest:
-    if has_manifest(out):
+    if has_manifest(out) and not _work_files(out):
         held = read_manifest(out)
         if held.scenes >= scenes:
-            _forget_work(out)
+            shutil.rmtree(work_dir(out))
             return held
-    states = finished_scenes(work_dir(out))
-    if not has_manifest(out) and all(state.quarantined for state in states.values()):
-        reason = next(iter(states.values())).quarantined
-        raise QuarantineError(_hopeless(len(states), reason))
+    if not has_manifest(out):
+        states = finished_scenes(work_dir(out))
+        if all(state.quarantined for state in states.values()):
+            raise _hopeless(out, len(states), next(iter(states.values())).quarantined)
     progress.say(f"writing {scenes} scenes into {out}")
     return assemble(out, identity, tuple(assets.assets.values()), scenes)
 
 
-def _forget_work(out: Path) -> None:
-    """Remove the empty work folder of a run that had nothing to do."""
-    work = work_dir(out)
-    for path in work.iterdir():
-        path.unlink()
-    work.rmdir()
+def _work_files(out: Path) -> bool:
+    """Whether a scene is stored in the work folder, whole or not."""
+    return next((work_dir(out) / "scenes").glob("*/*.work"), None) is not None
 
 
-def _hopeless(count: int, reason: str) -> str:
-    return f"none of {count} scenes could be made: {reason}; nothing was written"
+def _forget_idle_work(out: Path) -> None:
+    """Remove the work folder of a run that ended before its first scene did.
+
+    It would bind the folder to that run's config, which the user may just be mending.
+    """
+    if not has_manifest(out) and work_dir(out).is_dir() and not _work_files(out):
+        shutil.rmtree(work_dir(out))
+
+
+def _hopeless(out: Path, count: int, reason: str) -> QuarantineError:
+    """Return the error for a config that no scene can be made by; its work is forgotten."""
+    if not has_manifest(out):
+        shutil.rmtree(work_dir(out))
+    return QuarantineError(f"none of {count} scenes could be made: {reason}; nothing was written")
 
 
 def _interruption(out: Path, progress: Progress) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -33,6 +34,8 @@ class ScenePayload:
     """What a worker needs to make scenes and store them."""
 
     config: GenerationConfig
+    assets: Catalogue
+    """Built once, by the parent: a user's own meshes take a while to cut into parts."""
     work: str
     """Folder of unfinished work."""
 
@@ -76,11 +79,10 @@ def obstacle_pool(catalogue: Catalogue, config: GenerationConfig, split: Split) 
 
 def scene_maker(payload: ScenePayload) -> Callable[[int], int]:
     """Set a worker up: return what makes and stores a scene and says how many episodes it has."""
-    from internav_data.catalog import catalogue  # noqa: PLC0415 - workers only
     from internav_data.dataset.work import write_scene_work  # noqa: PLC0415 - workers only
 
-    config, work = payload.config, Path(payload.work)
-    assets = catalogue(asset_folders(config))
+    config, assets, work = payload.config, payload.assets, Path(payload.work)
+    gc.freeze()  # the catalogue stays: no collection need look at it again
 
     def make(scene: int) -> int:
         built = build_scene(scene, config, assets)

@@ -75,11 +75,15 @@ def killed(out, signum, scenes=60):
     (out.parent / "stub.json").write_text(json.dumps({"seconds": 0.05}))
     script = Path(__file__).with_name("run_stub.py")
     process = subprocess.Popen([sys.executable, script, out, str(scenes), "2"])
-    deadline = time.monotonic() + 30
+    deadline = time.monotonic() + 60
     while len(list(out.rglob("scene-*.work"))) < 5 and time.monotonic() < deadline:
         time.sleep(0.02)
     process.send_signal(signum)
-    return process.wait(timeout=20)
+    code = process.wait(timeout=60)
+    before = None
+    while before != (before := contents(out)):
+        time.sleep(0.3)  # workers whose parent was killed end the scene they are at
+    return code
 
 
 @pytest.mark.parametrize("signum", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
@@ -87,7 +91,6 @@ def test_what_is_done_stays_after_a_kill(tmp_path, signum):
     out = tmp_path / "d"
     code = killed(out, signum)
     assert code == (-signal.SIGKILL if signum == signal.SIGKILL else 128 + signum)
-    time.sleep(0.3)  # workers whose parent was killed may still end their scene
     finished = {int(path.stem[-6:]) for path in out.rglob("scene-*.work")}
     assert 5 <= len(finished) < 60
     assert not (out / "manifest.json").exists()
@@ -178,3 +181,18 @@ def test_counts_that_cannot_be_meant(tmp_path, scenes, workers):
     with pytest.raises(UsageError):
         made(tmp_path / "d", scenes, workers=workers)
     assert not (tmp_path / "d").exists()
+
+
+def test_a_config_that_never_worked_does_not_bind_the_folder(tmp_path):
+    out = tmp_path / "d"
+    with pytest.raises(QuarantineError):
+        made(out, 3, hopeless=True)
+    other = load_config(overrides=["episodes_per_scene=2"])
+    assert made(out, 3, config=other).scenes == 3
+
+
+def test_a_run_killed_before_its_first_scene_does_not_bind_the_folder(tmp_path):
+    out = tmp_path / "d"
+    (out / ".work").mkdir(parents=True)
+    (out / ".work" / "identity.json").write_text('{"of": "another"}')
+    assert made(out, 3).scenes == 3
