@@ -7,6 +7,7 @@ repetitions and roundings as real data, but nothing that was simulated.
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -72,7 +73,7 @@ def catalogue() -> tuple[Asset, ...]:
     )
 
 
-def _point(rng: np.random.Generator, scale: float, dimensions: int) -> Any:
+def _point(rng: np.random.Generator, scale: float, dimensions: int) -> Any:  # noqa: ANN401 - a tuple of so many
     return tuple(round(float(v), 4) for v in rng.uniform(0, scale, dimensions))
 
 
@@ -107,7 +108,9 @@ def _house(scene: int, rng: np.random.Generator, assets: tuple[Asset, ...]) -> H
                     (cells[b][0], cells[b][1] + along) if dx else (cells[b][0] + along, cells[b][1])
                 )
                 doors.append(
-                    Door(len(doors), (a, b), "single", x, y, 90.0 if dx else 0.0, 1.0, 2.1, True)
+                    Door(
+                        len(doors), (a, b), "single", x, y, 90.0 if dx else 0.0, 1.0, 2.1, open=True
+                    )
                 )
     things = tuple(
         _thing(n, int(rng.integers(count)), rng, assets[int(rng.integers(len(assets)))])
@@ -176,7 +179,7 @@ def _episode(
     doors = {door.rooms: door for door in house.doors}
     node_paths = []
     for path in paths:
-        through = [doors[min(p, q), max(p, q)] for p, q in zip(path, path[1:], strict=False)]
+        through = [doors[min(p, q), max(p, q)] for p, q in pairwise(path)]
         points = ((i / 4, j / 4), *((d.x, d.y) for d in through), (k / 4, l / 4))
         node_paths.append(NodePath(tuple(d.door_id for d in through), points))
     mode = "blocked" if (house.scene + index) % 2 == 0 else "lengthened"
@@ -230,7 +233,7 @@ def _obstacle(rng: np.random.Generator, asset: Asset, full: bool) -> Obstacle:
             round(float(rng.uniform(0, 1)), 4),
             int(rng.integers(8, 90)),
             round(float(rng.uniform(2, 20)), 4),
-            False,
+            bool(rng.random() < 0.1),
             round(int(rng.integers(100, 900)) / 240, 6),
             "",
         )

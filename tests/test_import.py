@@ -55,7 +55,8 @@ assert list(ds) == list(ds.iterable()) == [ds[0]]
 assert ds.scene(ds[0].scene_id).assets
 assert len(ds.to_table()) == 1
 """
-    assert not modules_after(code) & HEAVY
+    # pyarrow imports pandas by itself where that is installed.
+    assert not modules_after(code) & (HEAVY - {"pandas"})
 
 
 def test_facade_names_what_it_has():

@@ -76,9 +76,7 @@ def matching_rows(root: Path, files: Sequence[DataFile], filters: Filters) -> ND
     """
     names = _names(filters)
     table = read_columns(root, files, EPISODES, names)
-    # Not pa.array, which imports pandas where that is installed: half a second.
-    buffer = pa.py_buffer(np.arange(table.num_rows, dtype=np.int64))
-    rows = pa.Int64Array.from_buffers(pa.int64(), table.num_rows, [None, buffer])
+    rows = pa.array(np.arange(table.num_rows))
     try:
         expression = pq.filters_to_expression(_plain(filters))
         kept = table.append_column("row number", rows).filter(expression)
@@ -107,7 +105,5 @@ def _names(filters: Filters) -> list[str]:
     scalar = {f.name for f in EPISODES.node.fields if isinstance(f.node, Leaf)}
     for name in names:
         if name not in scalar:
-            raise UsageError(
-                f"filters: {name} is a nested column: filter on one of {sorted(scalar)}"
-            )
+            raise UsageError(f"filters: {name} is nested: expected one of {sorted(scalar)}")
     return sorted(set(names))

@@ -112,7 +112,7 @@ def test_a_choice_of_conditions(ds, everything):
     ],
 )
 def test_impossible_filters_say_what_is_expected(ds, filters):
-    with pytest.raises(UsageError, match="expected|did you mean"):
+    with pytest.raises(UsageError, match=r"expected|did you mean"):
         load_dataset(ds.path, filters=filters)
 
 

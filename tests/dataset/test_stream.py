@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 from collections import Counter
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -30,7 +31,7 @@ def test_shares_are_exact(count, members):
     bounds = [share(count, k, members) for k in range(members)]
     assert bounds[0][0] == 0
     assert bounds[-1][1] == count
-    assert all(a[1] == b[0] for a, b in zip(bounds, bounds[1:], strict=False))
+    assert all(a[1] == b[0] for a, b in pairwise(bounds))
     sizes = {stop - start for start, stop in bounds}
     assert max(sizes) - min(sizes) <= 1
 
@@ -129,7 +130,7 @@ def test_state_of_another_dataset_or_share_is_refused(ds, dataset_folder):
     ],
 )
 def test_impossible_shares_are_refused(ds, arguments):
-    with pytest.raises(UsageError, match="rank|worker"):
+    with pytest.raises(UsageError, match=r"rank|worker"):
         ds.iterable(**arguments)
 
 
