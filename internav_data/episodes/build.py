@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from internav_data.episodes.config import EpisodeConfig
 from internav_data.episodes.site import Site
 from internav_data.episodes.spawn import Way, spawn, steps_between
@@ -31,7 +33,7 @@ if TYPE_CHECKING:
     from internav_data.records import Asset, House
 
 PAIRS = 64
-"""Pairs of nodes drawn for one start and goal; most are far enough apart and in two rooms."""
+"""Pairs of nodes drawn for one start and goal; most are far enough apart."""
 QUARTER_TURNS = (0, 90, 180, 270)
 
 
@@ -100,15 +102,20 @@ def _build_episode(
 
 
 def _draw_way(site: Site, mode: Mode, config: EpisodeConfig, rng: Generator) -> Way | None:
-    """Draw a start and a goal, in two rooms where there are two; None if all are too close."""
-    one_room = len(site.house.rooms) == 1
-    pairs = rng.integers(max(1, len(site.nodes)), size=(PAIRS, 2)) if len(site.nodes) else []
-    for first, second in pairs:
-        if (site.rooms[first] == site.rooms[second]) != one_room:
-            continue
+    """Draw a start and a goal, in two rooms where there are two; None if all are too close.
+
+    Rooms first, then a node in each: were nodes drawn at once, large rooms would be in most pairs
+    and long room paths rare.
+    """
+    rooms = np.unique(site.rooms)
+    if len(rooms) < min(2, len(site.house.rooms)):
+        return None
+    for _ in range(PAIRS):
+        chosen = rng.choice(rooms, size=2, replace=len(rooms) == 1)
+        first, second = (int(rng.choice(np.flatnonzero(site.rooms == room))) for room in chosen)
         clear_m = site.ways.distance(_point(_node(site, first)), _point(_node(site, second)))
         if clear_m is not None and round_m(clear_m) >= config.least_clear_m:
-            return _begin(site, mode, config, int(first), int(second), round_m(clear_m))
+            return _begin(site, mode, config, first, second, round_m(clear_m))
     return None
 
 

@@ -221,29 +221,42 @@ def house_footprints(house: House) -> Polygons:
 
 
 @njit(cache=True)
+def _bounds(vertices: Floats, offsets: Ints) -> Floats:
+    """Lowest x, y and highest x, y of each polygon, shape (polygons, 4)."""
+    boxes = np.empty((len(offsets) - 1, 4))
+    for polygon in range(len(boxes)):
+        boxes[polygon, :2] = vertices[offsets[polygon]]
+        boxes[polygon, 2:] = vertices[offsets[polygon]]
+        for k in range(offsets[polygon] + 1, offsets[polygon + 1]):
+            x, y = vertices[k, 0], vertices[k, 1]
+            boxes[polygon, 0] = min(boxes[polygon, 0], x)
+            boxes[polygon, 1] = min(boxes[polygon, 1], y)
+            boxes[polygon, 2] = max(boxes[polygon, 2], x)
+            boxes[polygon, 3] = max(boxes[polygon, 3], y)
+    return boxes
+
+
+@njit(cache=True)
 def _clearance(first: Floats, starts: Ints, second: Floats, begins: Ints, stop_at: float) -> float:
-    best = np.inf
-    for a in range(len(starts) - 1):
-        low_x = first[starts[a] : starts[a + 1], 0].min()
-        high_x = first[starts[a] : starts[a + 1], 0].max()
-        low_y = first[starts[a] : starts[a + 1], 1].min()
-        high_y = first[starts[a] : starts[a + 1], 1].max()
-        for b in range(len(begins) - 1):
-            gap_x = max(
-                second[begins[b] : begins[b + 1], 0].min() - high_x,
-                low_x - second[begins[b] : begins[b + 1], 0].max(),
+    best = stop_at
+    ours, theirs = _bounds(first, starts), _bounds(second, begins)
+    for b in range(len(theirs)):
+        for a in range(len(ours)):
+            # A gap between bounding boxes is a lower bound, and nearly always large enough.
+            gap = max(
+                theirs[b, 0] - ours[a, 2],
+                ours[a, 0] - theirs[b, 2],
+                theirs[b, 1] - ours[a, 3],
+                ours[a, 1] - theirs[b, 3],
             )
-            gap_y = max(
-                second[begins[b] : begins[b + 1], 1].min() - high_y,
-                low_y - second[begins[b] : begins[b + 1], 1].max(),
-            )
-            if max(gap_x, gap_y) >= min(best, stop_at):
-                continue
-            best = min(
-                best,
-                polygon_distance(first, starts[a], starts[a + 1], second, begins[b], begins[b + 1]),
-            )
-    return min(best, stop_at)
+            if gap < best:
+                best = min(
+                    best,
+                    polygon_distance(
+                        first, starts[a], starts[a + 1], second, begins[b], begins[b + 1]
+                    ),
+                )
+    return best
 
 
 def clearance(first: Polygons, second: Polygons, stop_at: float = 1e6) -> float:

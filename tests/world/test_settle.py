@@ -24,7 +24,9 @@ def asset(name, parts, mass_kg=10.0):
 
 def chair():
     legs = [
-        part("cylinder", (x, y, 0.215), (0.05, 0.05, 0.43)) for x in (-0.2, 0.2) for y in (-0.2, 0.2)
+        part("cylinder", (x, y, 0.215), (0.05, 0.05, 0.43))
+        for x in (-0.2, 0.2)
+        for y in (-0.2, 0.2)
     ]
     seat = part("box", (0.0, 0.0, 0.45), (0.5, 0.5, 0.04))
     back = part("box", (0.0, 0.24, 0.68), (0.5, 0.02, 0.42))

@@ -1,0 +1,215 @@
+"""Episodes are pure functions of house, index and attempt, and mean what they say."""
+
+import itertools
+import math
+import subprocess
+import sys
+
+import networkx as nx
+import pytest
+import shapely
+
+from internav_data.catalog import catalogue
+from internav_data.episodes import EpisodeConfig, build_episodes, mode_of
+from internav_data.episodes.spawn import NEAR_M
+from internav_data.geometry import asset_corners, footprint, house_footprints, transform
+from internav_data.houses import HouseConfig, build_house
+from internav_data.records import Pose
+from internav_data.records.errors import QuarantineError, UsageError
+from internav_data.world import Body, Setting, engine_of_this_process, wall_body
+from internav_data.world.setting import UPRIGHT
+
+SCENES = (0, 1, 6)
+
+
+@pytest.fixture(scope="module")
+def pool():
+    return catalogue().spawnable
+
+
+@pytest.fixture(scope="module")
+def houses():
+    return {scene: build_house(0, scene, HouseConfig(), catalogue()) for scene in SCENES}
+
+
+@pytest.fixture(scope="module")
+def episodes(houses, pool):
+    return {scene: build_episodes(house, 6, pool) for scene, house in houses.items()}
+
+
+def everything(house, episode):
+    """Each footprint polygon of a scene, by shapely."""
+    assets = {**house.assets, **catalogue().assets}
+    groups = [house_footprints(house)]
+    groups += [footprint(assets[o.asset_id], o.pose) for o in episode.obstacles]
+    return [[shapely.Polygon(p) for p in group] for group in groups]
+
+
+def steps_by_networkx(house, polygons, start, goal):
+    """Lattice distance by shapely distances and networkx, plainly."""
+    tree = shapely.STRtree(polygons)
+    outline = shapely.Polygon(house.outline)
+    wide, deep = (max(c[k] for c in house.outline) for k in (0, 1))
+
+    def free(shape):
+        near = tree.query(shape.buffer(0.2))
+        return all(shape.distance(polygons[k]) >= 0.2 - 1e-6 for k in near)
+
+    nodes = {
+        (i, j)
+        for i, j in itertools.product(range(int(wide / 0.25) + 1), range(int(deep / 0.25) + 1))
+        if outline.contains(shapely.Point(0.25 * i, 0.25 * j))
+        and free(shapely.Point(0.25 * i, 0.25 * j))
+    }
+    graph = nx.Graph()
+    graph.add_nodes_from(nodes)
+    for i, j in nodes:
+        for other in ((i + 1, j), (i, j + 1)):
+            line = shapely.LineString([(0.25 * i, 0.25 * j), (0.25 * other[0], 0.25 * other[1])])
+            if other in nodes and free(line):
+                graph.add_edge((i, j), other)
+    try:
+        return nx.shortest_path_length(graph, start, goal)
+    except nx.NetworkXNoPath:
+        return None
+
+
+def test_modes_take_turns_and_hold(episodes):
+    for scene, batch in episodes.items():
+        for episode in batch:
+            assert episode.mode == mode_of(scene, episode.index)
+            if episode.mode == "blocked":
+                assert episode.steps is None
+            else:
+                assert episode.steps > episode.clear_steps
+                assert not episode.sealed
+            assert episode.sealed == (episode.way_m is None)
+
+
+def test_steps_are_those_of_networkx_and_shapely(houses, episodes):
+    for scene in (0, 1):
+        house = houses[scene]
+        for episode in episodes[scene][:2]:
+            start, goal = (episode.start.i, episode.start.j), (episode.goal.i, episode.goal.j)
+            still, *obstacles = everything(house, episode)
+            assert steps_by_networkx(house, still, start, goal) == episode.clear_steps
+            crowded = [*still, *itertools.chain(*obstacles)]
+            assert steps_by_networkx(house, crowded, start, goal) == episode.steps
+
+
+def test_the_last_obstacle_is_what_made_the_difference(houses, episodes):
+    # Spawning stops as soon as the condition holds: without the last one it must not.
+    house = houses[0]
+    for episode in episodes[0][:3]:
+        start, goal = (episode.start.i, episode.start.j), (episode.goal.i, episode.goal.j)
+        still, *obstacles = everything(house, episode)
+        before = [*still, *itertools.chain(*obstacles[:-1])]
+        steps = steps_by_networkx(house, before, start, goal)
+        assert steps is not None
+        if episode.mode == "lengthened":
+            assert steps == episode.clear_steps
+
+
+def test_obstacles_touch_nothing(houses, episodes):
+    for scene, batch in episodes.items():
+        for episode in batch:
+            for first, second in itertools.combinations(everything(houses[scene], episode), 2):
+                assert shapely.unary_union(first).distance(shapely.unary_union(second)) > 0.0
+
+
+def test_start_and_goal_are_apart_and_in_two_rooms(houses, episodes):
+    for scene, batch in episodes.items():
+        for episode in batch:
+            rooms = {r.room_id: shapely.Polygon(r.polygon) for r in houses[scene].rooms}
+            for place in (episode.start, episode.goal):
+                assert rooms[place.room].covers(shapely.Point(place.x, place.y))
+                assert (place.x, place.y) == (0.25 * place.i, 0.25 * place.j)
+            assert episode.clear_m >= 2.0
+            assert (episode.start.room == episode.goal.room) == (episode.room_count == 1)
+            assert (
+                episode.clear_m
+                >= math.dist((episode.start.x, episode.start.y), (episode.goal.x, episode.goal.y))
+                - 1e-4
+            )
+
+
+def test_an_episode_does_not_depend_on_its_neighbours(houses, episodes, pool):
+    alone = build_episodes(houses[1], 1, pool, first=4)
+    assert alone == (episodes[1][4],)
+
+
+def test_attempts_differ(houses, episodes, pool):
+    again = build_episodes(houses[0], 1, pool, attempt=1)
+    assert again[0] != episodes[0][0]
+
+
+def test_same_episode_in_a_fresh_process(episodes):
+    script = (
+        "from internav_data.catalog import catalogue\n"
+        "from internav_data.houses import build_house, HouseConfig\n"
+        "from internav_data.episodes import build_episodes\n"
+        "house = build_house(0, 6, HouseConfig(), catalogue())\n"
+        "print(repr(build_episodes(house, 1, catalogue().spawnable, first=2)[0]))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], check=True, capture_output=True, text=True
+    )
+    assert done.stdout.strip() == repr(episodes[6][2])
+
+
+def test_obstacles_stay_at_rest_in_a_whole_scene_of_bullet(houses, episodes):
+    # The generator lets each thing fall as if alone; here each falls among all that is near it.
+    engine = engine_of_this_process()
+    assets = {**houses[1].assets, **catalogue().assets}
+    for episode in episodes[1][:4]:
+        for k, obstacle in enumerate(episode.obstacles):
+            here = shapely.union_all(
+                [shapely.Polygon(p) for p in footprint(assets[obstacle.asset_id], obstacle.pose)]
+            )
+            others = [o for j, o in enumerate(episode.obstacles) if j != k]
+            things = [t for t in houses[1].things if assets[t.asset_id].blocks]
+            near = [
+                Body(assets[t.asset_id], t.pose, moves=False)
+                for t in (*things, *others)
+                if shapely.union_all(
+                    [shapely.Polygon(p) for p in footprint(assets[t.asset_id], t.pose)]
+                ).distance(here)
+                < NEAR_M
+            ]
+            walls = [wall_body(w) for w in houses[1].walls]
+            lifted = Pose(obstacle.x, obstacle.y, obstacle.z + 0.005, obstacle.quaternion)
+            body = Body(assets[obstacle.asset_id], lifted, moves=True)
+            rest = engine.settle(Setting((body, *near, *walls)))
+            assert rest.at_rest
+            assert (
+                math.dist(
+                    (rest.pose.x, rest.pose.y, rest.pose.z), (obstacle.x, obstacle.y, obstacle.z)
+                )
+                < 0.005
+            )
+            corners, _ = asset_corners(assets[obstacle.asset_id])
+            assert transform(corners, rest.pose)[:, 2].min() > -0.002
+
+
+def test_an_impossible_episode_is_quarantined_and_named(houses, pool):
+    config = EpisodeConfig(redraws=2, least_clear_m=1000.0)
+    with pytest.raises(QuarantineError, match=r"scene-000006, episode 0: .*blocked in 2 draws"):
+        build_episodes(houses[6], 1, pool, config)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("spots", 0), ("redraws", -1), ("gap_m", -0.1), ("least_clear_m", 0.0), ("sideways_m", -1.0)],
+)
+def test_settings_that_cannot_be_meant_are_refused(field, value):
+    with pytest.raises(UsageError, match=f"episodes.{field}: expected .* got {value}"):
+        EpisodeConfig(**{field: value}).check()
+
+
+def test_all_spawnable_assets_settle(pool):
+    engine = engine_of_this_process()
+    for asset in pool[::7]:
+        rest = engine.settle(Setting((Body(asset, Pose(0.0, 0.0, 0.01, UPRIGHT), moves=True),)))
+        assert rest.at_rest, asset.asset_id
+        assert math.hypot(rest.pose.x, rest.pose.y) < 0.05, asset.asset_id
+        assert rest.penetration_m <= 0.002, asset.asset_id
