@@ -8,7 +8,7 @@ import numpy as np
 
 from internav_data.episodes.config import EpisodeConfig
 from internav_data.episodes.site import Site
-from internav_data.episodes.spawn import Way, spawn, steps_between
+from internav_data.episodes.spawn import Way, spawn
 from internav_data.geometry import Polygons, round_m
 from internav_data.navigation import SPACING_M, node_paths
 from internav_data.records import (
@@ -125,7 +125,7 @@ def _begin(
     """Gather what is known about a start and a goal before anything is spawned."""
     start, goal = _node(site, first), _node(site, second)
     here, there = _point(start), _point(goal)
-    clear_steps = steps_between(site.lattice, start, goal)
+    clear_steps = site.lattice.distance(start, goal)
     if clear_steps is None:
         return None
     rooms, cut = site.room_paths(int(site.rooms[first]), int(site.rooms[second]))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from internav_data.geometry import Polygons, house_footprints
-from internav_data.navigation import Lattice, WayFinder, room_of, room_paths
+from internav_data.navigation import SPACING_M, Lattice, WayFinder, room_paths, rooms_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -42,14 +42,13 @@ class Site:
         components = lattice.components()
         sizes = np.bincount(components[components >= 0].ravel(), minlength=1)
         nodes = np.argwhere(components == int(np.argmax(sizes)))
-        rooms = [room_of(house, 0.25 * int(i), 0.25 * int(j)) for i, j in nodes]
         return Site(
             house=house,
             footprints=house_footprints(house),
             lattice=lattice,
             ways=WayFinder.of(house),
             nodes=nodes.astype(np.int64),
-            rooms=np.array(rooms, dtype=np.int64),
+            rooms=rooms_of(house, SPACING_M * nodes),
         )
 
     def way_between(self, first: Vec2, second: Vec2) -> tuple[Vec2, ...]:

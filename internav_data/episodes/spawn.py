@@ -160,19 +160,13 @@ def _place(way: Way, spawned: Spawned) -> None:
     """Keep an obstacle unless it stands over start or goal or cuts a way to be lengthened."""
     handle = way.lattice.add(spawned.footprint)
     free = way.lattice.free
-    steps = steps_between(way.lattice, way.start, way.goal)
+    steps = way.lattice.distance(way.start, way.goal)
     cuts = steps is None and way.mode == "lengthened"
     if not free[way.start] or not free[way.goal] or cuts:
         way.lattice.remove(handle)
         return
     way.obstacles.append(spawned)
     way.steps = steps
-
-
-def steps_between(lattice: Lattice, start: tuple[int, int], goal: tuple[int, int]) -> int | None:
-    """Lattice distance between two nodes; None when cut off."""
-    steps = int(lattice.distances(*goal)[start])
-    return None if steps < 0 else steps
 
 
 def _near(way: Way, here: Polygons) -> list[Body]:
