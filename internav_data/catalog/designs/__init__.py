@@ -8,7 +8,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from internav_data.catalog.designs import food, machines, rooms, seating, small, storage, tables
+from internav_data.catalog.designs import (
+    food,
+    machines,
+    rooms,
+    seating,
+    small,
+    soft,
+    storage,
+    tables,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -20,7 +29,7 @@ if TYPE_CHECKING:
 
 DESIGNS: Mapping[str, Design] = {
     "ArmChair": seating.arm_chair,
-    "DogBed": small.dog_bed,
+    "DogBed": soft.dog_bed,
     "Box": small.box,
     "Chair": seating.chair,
     "Desk": tables.desk,
@@ -29,7 +38,7 @@ DESIGNS: Mapping[str, Design] = {
     "Sofa": seating.sofa,
     "Stool": seating.stool,
     "Television": machines.television,
-    "Pillow": small.pillow,
+    "Pillow": soft.pillow,
     "Bread": food.bread,
     "Apple": food.apple,
     "AlarmClock": small.alarm_clock,
@@ -39,7 +48,7 @@ DESIGNS: Mapping[str, Design] = {
     "Microwave": machines.microwave,
     "Pot": small.pot,
     "Tomato": food.tomato,
-    "Bed": storage.bed,
+    "Bed": soft.bed,
     "CoffeeTable": tables.coffee_table,
     "Dresser": storage.dresser,
     "TVStand": storage.tv_stand,

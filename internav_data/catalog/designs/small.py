@@ -1,8 +1,7 @@
-"""Small household things: boxes, pillows, clocks, laptops, pots, bins, dog beds."""
+"""Small household things: boxes, clocks, laptops, pots, bins."""
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from internav_data.catalog.dice import BLACK, BRASS, IRON, LINEN, PAPER, SCREEN, STEEL, WHITE
@@ -49,40 +48,6 @@ def box(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
 
 def _span(a: float, b: float) -> tuple[float, float]:
     return (a, b) if a < b else (b, a)
-
-
-def pillow(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
-    """Draw a stuffed pillow: pointed corners, a full middle, perhaps a stripe."""
-    cloth, x, y = dice.pick((dice.fabric(), dice.fabric(), LINEN)), w / 2, d / 2
-
-    def body(grow: float, half_x: float) -> list[tuple[float, float, float]]:
-        corners = [(a * half_x, b * y, 0.5 * h) for a in (-1, 1) for b in (-1, 1)]
-        for share, z in ((0.5, 0.0), (0.78, 0.2), (0.78, 0.8), (0.5, 1.0)):
-            reach = min(half_x, share * x + (half_x < x) * x)
-            corners += [
-                (a * reach, b * share * y * 1.04, h * (0.5 + (z - 0.5) * grow))
-                for a in (-1, 1)
-                for b in (-1, 1)
-            ]
-        return corners
-
-    s.hull(body(1.0, x), cloth)
-    if dice.chance(0.5):
-        s.hull(
-            [
-                (a * 0.16 * x, b * share * y, h * z)
-                for a in (-1, 1)
-                for b in (-1, 1)
-                for share, z in (
-                    (0.53, -0.004),
-                    (0.84, 0.2),
-                    (0.96, 0.5),
-                    (0.84, 0.8),
-                    (0.53, 1.004),
-                )
-            ],
-            dice.fabric() if dice.chance(0.5) else cloth.shade(0.8),
-        )
 
 
 def alarm_clock(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
@@ -296,29 +261,3 @@ def garbage_can(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     for side in (-1, 1):
         s.box((-x, x), _span(side * (y + 0.003), side * (y - t)), (0.93 * h, h + 0.002), bag)
         s.box(_span(side * (x + 0.003), side * (x - t)), (-y, y), (0.93 * h, h + 0.002), bag)
-
-
-def dog_bed(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
-    """Draw a dog's bed: a cushion within a soft rim, lower in front."""
-    rim, x, y = dice.fabric(), w / 2, d / 2
-    t = 0.15 * min(w, d)
-    if dice.chance(0.5):
-        for k in range(8):
-            a, b = (math.radians(22.5 + 45 * (k + j)) for j in (0, 1))
-            high = h if math.sin((a + b) / 2) > -0.5 else 0.72 * h
-            corners = []
-            for turn in (a, b):
-                c, sn = math.cos(turn) / 0.924, math.sin(turn) / 0.924
-                for r, z in ((0.97, 0.0), (1.0, 0.45), (0.92, 1.0), (0.74, 1.0), (0.66, 0.0)):
-                    corners.append((c * r * x, sn * r * y, z * high))
-            s.hull(corners, rim)
-        s.layers(
-            (ring(0, 0, 0, 0.8 * x, 0.8 * y, 12), ring(0, 0, 0.5 * h, 0.74 * x, 0.74 * y, 12)),
-            LINEN,
-        )
-        return
-    s.cushion((-x + 0.7 * t, x - 0.7 * t), (-y + 0.5 * t, y - 0.7 * t), (0, 0.55 * h), LINEN, 0.3)
-    s.cushion((-x, x), (y - t, y), (0, h), rim, 0.35)
-    s.cushion((-x, -x + t), (-y, y), (0, h), rim, 0.35)
-    s.cushion((x - t, x), (-y, y), (0, h), rim, 0.35)
-    s.cushion((-x + 0.6 * t, x - 0.6 * t), (-y, -y + 0.8 * t), (0, 0.66 * h), rim.shade(0.95), 0.35)

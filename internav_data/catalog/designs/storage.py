@@ -1,11 +1,11 @@
-"""Cupboards, shelves, beds and other wooden furniture."""
+"""Cupboards, shelves and other wooden furniture."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from internav_data.catalog.designs.tables import drawers
-from internav_data.catalog.dice import BLACK, BRASS, CHROME, IRON, LINEN, STEEL, WHITE
+from internav_data.catalog.dice import BLACK, BRASS, CHROME, IRON, STEEL
 from internav_data.catalog.shapes import Paint
 
 if TYPE_CHECKING:
@@ -34,24 +34,6 @@ def doors(s: Sketch, x: Span, front: float, z: Span, leaves: int, paint: Paint) 
             (middle - half, middle + half),
             STEEL,
         )
-
-
-def bed(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
-    """Draw a bed, its head at +y: frame, mattress, duvet, pillows."""
-    x, y = w / 2, d / 2
-    wood, cloth = dice.wood(), dice.fabric()
-    head = dice.pick((wood, wood, dice.fabric()))
-    s.box((-x, x), (y - 0.06, y), (0, h), head)
-    s.box((-x, x), (-y, y - 0.05), (0.12, 0.3), wood)
-    s.legs((-x + 0.02, x - 0.02), (-y + 0.02, y - 0.08), (0, 0.12), 0.035, wood.shade(0.85))
-    s.cushion((-x + 0.02, x - 0.02), (-y + 0.03, y - 0.06), (0.28, 0.5), LINEN, 0.2)
-    s.cushion((-x + 0.002, x - 0.002), (-y + 0.01, y - 0.75), (0.32, 0.545), cloth, 0.2)
-    s.cushion((-x + 0.004, x - 0.004), (y - 0.9, y - 0.62), (0.34, 0.56), cloth.shade(1.18), 0.25)
-    count = 1 if w < 1.2 else 2
-    wide = (w - 0.1) / count
-    for k in range(count):
-        left = -x + 0.05 + k * wide
-        s.cushion((left + 0.02, left + wide - 0.02), (y - 0.5, y - 0.1), (0.48, 0.62), WHITE, 0.4)
 
 
 def _carcass(s: Sketch, size: tuple[float, float, float], wood: Paint, foot: float) -> None:
