@@ -48,7 +48,7 @@ class Site:
             lattice=lattice,
             ways=WayFinder.of(house),
             nodes=nodes.astype(np.int64),
-            rooms=rooms_of(house, SPACING_M * nodes),
+            rooms=rooms_of(house, SPACING_M * nodes.astype(np.float64)),
         )
 
     def way_between(self, first: Vec2, second: Vec2) -> tuple[Vec2, ...]:
