@@ -150,28 +150,31 @@ def _ensuite(
 
 
 def door_tree(
-    types: Sequence[str], edges: Sequence[tuple[int, int]], rng: Generator
+    types: Sequence[str],
+    edges: Sequence[tuple[int, int]],
+    rng: Generator,
+    whim: float = 0.6,
 ) -> tuple[list[tuple[int, int]], float] | None:
     """Join all rooms by the least unusual doors (Kruskal); None where they cannot be joined.
 
-    Returns the doors and their summed cost.
+    `whim` is how much of a door's cost is chance. Returns the doors and their summed cost.
     """
     ensuite = _ensuite(types, edges, rng)
     weighted = []
     for a, b in edges:
-        cost = door_cost(types[a], types[b]) + 0.6 * float(rng.random())
+        cost = door_cost(types[a], types[b]) + whim * float(rng.random())
         if ensuite is not None and ensuite[0] in {a, b} and set(ensuite) != {a, b}:
             cost += 40.0
         weighted.append((cost, a, b))
     group = list(range(len(types)))
     chosen: list[tuple[int, int]] = []
     total = 0.0
-    for cost, a, b in sorted(weighted):
+    for _, a, b in sorted(weighted):
         if group[a] != group[b]:
             old, new = group[a], group[b]
             group = [new if g == old else g for g in group]
             chosen.append((a, b))
-            total += cost
+            total += door_cost(types[a], types[b])
     if len(chosen) != len(types) - 1:
         return None
     return chosen, total

@@ -34,6 +34,10 @@ LEAST_DOOR_CM = {"paper": 100, "realistic": 80}
 """A wall between two rooms counts as shared when a door of this width fits."""
 PATIENCE = 8
 """How many times `candidates` may be drawn while none of them keeps the standards."""
+WHIMS = (0.6, 2.0, 4.0, 4.0, 4.0)
+"""How much chance there is in each of the door trees that a plan is tried with."""
+DEPTH_WEIGHT = 10.0
+"""What one room more or less on the way than asked for costs."""
 LEAST_JOG_CM = 50
 """Parallel walls nearer than this, side by side or end to end, are no architecture."""
 DAYLIGHT_CM = 130
@@ -105,11 +109,57 @@ def _through_private(types: Sequence[str], tree: Sequence[tuple[int, int]]) -> f
     return score
 
 
+def _rooms_on_way(plan: Plan, tree: Sequence[tuple[int, int]]) -> float:
+    """Mean number of rooms between points in two different rooms, by area, along the tree."""
+    count = len(tree) + 1
+    joined: list[list[int]] = [[] for _ in range(count)]
+    for a, b in tree:
+        joined[a].append(b)
+        joined[b].append(a)
+    areas = [float(plan.area_cm2(room)) for room in range(count)]
+    total = weights = 0.0
+    for start in range(count):
+        seen, ring, steps = {start}, [start], 1
+        while ring:
+            ring = [n for m in ring for n in joined[m] if n not in seen]
+            seen.update(ring)
+            steps += 1
+            weight = areas[start] * sum(areas[n] for n in ring)
+            weights += weight
+            total += weight * steps
+    return total / weights
+
+
+def _best_tree(
+    plan: Plan,
+    types: Sequence[str],
+    edges: Sequence[tuple[int, int]],
+    rng: Generator,
+    rooms_on_way: float | None,
+) -> tuple[list[tuple[int, int]], float] | None:
+    """Choose doors that reach all rooms: as usual as can be, and as deep as was asked for."""
+    best: tuple[list[tuple[int, int]], float] | None = None
+    for whim in (0.6,) if rooms_on_way is None else WHIMS:
+        found = door_tree(types, edges, rng, whim)
+        if found is None:
+            return None
+        tree, cost = found
+        score = 0.25 * cost + _through_private(types, tree)
+        if rooms_on_way is not None:
+            score += DEPTH_WEIGHT * abs(_rooms_on_way(plan, tree) - rooms_on_way)
+        if best is None or score < best[1]:
+            best = (tree, score)
+    return best
+
+
 def judged(
-    layout_plan: Plan, specs: Sequence[RoomSpec], least_door_cm: int, rng: Generator
+    plan: Plan,
+    specs: Sequence[RoomSpec],
+    least_door_cm: int,
+    rng: Generator,
+    rooms_on_way: float | None = None,
 ) -> FloorPlan | None:
     """Score a plan; None where a room breaks its standard or cannot be reached."""
-    plan = layout_plan
     types = tuple(spec.type for spec in specs)
     if len(plan.cells) != len(specs):
         return None
@@ -120,11 +170,15 @@ def judged(
             return None
         score += room_score
     edges = sorted(possible_doors(plan, least_door_cm))
-    found = door_tree(types, edges, rng)
-    if found is None or _jogs(plan) or not _drawable(plan, len(specs)):
+    if _jogs(plan) or not _drawable(plan, len(specs)):
         return None
-    tree, cost = found
-    score += 0.25 * cost + _through_private(types, tree)
+    found = _best_tree(plan, types, edges, rng, rooms_on_way)
+    if found is None:
+        return None
+    tree, tree_score = found
+    score += tree_score
+    width, depth = plan.xs[-1] - plan.xs[0], plan.ys[-1] - plan.ys[0]
+    score += 2.0 * max(0.0, max(width, depth) / min(width, depth) - 1.8)
     present = {pair(types[a], types[b]) for a, b in edges}
     score += sum(
         weight
@@ -179,9 +233,9 @@ def choose_floor_plan(
     for k in range(config.candidates * PATIENCE):
         if best is not None and k >= config.candidates:
             break
-        layout = draw_layout(specs, rng)
+        layout = draw_layout(specs, rng, config.wings)
         plan = Plan.of([layout[k] for k in range(len(specs))])
-        found = judged(plan, specs, least, rng)
+        found = judged(plan, specs, least, rng, config.rooms_on_way(len(specs)))
         if found is not None and (best is None or found.score < best.score):
             best = found
     if best is None:

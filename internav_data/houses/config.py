@@ -51,6 +51,12 @@ class HouseConfig:
     """Share of the sensible further doors that are built, so that there are ways round."""
     wide_openings: float = 0.35
     """Share of wide, double and open doorways where they make sense. `paper` only."""
+    wings: float = 0.8
+    """Share of drawn plans whose living room leads to rooms of its own: longer room paths."""
+    rooms_on_way_medium: float = 2.55
+    """Rooms on the way between two random points that plans of 3-5 rooms aim at. `paper` only."""
+    rooms_on_way_large: float = 3.5
+    """The same for 6-10 rooms. Doors of loops shorten it again."""
     hall_from: int = 5
     """Houses of this many rooms and more have a hall."""
     candidates: int = 24
@@ -82,6 +88,13 @@ class HouseConfig:
             by_size = self.scale_large
         return self.scale * by_size
 
+    def rooms_on_way(self, rooms: int) -> float | None:
+        """Return how many rooms a way through a house of so many should cross; None: any."""
+        medium, large = 3, 6
+        if self.preset != "paper" or rooms < medium:
+            return None
+        return self.rooms_on_way_large if rooms >= large else self.rooms_on_way_medium
+
 
 _BANDS: Mapping[str, tuple[float, float]] = {
     "scale": (0.7, 2.0),
@@ -91,6 +104,9 @@ _BANDS: Mapping[str, tuple[float, float]] = {
     "furnishing": (0.0, 2.0),
     "loops": (0.0, 1.0),
     "wide_openings": (0.0, 1.0),
+    "wings": (0.0, 1.0),
+    "rooms_on_way_medium": (2.0, 5.0),
+    "rooms_on_way_large": (2.0, 6.0),
     "hall_from": (3, 11),
     "candidates": (1, 200),
 }

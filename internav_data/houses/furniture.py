@@ -68,16 +68,14 @@ def _times(rule: Rule, picker: Picker, area_m2: float, density: float) -> int:
 def _furnish_room(state: RoomState, types: frozenset[str], picker: Picker, density: float) -> None:
     width, depth = float(state.inner[2] - state.inner[0]), float(state.inner[3] - state.inner[1])
     place = Place(state.area_m2, state.short_m, max(width, depth), types)
-    found = True
     for rule in RULES[state.type]:
         times = _times(rule, picker, state.area_m2, density)
-        if rule.without in types or (rule.instead and found):
+        present = {item.asset.type for group, *_ in state.placed for item in group.items}
+        if rule.without in types or rule.lacking in present:
             continue
-        found = False
         for _ in range(times):
             if not _try_rule(state, rule, place, picker):
                 break
-            found = True
 
 
 def _try_rule(state: RoomState, rule: Rule, place: Place, picker: Picker) -> bool:

@@ -122,6 +122,17 @@ shower = _plain("Shower", front=0.5)
 fridge = _plain("Fridge", front=0.6)
 
 
+def vanity(p: Picker, place: Place) -> list[Group]:
+    """Make a dressing table with a stool before it."""
+    del place
+    asset, seat = p.one("VanityTable"), p.one("Stool")
+    if asset is None:
+        return []
+    top = against(asset)
+    plain = Group((top,), (in_front(top, 0.6, 0.6),))
+    return [plain] if seat is None else [plain.with_items(p.tucked(top, seat, 0, 0.0)), plain]
+
+
 def side_table(p: Picker, place: Place) -> list[Group]:
     """Make a small table against a wall, with something on it."""
     del place
@@ -246,7 +257,7 @@ def television(p: Picker, place: Place) -> list[Group]:
 def dining(p: Picker, place: Place) -> list[Group]:
     """Make a table with chairs pushed in, for as many as the room can take."""
     largest = 1.1 if place.area_m2 < 12 else 1.6 if place.area_m2 < 18 else 2.9  # noqa: PLR2004
-    asset = p.one("DiningTable", narrow(largest), any_size=True)
+    asset = p.one("DiningTable", lambda a: 0.6 * largest <= a.size[0] <= largest, any_size=True)
     chair = p.one("Chair")
     if asset is None:
         return []

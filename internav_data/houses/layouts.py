@@ -39,6 +39,8 @@ _ORDER = (
 """Rooms near each other here want to be near each other in the house."""
 _SMALL = frozenset({"bathroom", "laundry", "storage"})
 _LIVING = ("living", "dining", "kitchen")
+_WING = frozenset({"bedroom", "office", "bathroom", "laundry"})
+"""What may be reached through the living room of a larger house."""
 
 
 def _uniform(rng: Generator, low: float, high: float) -> float:
@@ -161,16 +163,27 @@ def _fill_band(
     return layout
 
 
-def spine(specs: Sequence[RoomSpec], rng: Generator) -> Layout:
+def _end_zone(
+    specs: Sequence[RoomSpec], rest: Sequence[int], wings: float, rng: Generator
+) -> list[int]:
+    """Rooms at the hall's end: living rooms, and in wings what they lead to; () for none."""
+    draw, reach = float(rng.random()), 1 + int(float(rng.random()) * 3)
+    if len(rest) <= 3 or draw > 0.85:  # noqa: PLR2004 - four rooms have an end to spare
+        return []
+    end = [k for name in _LIVING for k in rest if specs[k].type == name][:reach]
+    others = [k for k in _shuffled(rng, rest) if specs[k].type in _WING]
+    if end and float(rng.random()) < wings:
+        end = [k for name in _LIVING for k in rest if specs[k].type == name]
+        further = 1 + int(float(rng.random()) * max(1, len(rest) - len(end) - 2))
+        end = end[:1] + others[:further] + end[1:]
+    return end if len(rest) - len(end) >= 2 else []  # noqa: PLR2004 - a hall serves two at least
+
+
+def spine(specs: Sequence[RoomSpec], rng: Generator, wings: float = 0.0) -> Layout:
     """Line a hall with rooms on both sides; the living rooms often fill its end."""
     hall = next(k for k, spec in enumerate(specs) if spec.type == "hall")
     rest = [k for k in range(len(specs)) if k != hall]
-    end: list[int] = []
-    if len(rest) > 3 and float(rng.random()) < 0.85:  # noqa: PLR2004 - four rooms have an end to spare
-        reach = 1 + int(float(rng.random()) * 3)
-        end = [k for name in _LIVING for k in rest if specs[k].type == name][:reach]
-        if len(rest) - len(end) < 2:  # noqa: PLR2004 - a hall serves two rooms at least
-            end = []
+    end = _end_zone(specs, rest, wings, rng)
     rest = [k for k in rest if k not in end]
     top, bottom = _split_bands(specs, rest, rng)
     hall_width = snapped(least_width(specs[hall]) * _uniform(rng, 1.0, 1.35))
@@ -199,7 +212,7 @@ def spine(specs: Sequence[RoomSpec], rng: Generator) -> Layout:
         height = heights[0] + heights[1] + hall_width
         width = snapped(sum(specs[k].area_m2 for k in end) * 1e4 / height)
         width = max(width, _least(specs, end))
-        order = end if float(rng.random()) < 0.5 else end[::-1]  # noqa: PLR2004 - a fair coin
+        order = end if len(end) < 4 else _shuffled(rng, end)  # noqa: PLR2004 - few keep their order
         rect = (-width, -heights[1], 0, heights[0] + hall_width)
         slice_rooms(rect, specs, order, rng, layout)
     return layout
@@ -248,11 +261,11 @@ def notch(layout: Layout, specs: Sequence[RoomSpec], rng: Generator) -> None:
         return
 
 
-def draw_layout(specs: Sequence[RoomSpec], rng: Generator) -> Layout:
+def draw_layout(specs: Sequence[RoomSpec], rng: Generator, wings: float = 0.0) -> Layout:
     """Draw one candidate for a floor plan."""
     has_hall = any(spec.type == "hall" for spec in specs)
     few = 3
-    layout = spine(specs, rng) if has_hall and len(specs) >= few else sliced(specs, rng)
+    layout = spine(specs, rng, wings) if has_hall and len(specs) >= few else sliced(specs, rng)
     if float(rng.random()) < 0.35:  # noqa: PLR2004 - a third of the outlines are notched
         notch(layout, specs, rng)
     return mirrored(layout, rng)

@@ -136,9 +136,9 @@ _WINDOWS: Mapping[str, tuple[int, int, int]] = {
     "laundry": (60, 140, 60),
     "storage": (60, 150, 50),
     "hall": (90, 100, 110),
-    "kitchen": (120, 105, 110),
+    "kitchen": (120, 112, 100),
     "living": (180, 60, 150),
-    "studio": (160, 80, 130),
+    "studio": (140, 112, 100),
     "dining": (150, 80, 130),
 }
 """Width, sill and height by type, centimetres."""
@@ -161,7 +161,8 @@ def draw_windows(
             continue
         room = max(segment.before, segment.after)
         name = floor_plan.types[room]
-        width, sill, height = _WINDOWS.get(name, _USUAL_WINDOW)
+        cooking = name == "living" and "kitchen" not in floor_plan.types
+        width, sill, height = _WINDOWS.get("studio" if cooking else name, _USUAL_WINDOW)
         top = min(sill + height, ceiling_cm - 15)
         room_for = (segment.length - 2 * JAMB_CM) // (width + 110)
         if room_for == 0 and segment.length >= width + 6 * JAMB_CM:

@@ -32,8 +32,8 @@ class Rule:
     """Rooms smaller than this go without."""
     without: str = ""
     """Only in houses that lack this type of room."""
-    instead: bool = False
-    """Only if the rule before found no place."""
+    lacking: str = ""
+    """Only while the room has no thing of this type."""
 
 
 _PICTURES = Rule(g.painting, "centre", 0.7, 0.03)
@@ -47,6 +47,7 @@ RULES: Mapping[str, tuple[Rule, ...]] = {
         Rule(g.wardrobe, "corner", 1.0),
         Rule(g.dresser, "any", 0.6),
         Rule(g.desk, "sun", 0.45, least_m2=10.0),
+        Rule(g.vanity, "sun", 0.3, least_m2=12.0),
         Rule(g.television, "any", 0.2, least_m2=16.0),
         Rule(g.shelf, "corner", 0.3, 0.01),
         Rule(g.armchair, "corner", 0.35, least_m2=14.0),
@@ -60,8 +61,9 @@ RULES: Mapping[str, tuple[Rule, ...]] = {
     ),
     "living": (
         Rule(g.seating, "centre", 1.0),
-        Rule(g.sofa_alone, "centre", 1.0, instead=True),
+        Rule(g.sofa_alone, "centre", 1.0, lacking="Sofa"),
         Rule(k.kitchen_run, "corner", 1.0, without="kitchen", least_m2=14.0),
+        Rule(g.fridge, "corner", 1.0, without="kitchen", lacking="Fridge", least_m2=14.0),
         Rule(g.dining, "open", 1.0, without="dining", least_m2=20.0),
         Rule(g.shelf, "corner", 0.8, 0.02),
         Rule(g.armchair, "corner", 0.6, 0.01),
@@ -78,8 +80,8 @@ RULES: Mapping[str, tuple[Rule, ...]] = {
     ),
     "kitchen": (
         Rule(k.kitchen_run, "corner", 1.0),
-        Rule(k.short_run, "corner", 1.0, instead=True),
-        Rule(g.fridge, "corner", 1.0, instead=True),
+        Rule(k.short_run, "corner", 1.0, lacking="Stove"),
+        Rule(g.fridge, "corner", 1.0, lacking="Fridge"),
         Rule(k.counter, "corner", 0.5, 0.015),
         Rule(g.dining, "open", 1.0, without="dining", least_m2=11.0),
         Rule(k.island, "open", 0.35, least_m2=20.0),
@@ -104,11 +106,12 @@ RULES: Mapping[str, tuple[Rule, ...]] = {
         Rule(g.toilet, "any", 1.0),
         Rule(g.washbasin, "any", 1.0),
         Rule(g.tub, "corner", 0.6, least_m2=4.5),
-        Rule(g.shower, "corner", 1.0, instead=True),
+        Rule(g.shower, "corner", 1.0, lacking="Bathtub"),
         Rule(g.shower, "corner", 0.3, least_m2=9.0),
         Rule(g.hamper, "corner", 0.5, least_m2=4.0),
         Rule(g.laundry, "corner", 0.4, without="laundry", least_m2=7.0),
-        Rule(g.shelf, "corner", 0.3, least_m2=7.0),
+        Rule(g.shelf, "corner", 0.5, least_m2=7.0),
+        Rule(g.bench, "any", 0.3, least_m2=9.0),
         Rule(g.bin_, "corner", 0.4, least_m2=4.0),
         Rule(g.stool, "any", 0.2, least_m2=6.0),
         Rule(g.plant, "corner", 0.2, least_m2=6.0),
@@ -158,9 +161,10 @@ RULES: Mapping[str, tuple[Rule, ...]] = {
     "studio": (
         Rule(g.bed, "centre", 1.0),
         Rule(k.kitchen_run, "corner", 1.0),
-        Rule(k.short_run, "corner", 1.0, instead=True),
+        Rule(k.short_run, "corner", 1.0, lacking="Stove"),
+        Rule(g.fridge, "corner", 1.0, lacking="Fridge"),
         Rule(g.seating, "centre", 1.0, least_m2=22.0),
-        Rule(g.sofa_alone, "centre", 1.0, instead=True),
+        Rule(g.sofa_alone, "centre", 1.0, lacking="Sofa"),
         Rule(g.wardrobe, "corner", 1.0),
         Rule(g.dining, "open", 0.8),
         Rule(g.desk, "sun", 0.4),
