@@ -105,7 +105,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--dataset", type=Path)
     parser.add_argument("--scenes", type=int, default=480)
-    parser.add_argument("--episodes", type=int, default=10)
+    parser.add_argument("--episodes", type=int, default=50)
     parser.add_argument("--records", type=int, default=5_000)
     parser.add_argument("--full", action="store_true", help="with outcomes and an expert")
     asked = parser.parse_args()

@@ -141,20 +141,23 @@ class Dataset(Generic[E]):
 
     def __getitems__(self, numbers: Sequence[int]) -> list[E]:
         """Return several episodes, as torch's DataLoader asks for a batch."""
-        return [self[int(number)] for number in numbers]
+        return list(self._run([self._row(int(number)) for number in numbers]))
 
     def __iter__(self) -> Iterator[E]:
-        number = 0
-        while number < len(self):
-            first, end, reader = self.shelf.group_of(self._row(number))
-            if self._index is None:
-                stop = min(end - first, number - first + _RUN)
-                yield from reader.rows(number - first, stop)
-                number = first + stop
-            else:
-                row = self._row(number) - first
-                yield from reader.rows(row, row + 1)
-                number += 1
+        for start in range(0, len(self), _RUN):
+            stop = min(start + _RUN, len(self))
+            yield from self._run([self._row(number) for number in range(start, stop)])
+
+    def _run(self, rows: Sequence[int]) -> Iterator[E]:
+        """Read rows of the files, neighbours in one go."""
+        start = 0
+        while start < len(rows):
+            first, end, reader = self.shelf.group_of(rows[start])
+            stop = start + 1
+            while stop < len(rows) and rows[stop] == rows[stop - 1] + 1 and rows[stop] < end:
+                stop += 1
+            yield from reader.rows(rows[start] - first, rows[stop - 1] + 1 - first)
+            start = stop
 
     def _row(self, number: int) -> int:
         return number if self._index is None else int(self._index[number])

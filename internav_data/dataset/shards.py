@@ -33,12 +33,14 @@ class SceneSource:
         self._states = {s.scene_id: s for s in states.values() if not s.quarantined}
         self._old_files = old.files if old else ()
         self._held: dict[str, list[str]] = {}
+        self._home: dict[tuple[str, str], DataFile] = {}
         self._last: tuple[str, pa.Table] | None = None
         self.scenes: dict[Split, list[str]] = {split: [] for split in SPLITS}
         for file in self._old_files:
             if file.table != "assets":
                 column = read_table(locate(out, file), _spec(file.table), ["scene_id"])["scene_id"]
                 self._held[file.path] = pc.unique(column).to_pylist()
+                self._home |= {(file.table, name): file for name in self._held[file.path]}
             if file.table == "scenes" and file.split is not None:
                 self.scenes[file.split] += self._held[file.path]
         for state in self._states.values():
@@ -63,13 +65,13 @@ class SceneSource:
         return pa.concat_tables(tables).combine_chunks()
 
     def _old_rows(self, spec: TableSpec[Any], scene_id: str) -> pa.Table:
-        for file in self._old_files:
-            if file.table == spec.name and scene_id in self._held[file.path]:
-                if self._last is None or self._last[0] != file.path:
-                    self._last = (file.path, read_table(locate(self._out, file), spec))
-                table = self._last[1]
-                return table.filter(pc.equal(table["scene_id"], scene_id))
-        return spec.schema.empty_table()  # a scene without episodes
+        file = self._home.get((spec.name, scene_id))
+        if file is None:
+            return spec.schema.empty_table()  # a scene without episodes
+        if self._last is None or self._last[0] != file.path:
+            self._last = (file.path, read_table(locate(self._out, file), spec))
+        table = self._last[1]
+        return table.filter(pc.equal(table["scene_id"], scene_id))
 
     def old_path(self, file: DataFile) -> Path:
         """Return where an older file lies."""

@@ -161,7 +161,7 @@ def test_killed_anywhere_readers_are_safe_and_the_next_call_finishes(tmp_path, m
 
         return step
 
-    for deadline in range(first % 3, 200, 3):
+    for deadline in range(first % 3, 200, 4):
         out = shutil.copytree(begun, tmp_path / f"out-{deadline}")
         killed = False
         with monkeypatch.context() as patch:

@@ -76,7 +76,7 @@ _OPS = {
 }
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.lists(CONDITIONS, min_size=1, max_size=3), st.sampled_from([None, "train", "val"]))
 def test_filters_keep_what_python_would(ds, everything, filters, split):
     def keep(episode):

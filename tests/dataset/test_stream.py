@@ -143,14 +143,18 @@ def collate(rows):
     return [row["episode_id"] for row in rows]
 
 
-@pytest.mark.parametrize("context", ["fork", "spawn"])
+@pytest.mark.parametrize(("context", "workers"), [("fork", 2), ("spawn", 1)])
 @pytest.mark.parametrize("style", ["map", "iterable"])
-def test_torch_data_loader(ds, context, style):
+def test_torch_data_loader(ds, context, workers, style):
     data = pytest.importorskip("torch.utils.data")
     ds[0]  # open files and a cache before the fork
     source = ds.iterable(seed=1) if style == "iterable" else ds
     loader = data.DataLoader(
-        source, batch_size=32, num_workers=2, multiprocessing_context=context, collate_fn=collate
+        source,
+        batch_size=32,
+        num_workers=workers,
+        multiprocessing_context=context,
+        collate_fn=collate,
     )
     got = [episode_id for batch in loader for episode_id in batch]
     assert sorted(got) == sorted(ids(ds))
