@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from internav_data.geometry import round_m, yaw_quaternion
+from internav_data.geometry import yaw_quaternion
 from internav_data.houses.choice import clear_area_m2
+from internav_data.houses.faces import Edge, edges_of, on_edge
 from internav_data.houses.fitting import (
     RADIUS_M,
     SPACING_M,
@@ -40,18 +41,6 @@ JOINED = 0.93
 """Share of the free nodes that are joined to the doors: pockets are small."""
 WINDOW_DEPTH_M = 0.45
 """What stands nearer to a window than this must be lower than its sill."""
-
-
-@dataclass(frozen=True, slots=True)
-class Edge:
-    """A wall face seen from inside a room: it runs along local x, the room lies at local y > 0."""
-
-    x: float
-    y: float
-    turn: int
-    """Quarter turns that carry local x onto the wall's direction."""
-    length: float
-    windows: int
 
 
 @dataclass(slots=True)
@@ -149,7 +138,7 @@ class RoomState:
             elif prefer == "sun":
                 like += 0.3 * ends - 0.8 * min(edge.windows, 1)
             like += 0.8 * float(rng.random())
-            spots.append(_on_edge(edge, along))
+            spots.append(on_edge(edge, along))
             likes.append(like)
         if not spots:
             return np.empty((0, 3))
@@ -174,46 +163,6 @@ class RoomState:
         every = np.concatenate(grids)
         found: Floats = every[np.argsort(every[:, 3], kind="stable")][:, :3]
         return np.ascontiguousarray(found)
-
-
-def _on_edge(edge: Edge, along: Floats) -> Floats:
-    dx, dy = ((1, 0), (0, 1), (-1, 0), (0, -1))[edge.turn]
-    out = np.empty((len(along), 3))
-    for k, p in enumerate(along):
-        out[k] = (round_m(edge.x + dx * p), round_m(edge.y + dy * p), edge.turn)
-    return out
-
-
-def _edges(corners: Sequence[tuple[int, int]], openings: Sequence[Opening]) -> tuple[Edge, ...]:
-    """Wall faces of a room: its polygon moved inwards by half a wall."""
-    count = len(corners)
-    directions = []
-    for k in range(count):
-        (ax, ay), (bx, by) = corners[k], corners[(k + 1) % count]
-        directions.append(((bx > ax) - (bx < ax), (by > ay) - (by < ay)))
-    inner = []
-    for k in range(count):
-        (ux, uy), (vx, vy) = directions[k - 1], directions[k]
-        x, y = corners[k]
-        inner.append((x + HALF_WALL_CM * (-uy - vy), y + HALF_WALL_CM * (ux + vx)))
-    out: list[Edge] = []
-    for k in range(count):
-        (ax, ay), (bx, by) = inner[k], inner[(k + 1) % count]
-        (dx, dy), line = directions[k], corners[k]
-        windows = sum(
-            1
-            for o in openings
-            if o.kind is None
-            and o.along_x == (dy == 0)
-            and o.at == (line[1] if o.along_x else line[0])
-            and o.low <= (max(ax, bx) if o.along_x else max(ay, by))
-            and o.high >= (min(ax, bx) if o.along_x else min(ay, by))
-        )
-        turn = ((1, 0), (0, 1), (-1, 0), (0, -1)).index((dx, dy))
-        length = (abs(bx - ax) + abs(by - ay)) / 100.0
-        if length > 0.0:
-            out.append(Edge(ax / 100.0, ay / 100.0, turn, length, windows))
-    return tuple(out)
 
 
 def _sided(opening: Opening, side: int, depth_cm: float, bottom: float, top: float) -> Floats:
@@ -282,7 +231,7 @@ def room_state(
         inner,
         clear_area_m2(plan, room),
         clear_size_m(plan.main_rectangle(room))[0],
-        _edges(plan.polygon(frozenset({room})), mine),
+        edges_of(plan.polygon(frozenset({room})), mine),
         np.zeros((CAPACITY, 6)),
         np.zeros((CAPACITY, 6)),
         np.ascontiguousarray(free),

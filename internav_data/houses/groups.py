@@ -10,15 +10,12 @@ from typing import TYPE_CHECKING
 
 from internav_data.houses.pieces import (
     BACK_GAP_M,
-    FACING_LEFT,
     FACING_RIGHT,
-    FACING_WALL,
     Group,
     Item,
     Picker,
     against,
     in_front,
-    overlap,
 )
 
 if TYPE_CHECKING:
@@ -49,6 +46,11 @@ def narrow(limit: float) -> Callable[[Asset], bool]:
     return lambda asset: asset.size[0] <= limit
 
 
+def within(low: float, high: float) -> Callable[[Asset], bool]:
+    """Return a test for assets of some width."""
+    return lambda asset: low <= asset.size[0] <= high
+
+
 def _beside(item: Item, asset: Asset, side: int) -> Item:
     """Stand an asset against the wall beside another, left (-1) or right (1)."""
     x = item.x + side * (item.half[0] + asset.size[0] / 2.0 + SIDE_GAP_M)
@@ -60,7 +62,7 @@ def bed(p: Picker, place: Place) -> list[Group]:
     double = place.area_m2 >= 11.5 and place.short_m >= 2.75  # noqa: PLR2004 - the stated minima
     asset = p.one("Bed", lambda a: (a.size[0] >= DOUBLE_BED_M) == double)
     if asset is None:
-        asset = min(p.catalogue.of_type("Bed"), key=lambda a: (a.size[0], a.asset_id), default=None)
+        asset = p.smallest("Bed")
     if asset is None:
         return []
     main = against(asset)
@@ -89,10 +91,11 @@ def _plain(*kinds: str, front: float = 0.3) -> Callable[[Picker, Place], list[Gr
         out: list[Group] = []
         start = int(float(p.rng.random()) * len(kinds))
         for kind in kinds[start:] + kinds[:start]:
-            asset = p.one(kind)
-            if asset is not None:
-                item = against(asset)
-                out.append(Group((item,), (in_front(item, front, 0.9),) if front else ()))
+            # The smallest of its kind where the one drawn finds no place.
+            for asset in (p.one(kind), p.smallest(kind)):
+                if asset is not None:
+                    item = against(asset)
+                    out.append(Group((item,), (in_front(item, front, 0.9),) if front else ()))
         return out
 
     return make
@@ -171,120 +174,6 @@ def rug(p: Picker, place: Place) -> list[Group]:
         "Rug", lambda a: a.size[0] < 0.6 * place.long_m and a.size[1] < 0.6 * place.short_m
     )
     return [Group((Item(asset, 0.0, 0.0, 0),))] if asset else []
-
-
-def seating(p: Picker, place: Place) -> list[Group]:
-    """Make sofa facing a television, coffee table between, an armchair beside."""
-    stand = p.one("TVStand")
-    screen = p.one("Television", lambda a: stand is not None and a.size[0] <= stand.size[0] + 0.05)
-    sofa = p.one("Sofa", narrow(max(1.6, 0.6 * place.long_m)), any_size=True)
-    if sofa is None:
-        return []
-    out: list[Group] = []
-    if stand is not None:
-        base = against(stand)
-        resting = p.resting(base, 0, screen, 0.0, 0.0) if screen is not None else None
-        screens = (base,) if resting is None else (base, resting)
-        for distance in _viewing_distances(place, stand, sofa):
-            out += _around(p, screens, sofa, distance)
-        out.append(Group((*screens,), (in_front(base, 0.5),)))
-    return out
-
-
-def _viewing_distances(place: Place, stand: Asset, sofa: Asset) -> list[float]:
-    """Gaps between television stand and sofa: to the opposite wall if that is near, else nearer."""
-    gaps = []
-    for span in (place.short_m, place.long_m):
-        gap = span - stand.size[1] - sofa.size[1] - 2 * BACK_GAP_M - 0.02
-        if 1.4 <= gap <= 3.4:  # noqa: PLR2004 - metres one watches from
-            gaps.append(gap)
-    return [*gaps, 2.4, 1.9, 1.5]
-
-
-def _around(p: Picker, screens: tuple[Item, ...], sofa: Asset, gap: float) -> list[Group]:
-    """Make sofa across from a screen, with and without what stands between and beside."""
-    base = screens[0]
-    front = base.y + base.half[1]
-    seat = Item(sofa, base.x, front + gap + sofa.size[1] / 2.0, FACING_WALL)
-    lane = (base.x - 0.4, front, base.x + 0.4, front + 0.5)
-    plain = Group((*screens, seat), (lane,))
-    coffee = p.one("CoffeeTable", lambda a: a.size[1] <= gap - 1.1 and a.size[0] <= sofa.size[0])
-    if coffee is None:
-        return [plain]
-    middle = front + gap - 0.42 - coffee.size[1] / 2.0
-    table = Item(coffee, base.x, middle, FACING_WALL)
-    with_table = plain.with_items(table)
-    room = 2.0 * min(front + gap - 0.06 - middle, middle - front - 0.06)
-    carpet = p.one(
-        "Rug", lambda a: coffee.size[1] + 0.1 <= a.size[1] <= room and coffee.size[0] <= a.size[0]
-    )
-    if carpet is not None and p.chance(0.7):
-        lying = Item(carpet, base.x, middle, FACING_WALL)
-        on_it = p.resting(lying, len(plain.items), coffee, 0.0, 0.0, FACING_WALL)
-        if on_it is not None:
-            with_table = plain.with_items(lying, on_it)
-    chair = p.one("ArmChair", narrow(1.0))
-    if chair is None:
-        return [with_table, plain]
-    side = 1 if p.chance(0.5) else -1
-    away = sofa.size[0] / 2.0 + 0.15 + chair.size[1] / 2.0
-    beside = Item(chair, base.x + side * away, middle, FACING_LEFT if side > 0 else FACING_RIGHT)
-    full = with_table.with_items(beside)
-    return [full, with_table, plain] if p.chance(0.6) else [with_table, plain]
-
-
-def sofa_alone(p: Picker, place: Place) -> list[Group]:
-    """Make a sofa with its back to the wall."""
-    asset = p.one("Sofa", narrow(max(1.6, 0.6 * place.long_m)), any_size=True)
-    if asset is None:
-        return []
-    item = against(asset)
-    return [Group((item,), (in_front(item, 0.6),))]
-
-
-def television(p: Picker, place: Place) -> list[Group]:
-    """Make a television on its stand."""
-    del place
-    stand, screen = p.one("TVStand"), p.one("Television")
-    if stand is None:
-        return []
-    base = against(stand)
-    resting = p.resting(base, 0, screen, 0.0, 0.0) if screen else None
-    items = (base,) if resting is None else (base, resting)
-    return [Group(items, (in_front(base, 0.5),))]
-
-
-def dining(p: Picker, place: Place) -> list[Group]:
-    """Make a table with chairs pushed in, for as many as the room can take."""
-    largest = 1.1 if place.area_m2 < 12 else 1.6 if place.area_m2 < 18 else 2.9  # noqa: PLR2004
-    asset = p.one("DiningTable", lambda a: 0.6 * largest <= a.size[0] <= largest, any_size=True)
-    chair = p.one("Chair")
-    if asset is None:
-        return []
-    table = Item(asset, 0.0, 0.0, FACING_WALL)
-    plain = Group((table,))
-    if chair is None:
-        return [plain]
-    hx = table.half[0]
-    seats = max(1, int((2 * hx - 0.1) / (chair.size[0] + 0.12)))
-    along = [(k - (seats - 1) / 2.0) * (chair.size[0] + 0.12) for k in range(seats)]
-    long_sides = [p.tucked(table, chair, side, a) for side in (0, 2) for a in along]
-    ends = [p.tucked(table, chair, side, 0.0) for side in (1, 3)]
-    # Corners have room for one pair of knees.
-    near = [p.parts(item) for item in long_sides]
-    ends = [e for e in ends if not any(overlap(p.parts(e), other, 0.04) for other in near)]
-    four = plain.with_items(*long_sides)
-    bowl = (
-        p.one(["Apple", "Bread", "Laptop"][int(float(p.rng.random()) * 3)])
-        if p.chance(0.5)
-        else None
-    )
-    resting = p.resting(table, 0, bowl, 0.1, 0.05) if bowl else None
-    extra = () if resting is None else (resting,)
-    six = four.with_items(*ends)
-    two = plain.with_items(*long_sides[:1], *long_sides[seats : seats + 1])
-    out = [six, four, two] if p.chance(0.5) else [four, two]
-    return [g.with_items(*extra) for g in out] + [plain]
 
 
 def desk(p: Picker, place: Place) -> list[Group]:

@@ -138,6 +138,11 @@ class Picker:
         draw = float(self.rng.random())
         return found[int(draw * len(found))] if found else None
 
+    def smallest(self, kind: str) -> Asset | None:
+        """Return the asset of a type that takes the least floor; None where there is none."""
+        found = self.catalogue.of_type(kind)
+        return min(found, key=lambda a: (a.size[0] * a.size[1], a.asset_id), default=None)
+
     def parts(self, item: Item) -> Floats:
         """Boxes around the parts of an item, (n, 6), in the group's frame."""
         key = (self.catalogue.digest, item.asset.asset_id)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from internav_data.houses import groups as g
 from internav_data.houses import kitchens as k
+from internav_data.houses import sitting as s
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -48,7 +49,7 @@ RULES: Mapping[str, tuple[Rule, ...]] = {
         Rule(g.dresser, "any", 0.6),
         Rule(g.desk, "sun", 0.45, least_m2=10.0),
         Rule(g.vanity, "sun", 0.3, least_m2=12.0),
-        Rule(g.television, "any", 0.2, least_m2=16.0),
+        Rule(s.television, "any", 0.2, least_m2=16.0),
         Rule(g.shelf, "corner", 0.3, 0.01),
         Rule(g.armchair, "corner", 0.35, least_m2=14.0),
         Rule(g.hamper, "corner", 0.3),
@@ -60,11 +61,11 @@ RULES: Mapping[str, tuple[Rule, ...]] = {
         _RUG,
     ),
     "living": (
-        Rule(g.seating, "centre", 1.0),
-        Rule(g.sofa_alone, "centre", 1.0, lacking="Sofa"),
+        Rule(s.seating, "centre", 1.0),
+        Rule(s.sofa_alone, "centre", 1.0, lacking="Sofa"),
         Rule(k.kitchen_run, "corner", 1.0, without="kitchen", least_m2=14.0),
         Rule(g.fridge, "corner", 1.0, without="kitchen", lacking="Fridge", least_m2=14.0),
-        Rule(g.dining, "open", 1.0, without="dining", least_m2=20.0),
+        Rule(s.dining, "open", 1.0, without="dining", least_m2=20.0),
         Rule(g.shelf, "corner", 0.8, 0.02),
         Rule(g.armchair, "corner", 0.6, 0.01),
         Rule(g.side_table, "any", 0.5, 0.01),
@@ -83,7 +84,7 @@ RULES: Mapping[str, tuple[Rule, ...]] = {
         Rule(k.short_run, "corner", 1.0, lacking="Stove"),
         Rule(g.fridge, "corner", 1.0, lacking="Fridge"),
         Rule(k.counter, "corner", 0.5, 0.015),
-        Rule(g.dining, "open", 1.0, without="dining", least_m2=11.0),
+        Rule(s.dining, "open", 1.0, without="dining", least_m2=11.0),
         Rule(k.island, "open", 0.35, least_m2=20.0),
         Rule(g.bin_, "corner", 0.8),
         Rule(g.shelf, "corner", 0.3, 0.01),
@@ -93,7 +94,7 @@ RULES: Mapping[str, tuple[Rule, ...]] = {
         _PICTURES,
     ),
     "dining": (
-        Rule(g.dining, "open", 1.0),
+        Rule(s.dining, "open", 1.0),
         Rule(g.dresser, "centre", 0.8),
         Rule(g.shelf, "corner", 0.4, 0.01),
         Rule(g.side_table, "any", 0.4),
@@ -103,10 +104,10 @@ RULES: Mapping[str, tuple[Rule, ...]] = {
         _PICTURES,
     ),
     "bathroom": (
-        Rule(g.toilet, "any", 1.0),
-        Rule(g.washbasin, "any", 1.0),
         Rule(g.tub, "corner", 0.6, least_m2=4.5),
         Rule(g.shower, "corner", 1.0, lacking="Bathtub"),
+        Rule(g.toilet, "any", 1.0),
+        Rule(g.washbasin, "any", 1.0),
         Rule(g.shower, "corner", 0.3, least_m2=9.0),
         Rule(g.hamper, "corner", 0.5, least_m2=4.0),
         Rule(g.laundry, "corner", 0.4, without="laundry", least_m2=7.0),
@@ -132,7 +133,7 @@ RULES: Mapping[str, tuple[Rule, ...]] = {
         Rule(g.shelf, "corner", 0.9, 0.03),
         Rule(g.cabinet, "any", 0.7),
         Rule(g.armchair, "corner", 0.5, least_m2=10.0),
-        Rule(g.sofa_alone, "centre", 0.3, least_m2=13.0),
+        Rule(s.sofa_alone, "centre", 0.3, least_m2=13.0),
         Rule(g.side_table, "any", 0.3),
         Rule(g.safe, "corner", 0.25),
         Rule(g.bin_, "corner", 0.6),
@@ -163,10 +164,10 @@ RULES: Mapping[str, tuple[Rule, ...]] = {
         Rule(k.kitchen_run, "corner", 1.0),
         Rule(k.short_run, "corner", 1.0, lacking="Stove"),
         Rule(g.fridge, "corner", 1.0, lacking="Fridge"),
-        Rule(g.seating, "centre", 1.0, least_m2=22.0),
-        Rule(g.sofa_alone, "centre", 1.0, lacking="Sofa"),
+        Rule(s.seating, "centre", 1.0, least_m2=22.0),
+        Rule(s.sofa_alone, "centre", 1.0, lacking="Sofa"),
         Rule(g.wardrobe, "corner", 1.0),
-        Rule(g.dining, "open", 0.8),
+        Rule(s.dining, "open", 0.8),
         Rule(g.desk, "sun", 0.4),
         Rule(g.shelf, "corner", 0.5, 0.01),
         Rule(g.armchair, "corner", 0.3),

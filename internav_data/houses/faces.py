@@ -1,0 +1,73 @@
+"""The wall faces of a room, which furniture stands against."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from internav_data.geometry import round_m
+from internav_data.houses.standards import HALF_WALL_CM
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from internav_data.houses.openings import Opening
+
+    Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """A wall face seen from inside a room: it runs along local x, the room lies at local y > 0."""
+
+    x: float
+    y: float
+    turn: int
+    """Quarter turns that carry local x onto the wall's direction."""
+    length: float
+    windows: int
+
+
+def on_edge(edge: Edge, along: Floats) -> Floats:
+    """Return spots (n, 3) at distances along a wall face: x, y, quarter turns."""
+    dx, dy = ((1, 0), (0, 1), (-1, 0), (0, -1))[edge.turn]
+    out = np.empty((len(along), 3))
+    for k, p in enumerate(along):
+        out[k] = (round_m(edge.x + dx * p), round_m(edge.y + dy * p), edge.turn)
+    return out
+
+
+def edges_of(corners: Sequence[tuple[int, int]], openings: Sequence[Opening]) -> tuple[Edge, ...]:
+    """Wall faces of a room: its polygon moved inwards by half a wall."""
+    count = len(corners)
+    directions = []
+    for k in range(count):
+        (ax, ay), (bx, by) = corners[k], corners[(k + 1) % count]
+        directions.append(((bx > ax) - (bx < ax), (by > ay) - (by < ay)))
+    inner = []
+    for k in range(count):
+        (ux, uy), (vx, vy) = directions[k - 1], directions[k]
+        x, y = corners[k]
+        inner.append((x + HALF_WALL_CM * (-uy - vy), y + HALF_WALL_CM * (ux + vx)))
+    out: list[Edge] = []
+    for k in range(count):
+        (ax, ay), (bx, by) = inner[k], inner[(k + 1) % count]
+        (dx, dy), line = directions[k], corners[k]
+        windows = sum(
+            1
+            for o in openings
+            if o.kind is None
+            and o.along_x == (dy == 0)
+            and o.at == (line[1] if o.along_x else line[0])
+            and o.low <= (max(ax, bx) if o.along_x else max(ay, by))
+            and o.high >= (min(ax, bx) if o.along_x else min(ay, by))
+        )
+        turn = ((1, 0), (0, 1), (-1, 0), (0, -1)).index((dx, dy))
+        length = (abs(bx - ax) + abs(by - ay)) / 100.0
+        if length > 0.0:
+            out.append(Edge(ax / 100.0, ay / 100.0, turn, length, windows))
+    return tuple(out)

@@ -1,0 +1,140 @@
+"""Groups to sit in: sofas before televisions, tables with chairs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from internav_data.houses.groups import narrow, within
+from internav_data.houses.pieces import (
+    BACK_GAP_M,
+    FACING_LEFT,
+    FACING_RIGHT,
+    FACING_WALL,
+    Group,
+    Item,
+    Picker,
+    against,
+    in_front,
+    overlap,
+)
+
+if TYPE_CHECKING:
+    from internav_data.houses.groups import Place
+    from internav_data.records import Asset
+
+
+def seating(p: Picker, place: Place) -> list[Group]:
+    """Make sofa facing a television, coffee table between, an armchair beside."""
+    stand = p.one("TVStand")
+    screen = p.one("Television", lambda a: stand is not None and a.size[0] <= stand.size[0] + 0.05)
+    sofa = p.one("Sofa", narrow(max(1.6, 0.6 * place.long_m)), any_size=True)
+    if sofa is None:
+        return []
+    out: list[Group] = []
+    if stand is not None:
+        base = against(stand)
+        resting = p.resting(base, 0, screen, 0.0, 0.0) if screen is not None else None
+        screens = (base,) if resting is None else (base, resting)
+        for distance in _viewing_distances(place, stand, sofa):
+            out += _around(p, screens, sofa, distance)
+        out.append(Group((*screens,), (in_front(base, 0.5),)))
+    return out
+
+
+def _viewing_distances(place: Place, stand: Asset, sofa: Asset) -> list[float]:
+    """Gaps between television stand and sofa: to the opposite wall if that is near, else nearer."""
+    gaps = []
+    for span in (place.short_m, place.long_m):
+        gap = span - stand.size[1] - sofa.size[1] - 2 * BACK_GAP_M - 0.02
+        if 1.4 <= gap <= 3.4:  # noqa: PLR2004 - metres one watches from
+            gaps.append(gap)
+    return [*gaps, 2.4, 1.9, 1.5]
+
+
+def _around(p: Picker, screens: tuple[Item, ...], sofa: Asset, gap: float) -> list[Group]:
+    """Make sofa across from a screen, with and without what stands between and beside."""
+    base = screens[0]
+    front = base.y + base.half[1]
+    seat = Item(sofa, base.x, front + gap + sofa.size[1] / 2.0, FACING_WALL)
+    lane = (base.x - 0.4, front, base.x + 0.4, front + 0.5)
+    plain = Group((*screens, seat), (lane,))
+    coffee = p.one("CoffeeTable", lambda a: a.size[1] <= gap - 1.1 and a.size[0] <= sofa.size[0])
+    if coffee is None:
+        return [plain]
+    middle = front + gap - 0.42 - coffee.size[1] / 2.0
+    table = Item(coffee, base.x, middle, FACING_WALL)
+    with_table = plain.with_items(table)
+    room = 2.0 * min(front + gap - 0.06 - middle, middle - front - 0.06)
+    carpet = p.one(
+        "Rug", lambda a: coffee.size[1] + 0.1 <= a.size[1] <= room and coffee.size[0] <= a.size[0]
+    )
+    if carpet is not None and p.chance(0.7):
+        lying = Item(carpet, base.x, middle, FACING_WALL)
+        on_it = p.resting(lying, len(plain.items), coffee, 0.0, 0.0, FACING_WALL)
+        if on_it is not None:
+            with_table = plain.with_items(lying, on_it)
+    chair = p.one("ArmChair", narrow(1.0))
+    if chair is None:
+        return [with_table, plain]
+    side = 1 if p.chance(0.5) else -1
+    away = sofa.size[0] / 2.0 + 0.15 + chair.size[1] / 2.0
+    beside = Item(chair, base.x + side * away, middle, FACING_LEFT if side > 0 else FACING_RIGHT)
+    full = with_table.with_items(beside)
+    return [full, with_table, plain] if p.chance(0.6) else [with_table, plain]
+
+
+def sofa_alone(p: Picker, place: Place) -> list[Group]:
+    """Make a sofa with its back to the wall."""
+    asset = p.one("Sofa", narrow(max(1.6, 0.6 * place.long_m)), any_size=True)
+    if asset is None:
+        return []
+    item = against(asset)
+    return [Group((item,), (in_front(item, 0.6),))]
+
+
+def television(p: Picker, place: Place) -> list[Group]:
+    """Make a television on its stand."""
+    del place
+    stand, screen = p.one("TVStand"), p.one("Television")
+    if stand is None:
+        return []
+    base = against(stand)
+    resting = p.resting(base, 0, screen, 0.0, 0.0) if screen else None
+    items = (base,) if resting is None else (base, resting)
+    return [Group(items, (in_front(base, 0.5),))]
+
+
+def dining(p: Picker, place: Place) -> list[Group]:
+    """Make a table with chairs pushed in, for as many as the room can take."""
+    largest = 1.1 if place.area_m2 < 12 else 1.6 if place.area_m2 < 18 else 2.9  # noqa: PLR2004
+    chair = p.one("Chair")
+    out: list[Group] = []
+    for limit in (largest, 1.5, 1.0):
+        asset = p.one("DiningTable", within(0.6 * limit, limit), any_size=True)
+        if asset is not None and limit <= largest:
+            out += _seated(p, Item(asset, 0.0, 0.0, FACING_WALL), chair)
+    return out
+
+
+def _seated(p: Picker, table: Item, chair: Asset | None) -> list[Group]:
+    """Seat people around a table, many first."""
+    plain = Group((table,))
+    if chair is None:
+        return [plain]
+    hx = table.half[0]
+    pitch = chair.size[0] + 0.12
+    seats = max(1, int((2 * hx - 0.1) / pitch))
+    along = [(k - (seats - 1) / 2.0) * pitch for k in range(seats)]
+    long_sides = [p.tucked(table, chair, side, a) for side in (0, 2) for a in along]
+    ends = [p.tucked(table, chair, side, 0.0) for side in (1, 3)]
+    # Corners have room for one pair of knees.
+    near = [p.parts(item) for item in long_sides]
+    ends = [e for e in ends if not any(overlap(p.parts(e), other, 0.04) for other in near)]
+    kind = ("Apple", "Bread", "Laptop")[int(float(p.rng.random()) * 3)]
+    thing = p.one(kind) if p.chance(0.5) else None
+    resting = p.resting(table, 0, thing, 0.1, 0.05) if thing else None
+    laid = plain if resting is None else plain.with_items(resting)
+    four = laid.with_items(*long_sides)
+    two = laid.with_items(*long_sides[:1], *long_sides[seats : seats + 1])
+    six = [four.with_items(*ends)] if p.chance(0.5) else []
+    return [*six, four, two, laid.with_items(*long_sides[:1])]
