@@ -38,7 +38,7 @@ GAP = 0.01
 SIDEWAYS = 0.25
 LEAST_CLEAR = 2.0
 SPOTS, REDRAWS = 200, 50
-ROUND = 2  # arcs of grown corners in steps of 45 degrees
+ROUND = 4  # grown corners turn in steps of 22.5 degrees: ways are right to 0.4 %
 
 Point = tuple[float, float]
 Node = tuple[int, int]
@@ -82,7 +82,7 @@ class Sight:
 
     def __init__(self, floor: shapely.Geometry) -> None:
         self.floor = floor
-        shapely.prepare(floor)
+        self.open = _open(floor)
         self.corners, self.before, self.after = _reflex_corners(floor)
         self.graph = nx.Graph()
         self.graph.add_nodes_from(range(len(self.corners)))
@@ -98,7 +98,7 @@ class Sight:
         a, b = self.corners[pairs[:, 0]], self.corners[pairs[:, 1]]
         useful = self._tangent(b - a, pairs[:, 0]) & self._tangent(a - b, pairs[:, 1])
         pairs, a, b = pairs[useful], a[useful], b[useful]
-        open_ = shapely.covers(self.floor, shapely.linestrings(np.stack([a, b], axis=1)))
+        open_ = shapely.covers(self.open, shapely.linestrings(np.stack([a, b], axis=1)))
         lengths = np.linalg.norm(a - b, axis=1)
         self.graph.add_weighted_edges_from(
             (int(m), int(n), float(d))
@@ -121,13 +121,13 @@ class Sight:
             lines = shapely.linestrings(
                 np.stack([np.broadcast_to(point, targets.shape), targets], axis=1)
             )
-            open_ = shapely.covers(self.floor, lines)
+            open_ = shapely.covers(self.open, lines)
             self.seen[point] = [(int(k), math.dist(point, self.corners[k])) for k in useful[open_]]
         return self.seen[point]
 
     def path(self, start: Point, goal: Point) -> list[Point] | None:
         """Shortest way as points, None where there is none."""
-        if shapely.covers(self.floor, shapely.LineString([start, goal])):
+        if shapely.covers(self.open, shapely.LineString([start, goal])):
             return [start, goal]
         for name, point in (("start", start), ("goal", goal)):
             self.graph.add_weighted_edges_from((name, k, d) for k, d in self.visible(point))
@@ -143,7 +143,7 @@ class Sight:
         """Visibility graph of the floor without some shapes, built from this one."""
         new = object.__new__(Sight)
         new.floor = shapely.difference(self.floor, shapes)
-        shapely.prepare(new.floor)
+        new.open = _open(new.floor)
         old = {tuple(c): k for k, c in enumerate(self.corners.tolist())}
         corners, before, after = _reflex_corners(new.floor)
         fresh = [k for k, c in enumerate(corners.tolist()) if tuple(c) not in old]
@@ -162,6 +162,13 @@ class Sight:
             new._connect(pairs)
         new.seen = {}
         return new
+
+
+def _open(floor: shapely.Geometry) -> shapely.Geometry:
+    """Return the floor a micrometre larger: ways that touch its corners stay inside it."""
+    larger = floor.buffer(1e-6, join_style="mitre")
+    shapely.prepare(larger)
+    return larger
 
 
 def _reflex_corners(floor: shapely.Geometry) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -201,6 +208,7 @@ class Site:
 
     @staticmethod
     def of(house: House) -> Site:
+        """Work out what the episodes of a house share."""
         blockers = [
             shapely.box(w.x_min, w.y_min, w.x_max, w.y_max)
             for w in house.walls
@@ -253,10 +261,12 @@ class Site:
         )
 
     def room_of(self, x: float, y: float) -> int:
+        """Room id of the room that holds a point."""
         point = shapely.Point(x, y)
         return next((k for k, polygon in self.rooms.items() if polygon.covers(point)), -1)
 
     def way(self, a: Point, b: Point) -> list[Point] | None:
+        """Shortest way in the house without obstacles."""
         if (a, b) not in self.ways:
             self.ways[a, b] = self.sight.path(a, b)
         return self.ways[a, b]
@@ -270,6 +280,8 @@ class Site:
 
 @dataclass
 class NaiveObstacle:
+    """An obstacle at rest."""
+
     asset: Asset
     rest: Rest
     shape: shapely.Geometry
@@ -370,8 +382,8 @@ def _node_paths(site: Site, start: Node, goal: Node) -> list[list[Point]]:
     found: list[list[Point]] = []
     for path in rooms:
         choices = [doors[min(s), max(s)] for s in pairwise(path)]
-        for centres in islice(product(*choices), 64 - len(found)):
-            found.append([_metres(start), *centres, _metres(goal)])
+        some = islice(product(*choices), 64 - len(found))
+        found += [[_metres(start), *centres, _metres(goal)] for centres in some]
     return found
 
 
@@ -411,7 +423,7 @@ def _done(episode: NaiveEpisode) -> bool:
     return episode.steps is not None and episode.steps > episode.clear_steps
 
 
-def _try(
+def _try(  # noqa: PLR0911 - every refusal is a return
     site: Site,
     episode: NaiveEpisode,
     node_paths: list[list[Point]],

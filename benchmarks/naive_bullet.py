@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pybullet as bullet
-import shapely
 
 from internav_data.geometry import part_corners, yaw_quaternion
 from internav_data.records import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    import shapely
 
     from internav_data.records import Asset, House, Part
 
@@ -33,9 +34,7 @@ class Rest:
     penetration: float
 
 
-@lru_cache(maxsize=1)
-def client() -> int:
-    return int(bullet.connect(bullet.DIRECT))
+CLIENT = bullet.connect(bullet.DIRECT)
 
 
 def settle(
@@ -48,13 +47,13 @@ def settle(
     shape: shapely.Geometry,
 ) -> Rest | None:
     """Let a thing fall 1 cm among what is near; None when it may not stay."""
-    bullet.resetSimulation(physicsClientId=client())
-    bullet.setGravity(0, 0, -9.81, physicsClientId=client())
-    bullet.setTimeStep(STEP, physicsClientId=client())
+    bullet.resetSimulation(physicsClientId=CLIENT)
+    bullet.setGravity(0, 0, -9.81, physicsClientId=CLIENT)
+    bullet.setTimeStep(STEP, physicsClientId=CLIENT)
     # One shared dummy visual: Bullet would otherwise build a mesh to look at for every body.
-    visual = bullet.createVisualShape(bullet.GEOM_SPHERE, radius=0.01)
-    plane = bullet.createCollisionShape(bullet.GEOM_PLANE)
-    _surface(bullet.createMultiBody(0, plane, visual), 1.0)
+    visual = bullet.createVisualShape(bullet.GEOM_SPHERE, radius=0.01, physicsClientId=CLIENT)
+    plane = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=CLIENT)
+    _surface(bullet.createMultiBody(0, plane, visual, physicsClientId=CLIENT), 1.0)
     low_x, low_y, high_x, high_y = shape.buffer(NEAR).bounds
     for wall in house.walls:
         if wall.x_max < low_x or wall.x_min > high_x or wall.y_max < low_y or wall.y_min > high_y:
@@ -63,8 +62,10 @@ def settle(
         half.append((wall.z_max - wall.z_min) / 2)
         centre = [(wall.x_max + wall.x_min) / 2, (wall.y_max + wall.y_min) / 2]
         centre.append((wall.z_max + wall.z_min) / 2)
-        solid = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half)
-        _surface(bullet.createMultiBody(0, solid, visual, centre), 1.0)
+        solid = bullet.createCollisionShape(
+            bullet.GEOM_BOX, halfExtents=half, physicsClientId=CLIENT
+        )
+        _surface(bullet.createMultiBody(0, solid, visual, centre, physicsClientId=CLIENT), 1.0)
     for thing in house.things:
         reach = math.hypot(*house.assets[thing.asset_id].size[:2]) / 2
         near_x = low_x - reach < thing.x < high_x + reach
@@ -80,15 +81,17 @@ def settle(
 def _judged(body: int, asset: Asset, start: Pose) -> Rest | None:
     calm = steps = 0
     while steps < 240 and calm < 10:
-        bullet.stepSimulation()
+        bullet.stepSimulation(physicsClientId=CLIENT)
         steps += 1
-        speed, spin = bullet.getBaseVelocity(body)
+        speed, spin = bullet.getBaseVelocity(body, physicsClientId=CLIENT)
         slow = math.hypot(*speed) < 0.001 and math.hypot(*spin) < 0.01
         calm = calm + 1 if slow else 0
-    position, turn = bullet.getBasePositionAndOrientation(body)
+    position, turn = bullet.getBasePositionAndOrientation(body, physicsClientId=CLIENT)
     matrix = np.array(bullet.getMatrixFromQuaternion(turn)).reshape(3, 3)
     origin = np.array(position) - matrix @ np.array(_middle(asset))
-    depth = max([0.0, *(-c[8] for c in bullet.getContactPoints(bodyA=body))])
+    depth = max(
+        [0.0, *(-c[8] for c in bullet.getContactPoints(bodyA=body, physicsClientId=CLIENT))]
+    )
     moved = math.hypot(origin[0] - start.x, origin[1] - start.y)
     tilt = math.degrees(math.acos(max(-1.0, min(1.0, float(matrix[2, 2])))))
     if calm < 10 or moved > 0.05 or tilt > 5.0 or depth > 0.002:
@@ -107,6 +110,7 @@ def _surface(body: int, friction: float) -> None:
         restitution=0,
         linearDamping=0,
         angularDamping=0,
+        physicsClientId=CLIENT,
     )
 
 
@@ -128,6 +132,7 @@ def _add(asset: Asset, pose: Pose, visual: int, *, moves: bool) -> int:
         basePosition=(pose.x, pose.y, pose.z),
         baseOrientation=pose.quaternion,
         baseInertialFramePosition=_middle(asset),
+        physicsClientId=CLIENT,
     )
     _surface(body, asset.friction)
     return int(body)
@@ -145,13 +150,16 @@ def _shape(asset: Asset) -> int:
             lengths=[p.get("length", 0.1) for p in parts],
             collisionFramePositions=[p["at"] for p in parts],
             collisionFrameOrientations=[p["turn"] for p in parts],
+            physicsClientId=CLIENT,
         )
     )
 
 
 def _mesh(asset: Asset) -> int:
     """One convex piece a part, through a file as Bullet's compound meshes need it."""
-    return int(bullet.createCollisionShape(bullet.GEOM_MESH, fileName=_file(asset)))
+    return int(
+        bullet.createCollisionShape(bullet.GEOM_MESH, fileName=_file(asset), physicsClientId=CLIENT)
+    )
 
 
 @lru_cache(maxsize=4096)

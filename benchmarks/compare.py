@@ -1,0 +1,166 @@
+"""internav against the baseline of `naive.py`: the same houses, the same answers, side by side.
+
+    python benchmarks/compare.py [--scenes 6] [--episodes 10] [--seed 0] [--out FILE]
+
+Both make the same number of episodes in the same houses in one process, what a house needs once
+included; what a process needs once (`internav_start_s`) is told apart. Then each judges the
+obstacle sets of the other: lattice steps must be equal, any-angle ways agree within 1 % (the
+baseline's grown corners are polygons, so a gap a few millimetres too narrow is open to it).
+Exits 1 if they don't.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import platform
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import naive
+import numpy as np
+import shapely
+
+from internav_data.catalog import catalogue
+from internav_data.episodes import EpisodeConfig, Site, build_episodes
+from internav_data.geometry import Polygons, footprint
+from internav_data.houses import HouseConfig, build_house
+from internav_data.records import Pose
+from internav_data.world import settle
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from internav_data.records import Asset, Episode, House
+
+TOLERANCE = 0.01
+ROOMS = ("1", "2", "3", "4", "5", "7", "9")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scenes", type=int, default=len(ROOMS))
+    parser.add_argument("--episodes", type=int, default=10)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", type=Path)
+    options = parser.parse_args()
+    pool = catalogue().spawnable
+    houses = [
+        build_house(options.seed, scene, HouseConfig(rooms=ROOMS[scene % len(ROOMS)]), catalogue())
+        for scene in range(options.scenes)
+    ]
+    config = EpisodeConfig()
+    _, start_s = _timed(lambda: _start(houses[0], pool, config))
+    rows = [_row(house, options.episodes, pool, config, options.seed) for house in houses]
+    result = _summary(rows, options.episodes, start_s)
+    text = json.dumps(result, indent=1)
+    if options.out is not None:
+        options.out.parent.mkdir(parents=True, exist_ok=True)
+        options.out.write_text(text + "\n", encoding="utf-8")
+    print(text)
+    return 0 if result["agree"] else 1
+
+
+def _start(house: House, pool: tuple[Asset, ...], config: EpisodeConfig) -> None:
+    """Do what a worker does once in its life: load kernels, let every asset fall alone."""
+    build_episodes(house, 2, pool, config)
+    for asset in pool:
+        settle(asset, Pose(0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 1.0)), math.inf, tuple)
+
+
+def _timed(work: Callable[[], Any]) -> tuple[Any, float]:
+    begin = time.perf_counter()
+    done = work()
+    return done, time.perf_counter() - begin
+
+
+def _row(
+    house: House, count: int, pool: tuple[Asset, ...], config: EpisodeConfig, seed: int
+) -> dict[str, Any]:
+    ours, our_s = _timed(lambda: build_episodes(house, count, pool, config))
+    rng = np.random.default_rng([seed, house.scene])
+    most = config.most_obstacles(len(house.rooms))
+    site, house_s = _timed(lambda: naive.Site.of(house))
+    theirs, their_s = _timed(lambda: naive.build_episodes(site, count, pool, most, rng))
+    checked = [*(_theirs_on(site, e) for e in ours), *(_ours_on(Site.of(house), e) for e in theirs)]
+    row = {
+        "rooms": len(house.rooms),
+        "internav_s": our_s,
+        "baseline_s": house_s + their_s,
+        "baseline_house_s": house_s,
+        "ratio": (house_s + their_s) / our_s,
+        "obstacles_internav": sum(e.obstacle_count for e in ours),
+        "obstacles_baseline": sum(len(e.obstacles) for e in theirs),
+        "steps_differ": sum(not steps for steps, _ in checked),
+        "ways_differ": sum(not ways for _, ways in checked),
+        "checked": len(checked),
+    }
+    print(json.dumps(row), file=sys.stderr)
+    return row
+
+
+def _theirs_on(site: naive.Site, episode: Episode) -> tuple[bool, bool]:
+    """Let the baseline judge one of our episodes."""
+    assets = catalogue().assets
+    shapes = [
+        shapely.union_all(naive.plan_of(assets[o.asset_id], o.pose)) for o in episode.obstacles
+    ]
+    start, goal = (episode.start.i, episode.start.j), (episode.goal.i, episode.goal.j)
+    steps, way = naive.judge(site, start, goal, shapes)
+    clear = naive.steps_between(site.grid, start, goal)
+    ways = _near(way, episode.way_m) and _near(
+        naive.length(site.sight.path(naive._metres(start), naive._metres(goal)) or []),  # noqa: SLF001
+        episode.clear_m,
+    )
+    return steps == episode.steps and clear == episode.clear_steps, ways
+
+
+def _ours_on(site: Site, episode: naive.NaiveEpisode) -> tuple[bool, bool]:
+    """Judge one of the baseline's episodes."""
+    lattice = site.lattice.copy()
+    shapes = [footprint(o.asset, o.rest.pose) for o in episode.obstacles]
+    for shape in shapes:
+        lattice.add(shape)
+    steps = lattice.distance(episode.start, episode.goal)
+    ends = naive._metres(episode.start), naive._metres(episode.goal)  # noqa: SLF001
+    way = site.ways.distance(*ends, Polygons.joined(shapes))
+    clear = site.lattice.distance(episode.start, episode.goal)
+    ways = _near(way, episode.way_m) and _near(site.ways.distance(*ends), episode.clear_m)
+    return steps == episode.steps and clear == episode.clear_steps, ways
+
+
+def _near(first: float | None, second: float | None) -> bool:
+    if first is None or second is None:
+        return first is second
+    return abs(first - second) <= TOLERANCE * max(first, second)
+
+
+def _summary(rows: list[dict[str, Any]], episodes: int, start_s: float) -> dict[str, Any]:
+    our_s, their_s = (sum(row[k] for row in rows) for k in ("internav_s", "baseline_s"))
+    total = len(rows) * episodes
+    checked = sum(row["checked"] for row in rows)
+    differing = sum(row["ways_differ"] for row in rows)
+    return {
+        "benchmark": "compare",
+        "python": platform.python_version(),
+        "scenes": len(rows),
+        "episodes": total,
+        "internav_start_s": start_s,
+        "internav_episodes_per_s": total / our_s,
+        "baseline_episodes_per_s": total / their_s,
+        "ratio": their_s / our_s,
+        "target": 20.0,
+        "checked": checked,
+        "steps_differ": sum(row["steps_differ"] for row in rows),
+        "ways_differ": differing,
+        # Gaps within a millimetre of the disc's width are open to one and shut to the other.
+        "agree": all(row["steps_differ"] == 0 for row in rows) and differing <= checked * 0.02,
+        "rows": rows,
+    }
+
+
+if __name__ == "__main__":
+    sys.exit(main())
