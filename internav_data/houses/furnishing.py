@@ -39,6 +39,9 @@ LEAST_FREE = 0.45
 """Share of an empty room's nodes that furniture leaves to the agent."""
 JOINED = 0.93
 """Share of the free nodes that are joined to the doors: pockets are small."""
+SMALL_NODES = 60
+"""Rooms with fewer nodes than this are small: bathrooms, storage."""
+LEAST_FREE_SMALL, JOINED_SMALL = 0.33, 0.86
 WINDOW_DEPTH_M = 0.45
 """What stands nearer to a window than this must be lower than its sill."""
 
@@ -61,6 +64,7 @@ class RoomState:
     origin: NDArray[np.int64]
     anchors: NDArray[np.int64]
     least: int
+    joined: float
     solid_count: int = 0
     keep_count: int = 0
     placed: list[tuple[Group, float, float, int]] = field(default_factory=list)
@@ -95,7 +99,7 @@ class RoomState:
             self.origin,
             self.anchors,
             self.least,
-            JOINED,
+            self.joined,
         )
         if m < 0:
             return False
@@ -238,6 +242,7 @@ def room_state(
         origin,
         np.array(anchors, dtype=np.int64).reshape(-1, 2),
         0,
+        JOINED,
     )
     for i in range(i0, i1):
         for j in range(j0, j1):
@@ -254,7 +259,10 @@ def room_state(
             depth = WINDOW_DEPTH_M * 100.0
             side = _side_of(plan, room, o)
             state.add_keep(_sided(o, side, depth, o.bottom / 100.0, o.top / 100.0))
-    state.least = int(LEAST_FREE * int(state.free.sum()))
+    nodes = int(state.free.sum())
+    small = nodes < SMALL_NODES
+    state.least = int((LEAST_FREE_SMALL if small else LEAST_FREE) * nodes)
+    state.joined = JOINED_SMALL if small else JOINED
     return state
 
 

@@ -198,17 +198,18 @@ def desk(p: Picker, place: Place) -> list[Group]:
 def washbasin(p: Picker, place: Place) -> list[Group]:
     """Make a basin with a mirror over it."""
     del place
-    asset, glass = p.one("Sink"), p.one("Mirror", narrow(0.9))
-    if asset is None:
-        return []
-    basin = against(asset)
-    group = Group((basin,), (in_front(basin, 0.5),))
-    height = max(EYE_LEVEL_M - 0.05, asset.size[2] + 0.05)
-    if glass is not None and height + glass.size[2] < 2.2:  # noqa: PLR2004 - under any ceiling
-        hung = against(glass, z=round(height, 2))
-        if glass.size[0] <= asset.size[0] + 0.1:
-            return [group.with_items(hung), group]
-    return [group]
+    glass = p.one("Mirror", narrow(0.9))
+    out: list[Group] = []
+    for asset in (p.one("Sink"), p.smallest("Sink")):
+        if asset is None:
+            continue
+        basin = against(asset)
+        plain = Group((basin,), (in_front(basin, 0.5, 0.8),))
+        height = max(EYE_LEVEL_M - 0.05, asset.size[2] + 0.05)
+        if glass is not None and height + glass.size[2] < 2.2:  # noqa: PLR2004 - under any ceiling
+            out.append(plain.with_items(against(glass, z=round(height, 2))))
+        out.append(plain)
+    return out
 
 
 def laundry(p: Picker, place: Place) -> list[Group]:

@@ -88,8 +88,11 @@ def sofa_alone(p: Picker, place: Place) -> list[Group]:
     asset = p.one("Sofa", narrow(max(1.6, 0.6 * place.long_m)), any_size=True)
     if asset is None:
         return []
-    item = against(asset)
-    return [Group((item,), (in_front(item, 0.6),))]
+    out = []
+    for sofa in (asset, p.smallest("Sofa") or asset):
+        item = against(sofa)
+        out.append(Group((item,), (in_front(item, 0.5),)))
+    return out
 
 
 def television(p: Picker, place: Place) -> list[Group]:
@@ -108,12 +111,14 @@ def dining(p: Picker, place: Place) -> list[Group]:
     """Make a table with chairs pushed in, for as many as the room can take."""
     largest = 1.1 if place.area_m2 < 12 else 1.6 if place.area_m2 < 18 else 2.9  # noqa: PLR2004
     chair = p.one("Chair")
-    out: list[Group] = []
+    out: list[list[Group]] = []
     for limit in (largest, 1.5, 1.0):
         asset = p.one("DiningTable", within(0.6 * limit, limit), any_size=True)
         if asset is not None and limit <= largest:
-            out += _seated(p, Item(asset, 0.0, 0.0, FACING_WALL), chair)
-    return out
+            out.append(_seated(p, Item(asset, 0.0, 0.0, FACING_WALL), chair))
+    # A smaller table with all its chairs comes before a large one with few.
+    many = [group for table in out for group in table[:-2]]
+    return many + [group for table in out for group in table[-2:]]
 
 
 def _seated(p: Picker, table: Item, chair: Asset | None) -> list[Group]:
