@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from internav_data.episodes.config import EpisodeConfig
 from internav_data.generation.values import from_mapping, nested, plain, updated
 from internav_data.houses.config import HouseConfig
+from internav_data.houses.plan_file import load_floor_plan
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
@@ -61,6 +62,8 @@ class GenerationConfig:
             if not Path(folder).is_dir():
                 raise UsageError(f"assets: '{folder}' is no folder; name a folder with meshes")
         self.house.check()
+        if self.house.floor_plan is not None:
+            load_floor_plan(self.house.floor_plan)
         self.episodes.check()
 
     def episodes_of(self, split: Split) -> int:

@@ -1,3 +1,4 @@
+import functools
 import json
 import os
 import signal
@@ -18,12 +19,25 @@ from internav_data.records.errors import InternavError, QuarantineError, UsageEr
 CONFIG = load_config(overrides=["episodes_per_scene=3"])
 
 
-def made(out, scenes, workers=2, config=CONFIG, **orders):
+def made(out, scenes, workers=1, config=CONFIG, **orders):
     """Generate stub scenes; the journal lists every scene begun since the last call."""
     out.parent.mkdir(parents=True, exist_ok=True)
     (out.parent / "stub.json").write_text(json.dumps(orders))
     (out.parent / "journal").write_text("")
     return generate(out, config, scenes, workers, assets=CATALOGUE, setup=stub)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The contents of datasets of so many scenes, each made in one go by one worker."""
+
+    @functools.cache
+    def of(scenes):
+        out = tmp_path_factory.mktemp("whole") / "d"
+        made(out, scenes)
+        return contents(out)
+
+    return of
 
 
 def journal(out):
@@ -43,11 +57,10 @@ def test_a_dataset_is_made(tmp_path):
     assert read_manifest(tmp_path / "d").config["episodes_per_scene"] == 3
 
 
-def test_the_same_bytes_for_any_workers_and_after_deaths(tmp_path):
-    made(tmp_path / "1" / "d", 12, workers=1)
-    made(tmp_path / "3" / "d", 12, workers=3, kill_once=[4, 9])
-    assert contents(tmp_path / "1" / "d") == contents(tmp_path / "3" / "d")
-    assert journal(tmp_path / "3" / "d").count(4) == 2
+def test_the_same_bytes_for_any_workers_and_after_deaths(tmp_path, whole):
+    made(tmp_path / "d", 12, workers=3, kill_once=[4, 9])
+    assert contents(tmp_path / "d") == whole(12)
+    assert journal(tmp_path / "d").count(4) == 2
 
 
 def test_scenes_that_cannot_be_made_are_named(tmp_path):
@@ -87,7 +100,7 @@ def killed(out, signum, scenes=60):
 
 
 @pytest.mark.parametrize("signum", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
-def test_what_is_done_stays_after_a_kill(tmp_path, signum):
+def test_what_is_done_stays_after_a_kill(tmp_path, signum, whole):
     out = tmp_path / "d"
     code = killed(out, signum)
     assert code == (-signal.SIGKILL if signum == signal.SIGKILL else 128 + signum)
@@ -97,18 +110,16 @@ def test_what_is_done_stays_after_a_kill(tmp_path, signum):
     report = made(out, 60)
     assert set(journal(out)) == set(range(60)) - finished
     assert report.new_scenes == 60 - len(finished)
-    made(tmp_path / "whole" / "d", 60)
-    assert contents(out) == contents(tmp_path / "whole" / "d")
+    assert contents(out) == whole(60)
 
 
-def test_more_scenes_extend(tmp_path):
+def test_more_scenes_extend(tmp_path, whole):
     out = tmp_path / "d"
     made(out, 5)
-    report = made(out, 11)
-    assert journal(out) == list(range(5, 11))
-    assert (report.scenes, report.new_scenes) == (11, 6)
-    made(tmp_path / "whole" / "d", 11)
-    assert contents(out) == contents(tmp_path / "whole" / "d")
+    report = made(out, 12)
+    assert journal(out) == list(range(5, 12))
+    assert (report.scenes, report.new_scenes) == (12, 7)
+    assert contents(out) == whole(12)
 
 
 @pytest.mark.parametrize("scenes", [5, 3])
