@@ -41,6 +41,7 @@ ID_OR_NONE = Rule(-1, 32767)
 SIZE = Rule(1e-4, 1e4, digits=METRES)
 SCENE = Rule(pattern=r"scene-\d{6,}")
 NAME = Rule(pattern=r"\S+")
+WORDS = Rule(pattern=r"\S+( \S+)*")
 MASS = Rule(1e-4, 1e5)
 FRICTION = Rule(0.0, 2.0)
 SPLIT = Rule(choices=("train", "val", "test"))
@@ -79,7 +80,7 @@ EPISODE_RULES: Mapping[str, Rule] = {
     "obstacles.element.settle_s": FROM_ZERO,
     "obstacles.element.settle_penetration_m": FROM_ZERO,
     "physics.engine": NAME,
-    "physics.build": NAME,
+    "physics.build": WORDS,
     "physics.settle_s": FROM_ZERO,
     "physics.penetration_m": FROM_ZERO,
 }
