@@ -18,7 +18,6 @@ from internav_data.geometry.planar import (
     cross,
     point_polygon_distance,
     segment_polygon_distance,
-    segments_cross,
 )
 
 if TYPE_CHECKING:
@@ -104,37 +103,57 @@ def in_outline(x: float, y: float, outline: Floats) -> bool:
 
 
 @njit(cache=True)
-def close_outside(  # noqa: C901 - nodes, then edges
+def _leaves(ax: float, ay: float, bx: float, by: float, outline: Floats) -> bool:
+    """Whether segment ab, whose ends lie in or on an outline, leaves it on its way.
+
+    Unlike `planar.segments_cross`, which settles ties one way, touching is not crossing here.
+    """
+    previous = len(outline) - 1
+    for k in range(len(outline)):
+        cx, cy, dx, dy = outline[previous, 0], outline[previous, 1], outline[k, 0], outline[k, 1]
+        previous = k
+        first = cross(bx - ax, by - ay, cx - ax, cy - ay)
+        second = cross(bx - ax, by - ay, dx - ax, dy - ay)
+        third = cross(dx - cx, dy - cy, ax - cx, ay - cy)
+        fourth = cross(dx - cx, dy - cy, bx - cx, by - cy)
+        if first * second < 0.0 and third * fourth < 0.0:
+            return True
+    return not in_outline((ax + bx) / 2.0, (ay + by) / 2.0, outline)
+
+
+@njit(cache=True)
+def close_outside(  # noqa: C901 - nodes, their edges, then edges along each side
     blockers: Counts, outline: Floats, spacing: float
 ) -> None:
-    """Block for good what lies outside the outline, crosses it or leaves the lattice."""
+    """Block for good what lies outside the outline, leaves it or leaves the lattice."""
     nx, ny = blockers.shape[1], blockers.shape[2]
-    blockers[EAST, nx - 1, :] += 1
-    blockers[NORTH, :, ny - 1] += 1
     for i in range(nx):
         for j in range(ny):
             if not in_outline(i * spacing, j * spacing, outline):
-                blockers[:, i, j] += 1
+                blockers[:, i, j] = 1
                 if i > 0:
-                    blockers[EAST, i - 1, j] += 1
+                    blockers[EAST, i - 1, j] = 1
                 if j > 0:
-                    blockers[NORTH, i, j - 1] += 1
+                    blockers[NORTH, i, j - 1] = 1
     previous = len(outline) - 1
     for k in range(len(outline)):
-        ax, ay = outline[previous, 0], outline[previous, 1]
-        bx, by = outline[k, 0], outline[k, 1]
-        i0 = max(0, math.floor(min(ax, bx) / spacing))
-        i1 = min(nx - 1, math.ceil(max(ax, bx) / spacing))
-        j0 = max(0, math.floor(min(ay, by) / spacing))
-        j1 = min(ny - 1, math.ceil(max(ay, by) / spacing))
-        for i in range(i0, i1 + 1):
-            for j in range(j0, j1 + 1):
-                x, y = i * spacing, j * spacing
-                if segments_cross(x, y, x + spacing, y, ax, ay, bx, by):
-                    blockers[EAST, i, j] += 1
-                if segments_cross(x, y, x, y + spacing, ax, ay, bx, by):
-                    blockers[NORTH, i, j] += 1
+        ax, ay, bx, by = outline[previous, 0], outline[previous, 1], outline[k, 0], outline[k, 1]
         previous = k
+        # An edge between two nodes inside can leave the outline only across a side near it.
+        for i in range(
+            max(0, math.floor(min(ax, bx) / spacing)), min(nx, math.ceil(max(ax, bx) / spacing) + 1)
+        ):
+            for j in range(
+                max(0, math.floor(min(ay, by) / spacing)),
+                min(ny, math.ceil(max(ay, by) / spacing) + 1),
+            ):
+                x, y = i * spacing, j * spacing
+                if blockers[EAST, i, j] == 0 and _leaves(x, y, x + spacing, y, outline):
+                    blockers[EAST, i, j] = 1
+                if blockers[NORTH, i, j] == 0 and _leaves(x, y, x, y + spacing, outline):
+                    blockers[NORTH, i, j] = 1
+    blockers[EAST, nx - 1, :] = 1
+    blockers[NORTH, :, ny - 1] = 1
 
 
 @njit(cache=True)
