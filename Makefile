@@ -62,6 +62,21 @@ $(STAMP): pyproject.toml constraints.txt
 .PHONY: setup
 setup: $(STAMP) ## only set up .venv
 
+.PHONY: demo
+demo: $(STAMP) ## make a small dataset, prove it right, draw it: about three minutes
+	$(BIN)/internav-gen generate --out $(DEMO)/dataset --scenes 24 --episodes-per-scene 5
+	$(BIN)/internav-gen validate $(DEMO)/dataset
+	$(BIN)/internav-gen stats $(DEMO)/dataset
+	$(BIN)/internav-gen show $(DEMO)/dataset --scene 6 --out $(DEMO)/house.png
+	$(BIN)/internav-gen show $(DEMO)/dataset --scene 6 --episode 0 --out $(DEMO)/blocked.png
+	$(BIN)/internav-gen show $(DEMO)/dataset --scene 6 --episode 1 --out $(DEMO)/lengthened.png
+	$(BIN)/python examples/contact_sheet.py $(DEMO)/dataset $(DEMO)/houses.png
+	@echo
+	@echo "Look at   $(DEMO)/house.png  $(DEMO)/blocked.png  $(DEMO)/lengthened.png  $(DEMO)/houses.png"
+	@echo "The data  $(DEMO)/dataset (begin with its README.md)"
+	@echo "Load it   $(BIN)/python examples/stream_episodes.py $(DEMO)/dataset"
+	@echo "Make more $(BIN)/internav-gen generate --help"
+
 .PHONY: test
 test: $(STAMP) ## run the tests (but not the slow campaigns)
 	$(BIN)/python -m pytest -q -m 'not slow' -n 2 --dist loadfile $(ARGS)
@@ -77,12 +92,24 @@ test-bare: ## run the loader's tests with nothing but numpy and pyarrow installe
 	  --constraint constraints.txt --editable . pytest
 	$(BARE)/bin/python -m pytest -q -m bare $(ARGS)
 
+.PHONY: bench
+bench: $(STAMP) ## run the benchmarks: JSON into bench-results/
+	@mkdir -p bench-results
+	$(BIN)/python benchmarks/compare.py --out bench-results/compare.json >/dev/null
+	$(BIN)/python benchmarks/generation.py > bench-results/generation.json
+	$(BIN)/python benchmarks/loader.py > bench-results/loader.json
+	$(BIN)/python benchmarks/houses.py --out bench-results/houses.json
+	$(BIN)/python benchmarks/table2.py > bench-results/table2.json
+	@echo "Results: bench-results/*.json"
+
 .PHONY: check
 check: $(STAMP) ## lint, format, types, layers, schemas
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
+	$(BIN)/internav-gen schema --out build/schemas
+	diff -r schemas build/schemas
 
 .PHONY: format
 format: $(STAMP) ## mend what ruff can mend
@@ -91,5 +118,5 @@ format: $(STAMP) ## mend what ruff can mend
 
 .PHONY: clean
 clean: ## remove what was built here (not .venv)
-	rm -rf build dist bench-results demo .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf build dist bench-results $(DEMO) .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find internav_data cli tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +

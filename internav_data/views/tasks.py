@@ -101,18 +101,24 @@ def episode_lines(episode: Episode) -> list[str]:
     mode = f"{episode.mode}, {'sealed' if episode.sealed else 'passable off the grid'}"
     if episode.mode == "lengthened":
         mode = episode.mode
-    steps = "no way" if episode.steps is None else f"{episode.steps} steps"
-    way = "no way" if episode.way_m is None else f"{episode.way_m:.2f} m"
     first = [
         episode.episode_id,
         mode,
         f"clear {episode.clear_steps} steps, {episode.clear_m:.2f} m",
-        f"with obstacles {steps}, {way}",
+        f"with obstacles {_with_obstacles(episode)}",
     ]
     things = [
         f"{k} {o.type} {o.mass_kg:.1f} kg ({_kind(o)})" for k, o in enumerate(episode.obstacles, 1)
     ]
     return ["   ".join(first), "   ".join(things)] if things else ["   ".join(first)]
+
+
+def _with_obstacles(episode: Episode) -> str:
+    if episode.steps is not None:
+        return f"{episode.steps} steps, {episode.way_m or math.nan:.2f} m"
+    if episode.way_m is not None:
+        return f"cut off on the grid, {episode.way_m:.2f} m off it"
+    return "cut off"
 
 
 def _ends(episode: Episode) -> tuple[Vec2, Vec2]:

@@ -115,6 +115,9 @@ def test_captions_say_what_the_episode_says(hand_episode):
     assert "blocked, sealed" in first
     assert "clear 22 steps, 5.10 m" in first
     assert second == "1 Chair 10.0 kg (push)   2 Apple 0.2 kg (pick)"
+    assert first.endswith("with obstacles cut off")
+    off_grid = replace(hand_episode, sealed=False, way_m=6.5)
+    assert "cut off on the grid, 6.50 m off it" in episode_lines(off_grid)[0]
     open_one = replace(hand_episode, mode="lengthened", steps=40, way_m=8.25, sealed=False)
     assert (
         "lengthened   clear 22 steps, 5.10 m   with obstacles 40 steps, 8.25 m"
