@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import shutil
@@ -148,43 +149,43 @@ def test_killed_anywhere_readers_are_safe_and_the_next_call_finishes(tmp_path, m
         build(begun, range(first))
         assemble(begun, IDENTITY, ASSETS, first)
     build(begun, range(first, 20))
-    real = {name: getattr(Path, name) for name in ("replace", "unlink")}
-    left = 0
-
-    def counted(name):
-        def step(*args, **kwargs):
-            nonlocal left
-            if left == 0:
-                raise _KilledError
-            left -= 1
-            return real[name](*args, **kwargs)
-
-        return step
-
-    for deadline in range(first % 3, 200, 4):
+    steps = killed_after(shutil.copytree(begun, tmp_path / "whole"), None, monkeypatch)
+    # Every step while things are put in place, every fourth while shards are made.
+    for deadline in (*range(0, steps - 24, 4), *range(max(0, steps - 24), steps)):
         out = shutil.copytree(begun, tmp_path / f"out-{deadline}")
-        killed = False
-        with monkeypatch.context() as patch:
-            left = deadline
-            for name in real:
-                patch.setattr(Path, name, counted(name))
-            try:
-                assemble(out, IDENTITY, ASSETS, 20)
-            except _KilledError:
-                killed = True
+        assert killed_after(out, deadline, monkeypatch) == deadline
         assert has_manifest(out) or not first
         if has_manifest(out):
             ids = [episode.episode_id for episode in load_dataset(out)]
             assert len(ids) in {2 * first, 40}
             assert len(set(ids)) == len(ids)
-        if not killed:
-            break
         open_work(out, IDENTITY)
         assert done_scenes(out) == frozenset(range(20))
         assemble(out, IDENTITY, ASSETS, 20)
         assert tree(out) == tree(wanted)
-    assert not killed
-    assert deadline > 20
+        shutil.rmtree(out)
+
+
+def killed_after(out, deadline, monkeypatch):
+    """Assemble 20 scenes, killed after some renames and removals; return how many there were."""
+    real = {name: getattr(Path, name) for name in ("replace", "unlink")}
+    steps = 0
+
+    def counted(name):
+        def step(*args, **kwargs):
+            nonlocal steps
+            if steps == deadline:
+                raise _KilledError
+            steps += 1
+            return real[name](*args, **kwargs)
+
+        return step
+
+    with monkeypatch.context() as patch, contextlib.suppress(_KilledError):
+        for name in real:
+            patch.setattr(Path, name, counted(name))
+        assemble(out, IDENTITY, ASSETS, 20)
+    return steps
 
 
 def test_missing_scene_is_named(tmp_path):

@@ -86,7 +86,8 @@ def test_any_change_changes_the_digest(change):
     assert logical_digest(one) != logical_digest(other)
 
 
-def test_what_lies_under_a_null_does_not_matter():
+@pytest.mark.parametrize("last", [[4], None])
+def test_what_lies_under_a_null_does_not_matter(last):
     kind = pa.struct([pa.field("a", pa.list_(pa.field("element", pa.int32())))])
     columns = [
         pa.StructArray.from_arrays(
@@ -94,7 +95,7 @@ def test_what_lies_under_a_null_does_not_matter():
             fields=list(kind),
             mask=pa.array([False, True, False]),
         )
-        for items in ([[1], [2, 3], [4]], [[1], None, [4]])
+        for items in ([[1], [2, 3], last], [[1], None, last], [[1], [], last])
     ]
-    digests = [logical_digest(pa.table({"s": column})) for column in columns]
-    assert digests[0] == digests[1] == slow_digest(pa.table({"s": columns[0]}))
+    digests = {logical_digest(pa.table({"s": column})) for column in columns}
+    assert digests == {slow_digest(pa.table({"s": columns[0]}))}

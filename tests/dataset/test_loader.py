@@ -188,6 +188,16 @@ def test_memory_held_is_bounded(ds, monkeypatch):
         assert len(some.shelf._groups) == 1
 
 
+def test_another_process_opens_its_own_files(ds, monkeypatch):
+    some = load_dataset(ds.path)
+    some[0]
+    before, groups = some.shelf.file(0), some.shelf._groups
+    monkeypatch.setattr("os.getpid", lambda: -1)
+    assert some[0] == ds[0]
+    assert some.shelf._groups is not groups
+    assert some.shelf.file(0) is not before
+
+
 def test_duckdb_reads_it(dataset_folder, everything):
     import duckdb
 
