@@ -41,7 +41,7 @@ JOINED = 0.93
 """Share of the free nodes that are joined to the doors: pockets are small."""
 SMALL_NODES = 60
 """Rooms with fewer nodes than this are small: bathrooms, storage."""
-LEAST_FREE_SMALL, JOINED_SMALL = 0.33, 0.86
+LEAST_FREE_SMALL, JOINED_SMALL = 0.25, 0.84
 WINDOW_DEPTH_M = 0.45
 """What stands nearer to a window than this must be lower than its sill."""
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from internav_data.houses.pieces import (
     BACK_GAP_M,
+    FACING_LEFT,
     FACING_RIGHT,
     Group,
     Item,
@@ -72,7 +73,7 @@ def bed(p: Picker, place: Place) -> list[Group]:
     lengthwise = Item(asset, 0.0, BACK_GAP_M + asset.size[0] / 2.0, FACING_RIGHT)
     corner = Group((lengthwise,), (in_front(lengthwise, 0.5, 0.5),))
     if stand is None:
-        return [plain, corner]
+        return [plain, corner, *_narrow_beds(p)]
     left, right = _beside(main, stand, -1), _beside(main, stand, 1)
     one, both = plain.with_items(left), plain.with_items(left, right)
     clock = p.one("AlarmClock") if p.chance(0.5) else None
@@ -80,10 +81,23 @@ def bed(p: Picker, place: Place) -> list[Group]:
         resting = p.resting(left, 1, clock, 0.0, 0.0)
         if resting is not None:
             one, both = one.with_items(resting), both.with_items(resting)
-    return [both, one, plain, corner] if double or p.chance(0.3) else [one, plain, corner]
+    first = [both] if double or p.chance(0.3) else []
+    return [*first, one, plain, corner, *_narrow_beds(p)]
 
 
-def _plain(*kinds: str, front: float = 0.3) -> Callable[[Picker, Place], list[Group]]:
+def _narrow_beds(p: Picker) -> list[Group]:
+    """Make the smallest bed, head or side to the wall, for where no other finds a place."""
+    asset = p.smallest("Bed")
+    if asset is None:
+        return []
+    side = BACK_GAP_M + asset.size[0] / 2.0
+    turned = (Item(asset, 0.0, side, turn) for turn in (FACING_RIGHT, FACING_LEFT))
+    return [Group((item,), (in_front(item, 0.4, 0.4),)) for item in (against(asset), *turned)]
+
+
+def _plain(
+    *kinds: str, front: float = 0.3, share: float = 0.9
+) -> Callable[[Picker, Place], list[Group]]:
     """One piece against a wall: any of some types."""
 
     def make(p: Picker, place: Place) -> list[Group]:
@@ -95,7 +109,7 @@ def _plain(*kinds: str, front: float = 0.3) -> Callable[[Picker, Place], list[Gr
             for asset in (p.one(kind), p.smallest(kind)):
                 if asset is not None:
                     item = against(asset)
-                    out.append(Group((item,), (in_front(item, front, 0.9),) if front else ()))
+                    out.append(Group((item,), (in_front(item, front, share),) if front else ()))
         return out
 
     return make
@@ -119,9 +133,9 @@ safe = _plain("Safe", front=0.3)
 cabinet = _plain("FilingCabinet", front=0.4)
 coat_rack = _plain("CoatRack", front=0.0)
 shoe_cabinet = _plain("ShoeCabinet", front=0.3)
-toilet = _plain("Toilet", front=0.5)
-tub = _plain("Bathtub", front=0.5)
-shower = _plain("Shower", front=0.5)
+toilet = _plain("Toilet", front=0.35, share=0.8)
+tub = _plain("Bathtub", front=0.35, share=0.35)
+shower = _plain("Shower", front=0.4, share=0.5)
 fridge = _plain("Fridge", front=0.6)
 
 
@@ -208,7 +222,7 @@ def washbasin(p: Picker, place: Place) -> list[Group]:
         height = max(EYE_LEVEL_M - 0.05, asset.size[2] + 0.05)
         if glass is not None and height + glass.size[2] < 2.2:  # noqa: PLR2004 - under any ceiling
             out.append(plain.with_items(against(glass, z=round(height, 2))))
-        out.append(plain)
+        out += [plain, Group((basin,), (in_front(basin, 0.25, 0.6),))]
     return out
 
 

@@ -104,10 +104,10 @@ RULES: Mapping[str, tuple[Rule, ...]] = {
         _PICTURES,
     ),
     "bathroom": (
-        Rule(g.tub, "corner", 0.6, least_m2=4.5),
+        Rule(g.tub, "corner", 0.7, least_m2=6.0),
         Rule(g.shower, "corner", 1.0, lacking="Bathtub"),
-        Rule(g.toilet, "any", 1.0),
-        Rule(g.washbasin, "any", 1.0),
+        Rule(g.washbasin, "corner", 1.0),
+        Rule(g.toilet, "corner", 1.0),
         Rule(g.shower, "corner", 0.3, least_m2=9.0),
         Rule(g.hamper, "corner", 0.5, least_m2=4.0),
         Rule(g.laundry, "corner", 0.4, without="laundry", least_m2=7.0),
