@@ -18,6 +18,7 @@ from internav_data.houses.fitting import (
     first_fit,
     turned,
 )
+from internav_data.houses.pieces import BACK_GAP_M
 from internav_data.houses.plan import clear_size_m
 from internav_data.houses.standards import DOOR_CLEAR_CM, HALF_WALL_CM
 
@@ -125,7 +126,8 @@ class RoomState:
         """
         spots: list[Floats] = []
         likes: list[Floats] = []
-        left, right = group.left, group.right
+        # A finger's breadth to the walls on either side, as to the one behind.
+        left, right = group.left - BACK_GAP_M, group.right + BACK_GAP_M
         for edge in self.edges:
             spare = edge.length - (right - left)
             if spare < 0.0:
@@ -136,7 +138,7 @@ class RoomState:
             ends = np.minimum(along + left, edge.length - along - right)
             like = 0.6 * rng.random(count)
             if prefer == "corner":
-                like += ends
+                like += 3.0 * ends
             elif prefer == "centre":
                 like += 1.2 * np.abs(along + 0.5 * (left + right) - edge.length / 2) - 0.15 * spare
             elif prefer == "sun":

@@ -106,8 +106,8 @@ RULES: Mapping[str, tuple[Rule, ...]] = {
     "bathroom": (
         Rule(g.tub, "corner", 0.7, least_m2=6.0),
         Rule(g.shower, "corner", 1.0, lacking="Bathtub"),
-        Rule(g.washbasin, "corner", 1.0),
         Rule(g.toilet, "corner", 1.0),
+        Rule(g.washbasin, "corner", 1.0),
         Rule(g.shower, "corner", 0.3, least_m2=9.0),
         Rule(g.hamper, "corner", 0.5, least_m2=4.0),
         Rule(g.laundry, "corner", 0.4, without="laundry", least_m2=7.0),
