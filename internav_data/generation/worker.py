@@ -57,7 +57,11 @@ def _answer(work: Callable[[Any], Any], task: Any) -> Done | Failed | Fatal:  # 
         return Fatal(type(error).__name__, str(error))
     except OSError as error:
         where = f" ({error.filename})" if error.filename else ""
-        return Fatal("InternavError", f"cannot write: {error.strerror or error}{where}")
+        return Fatal(
+            "InternavError",
+            f"cannot write: {error.strerror or error}{where}; make room for the dataset, then "
+            "run the same command again: finished scenes are kept",
+        )
     except MemoryError:
         os._exit(1)  # a new process may have more luck: the parent tries again
     except Exception as error:  # noqa: BLE001 - a bug in one scene must not end the run

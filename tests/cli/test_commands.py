@@ -1,5 +1,6 @@
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -225,6 +226,22 @@ def test_the_doctor_finds_this_machine_fit(tmp_path):
     assert told.returncode == 0
     assert {"Python", "pybullet", "cores", "disk", "numba cache"} <= set(checks)
     assert all(check["remedy"] for check in checks.values() if check["state"] != "good")
+
+
+@pytest.mark.parametrize(("signum", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_ends_in_order_and_keeps_what_is_done(tmp_path, signum, code):
+    words = ("--scenes", 500, "--episodes-per-scene", 2, "--rooms", 1, "--workers", 1)
+    command = [GEN, "generate", "--out", tmp_path / "d", *map(str, words)]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 120
+    while not list(tmp_path.rglob("scene-*.work")) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    process.send_signal(signum)
+    _, told = process.communicate(timeout=60)
+    assert process.returncode == code
+    assert len(told.strip().splitlines()) == 1, told
+    assert "run the same command again to continue" in told
+    assert list(tmp_path.rglob("scene-*.work"))
 
 
 def test_a_reader_that_leaves_early_is_no_error():

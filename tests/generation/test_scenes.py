@@ -1,0 +1,104 @@
+"""Real scenes, small ones: what the commands and the Python functions make of them."""
+
+import dataclasses
+import json
+
+import pytest
+import scene_stubs
+
+from internav_data.catalog import catalogue, split_of_asset
+from internav_data.generation import generate, generate_episodes, generate_house, load_config
+from internav_data.generation.again import scene_again
+from internav_data.generation.scenes import ATTEMPTS, build_scene, obstacle_pool
+from internav_data.records.errors import QuarantineError, UsageError, ValidationError
+
+CONFIG = load_config(overrides=["episodes_per_scene=2", "house.rooms=1-2"])
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    out = tmp_path_factory.mktemp("real") / "d"
+    assert generate(out, CONFIG, 3, workers=1).episodes == 5
+    return out
+
+
+def test_python_makes_what_the_dataset_holds(dataset):
+    from internav_data.dataset import load_dataset
+
+    held = [episode for episode in load_dataset(dataset) if episode.scene_id == "scene-000002"]
+    house = generate_house(seed=0, scene=2, config=CONFIG)
+    assert house == load_dataset(dataset).scene("scene-000002")
+    assert list(generate_episodes(house, 2, config=CONFIG)) == held
+    assert generate_episodes(house, 1, first=1, config=CONFIG) == (held[1],)
+
+
+def test_a_scene_again_is_compared(dataset, tmp_path):
+    text, verdict = scene_again(CONFIG, 2, 1, dataset)
+    assert "the same as in" in verdict
+    said = json.loads(text)
+    assert said["episode_id"] == "scene-000002/0001"
+    assert "assets" not in json.loads(scene_again(CONFIG, 2)[0])["scene"]
+    other = dataclasses.replace(CONFIG, seed=1)
+    with pytest.raises(UsageError, match="another config"):
+        scene_again(other, 2, 1, dataset)
+    with pytest.raises(UsageError, match="no episode"):
+        scene_again(CONFIG, 2, 7, dataset)
+
+
+def test_a_dataset_that_holds_something_else_is_told(dataset, monkeypatch):
+    import internav_data.generation.again as module
+
+    true = module.made_again(CONFIG, 2, 1)
+    moved = dataclasses.replace(true.episodes[1], clear_m=99.0)
+    false = dataclasses.replace(true, episodes=(true.episodes[0], moved))
+    monkeypatch.setattr(module, "made_again", lambda *_: false)
+    with pytest.raises(ValidationError, match=r"scene-000002/0001 differs.*: clear_m$"):
+        scene_again(CONFIG, 2, 1, dataset)
+
+
+@pytest.mark.parametrize("fails", range(ATTEMPTS + 1))
+@pytest.mark.parametrize("room", ["houses.build_house", "episodes.build_episodes"])
+def test_sub_seeds_are_tried_before_a_scene_is_given_up(monkeypatch, room, fails):
+    tried = []
+
+    def refused(name, attempt):
+        if room.endswith(name):
+            tried.append(attempt)
+            if attempt < fails:
+                raise QuarantineError(f"attempt {attempt}")
+
+    def build_house(seed, scene, _config, _catalogue, attempt):
+        refused("build_house", attempt)
+        return scene_stubs.house(seed, scene)
+
+    def build_episodes(house, count, _pool, _config, *, attempt):
+        refused("build_episodes", attempt)
+        return tuple(scene_stubs.episode(house, index) for index in range(count))
+
+    monkeypatch.setattr("internav_data.houses.build_house", build_house, raising=False)
+    monkeypatch.setattr("internav_data.episodes.build_episodes", build_episodes, raising=False)
+    if fails < ATTEMPTS:
+        assert build_scene(2, CONFIG, scene_stubs.CATALOGUE).attempts == fails + 1
+    else:
+        with pytest.raises(QuarantineError, match=f"attempt {ATTEMPTS - 1}"):
+            build_scene(2, CONFIG, scene_stubs.CATALOGUE)
+    assert tried == list(range(min(fails + 1, ATTEMPTS)))
+
+
+def test_unseen_assets_are_apart():
+    config = load_config(overrides=["episodes.unseen_assets=true"])
+    known = catalogue()
+    pools = [obstacle_pool(known, config, split) for split in ("train", "val", "test")]
+    ids = [{asset.asset_id for asset in pool} for pool in pools]
+    assert sum(map(len, ids)) == len(set.union(*ids)) == len(known.spawnable)
+    assert all(split_of_asset(asset) == "val" for asset in pools[1])
+    assert obstacle_pool(known, CONFIG, "val") == known.spawnable
+
+
+@pytest.mark.parametrize(("count", "first"), [(0, 0), (1, -1)])
+def test_counts_that_cannot_be_meant(count, first):
+    house = generate_house(seed=0, scene=2, config=CONFIG)
+    with pytest.raises(UsageError):
+        generate_episodes(house, count, first, CONFIG)
+    with pytest.raises(UsageError):
+        generate_house(seed=0, scene=-1)
