@@ -85,6 +85,14 @@ def _touching_shadow(
 
 
 @njit(cache=True)
+def far_from(x: float, y: float, boxes: Floats, k: int, reach: float) -> bool:
+    """Whether a point is farther than `reach` from a box."""
+    dx = max(0.0, boxes[k, 0] - x, x - boxes[k, 2])
+    dy = max(0.0, boxes[k, 1] - y, y - boxes[k, 3])
+    return dx * dx + dy * dy >= reach * reach
+
+
+@njit(cache=True)
 def shadow(
     x: float, y: float, radius: float, vertices: Floats, start: int, stop: int
 ) -> tuple[int, float, float]:
@@ -225,12 +233,16 @@ def free_arcs(  # noqa: C901 - corners of polygons against polygons of two group
             begin, width = cone(vertices, start, stop, k)
             count, state = 0, NONE
             for o in own:
-                if o != polygon and state != ALL:
+                if state == ALL:
+                    break
+                if o != polygon and not far_from(x, y, boxes, o, 2.0 * radius):
                     state, low, high = shadow(x, y, radius, vertices, offsets[o], offsets[o + 1])
                     if state == SOME:
                         count = _cover(pieces, count, begin, width, low, high)
             for o in foreign:
-                if state != ALL:
+                if state == ALL:
+                    break
+                if not far_from(x, y, other_boxes, o, 2.0 * radius):
                     a, b = other_offsets[o], other_offsets[o + 1]
                     state, low, high = shadow(x, y, radius, others, a, b)
                     if state == SOME:
@@ -258,15 +270,9 @@ def shadows_on(
     count = 0
     for a in range(len(arcs)):
         x, y, half = arcs[a, X], arcs[a, Y], arcs[a, HALF]
-        reach = 2.0 * radius
         begin = math.nan
         for k in range(len(boxes)):
-            if (
-                x < boxes[k, 0] - reach
-                or x > boxes[k, 2] + reach
-                or y < boxes[k, 1] - reach
-                or y > boxes[k, 3] + reach
-            ):
+            if far_from(x, y, boxes, k, 2.0 * radius):
                 continue
             if math.isnan(begin):
                 begin = math.atan2(arcs[a, MID_Y], arcs[a, MID_X]) - half

@@ -57,28 +57,23 @@ def unite(parent: Ints, parity: Ints, a: int, b: int, odd: int) -> bool:
 @njit(cache=True)
 def closest(
     first: Floats, start: int, stop: int, second: Floats, begin: int, end: int
-) -> tuple[float, Floats]:
-    """Distance of two convex polygons and a point of each (ax, ay, bx, by) that far apart."""
-    points = np.empty(4)
-    best = math.inf
+) -> tuple[float, float, float, float, float]:
+    """Distance of two convex polygons and a point of each that far apart: d, ax, ay, bx, by."""
+    best, px, py, qx, qy = math.inf, 0.0, 0.0, 0.0, 0.0
     for k in range(start, stop):
         x, y = first[k, 0], first[k, 1]
         if inside(x, y, second, begin, end):
-            points[:] = (x, y, x, y)
-            return 0.0, points
+            return 0.0, x, y, x, y
         bx, by, d = nearest(x, y, second, begin, end)
         if d < best:
-            best = d
-            points[:] = (x, y, bx, by)
+            best, px, py, qx, qy = d, x, y, bx, by
     for k in range(begin, end):
         x, y = second[k, 0], second[k, 1]
         if inside(x, y, first, start, stop):
-            points[:] = (x, y, x, y)
-            return 0.0, points
+            return 0.0, x, y, x, y
         ax, ay, d = nearest(x, y, first, start, stop)
         if d < best:
-            best = d
-            points[:] = (ax, ay, x, y)
+            best, px, py, qx, qy = d, ax, ay, x, y
     # No corner of either inside the other, and yet they may cross like two bars.
     previous = stop - 1
     for k in range(start, stop):
@@ -89,12 +84,11 @@ def closest(
             cx, cy, dx, dy = second[before, 0], second[before, 1], second[m, 0], second[m, 1]
             before = m
             if segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
-                side = cross(dx - cx, dy - cy, bx - ax, by - ay)
-                t = cross(cx - ax, cy - ay, dx - cx, dy - cy) / -side
+                side = cross(bx - ax, by - ay, dx - cx, dy - cy)
+                t = cross(cx - ax, cy - ay, dx - cx, dy - cy) / side
                 x, y = ax + t * (bx - ax), ay + t * (by - ay)
-                points[:] = (x, y, x, y)
-                return 0.0, points
-    return best, points
+                return 0.0, x, y, x, y
+    return best, px, py, qx, qy
 
 
 @njit(cache=True)
@@ -105,7 +99,7 @@ def clusters(vertices: Floats, offsets: Ints, boxes: Floats, gap: float) -> Ints
     for a in range(count):
         for b in near_ids(boxes, boxes[a], gap):
             if b > a:
-                d, _ = closest(
+                d, _, _, _, _ = closest(
                     vertices, offsets[a], offsets[a + 1], vertices, offsets[b], offsets[b + 1]
                 )
                 if d < gap:
@@ -149,18 +143,20 @@ def closes(
     for a in range(new):
         start, stop = added_offsets[a], added_offsets[a + 1]
         for b in near_ids(boxes, added_boxes[a], gap):
-            d, p = closest(added, start, stop, vertices, offsets[b], offsets[b + 1])
+            d, px, py, qx, qy = closest(added, start, stop, vertices, offsets[b], offsets[b + 1])
             if d < gap:
-                odd = _crossings(way, middles[a, 0], middles[a, 1], p[0], p[1])
-                odd ^= _crossings(way, p[0], p[1], p[2], p[3])
+                odd = _crossings(way, middles[a, 0], middles[a, 1], px, py)
+                odd ^= _crossings(way, px, py, qx, qy)
                 if not unite(parent, parity, labels[b], count + a, odd):
                     return True
         for b in range(a + 1, new):
-            d, p = closest(added, start, stop, added, added_offsets[b], added_offsets[b + 1])
+            d, px, py, qx, qy = closest(
+                added, start, stop, added, added_offsets[b], added_offsets[b + 1]
+            )
             if d < gap:
-                odd = _crossings(way, middles[a, 0], middles[a, 1], p[0], p[1])
-                odd ^= _crossings(way, p[0], p[1], p[2], p[3])
-                odd ^= _crossings(way, p[2], p[3], middles[b, 0], middles[b, 1])
+                odd = _crossings(way, middles[a, 0], middles[a, 1], px, py)
+                odd ^= _crossings(way, px, py, qx, qy)
+                odd ^= _crossings(way, qx, qy, middles[b, 0], middles[b, 1])
                 if not unite(parent, parity, count + b, count + a, odd):
                     return True
     return False

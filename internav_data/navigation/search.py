@@ -26,8 +26,8 @@ from internav_data.navigation.tangents import (
     TO_X,
     TO_Y,
     Tangents,
+    join,
     join_point,
-    joined,
 )
 
 if TYPE_CHECKING:
@@ -158,10 +158,10 @@ def _pop(states: States) -> int:
 def _relax(states: States, query: Query, state: int, cost: float, parent: int) -> None:
     if states.place[state] == CLOSED or cost >= states.cost[state]:
         return
-    row = states.data[state]
-    ahead = math.hypot(row[TO_X] - query.goal[0], row[TO_Y] - query.goal[1])
+    data = states.data
+    ahead = math.hypot(data[state, TO_X] - query.goal[0], data[state, TO_Y] - query.goal[1])
     states.cost[state] = cost
-    states.key[state] = cost + row[LENGTH] + ahead
+    states.key[state] = cost + data[state, LENGTH] + ahead
     states.parent[state] = parent
     at = states.place[state]
     if at == OUT_OF_HEAP:
@@ -189,34 +189,36 @@ def _append(states: States, slot: int, target: int) -> int:
 def _list(states: States, query: Query, slot: int) -> None:
     """List a slot's tangents to the goal and to or from obstacles' corners."""
     states.listed[slot] = True
-    arcs = query.arcs
-    row = states.data[states.sizes[0]]
-    if join_point(row, arcs, slot, query.goal[0], query.goal[1], query.radius):
+    data, arcs, radius = states.data, query.arcs, query.radius
+    if join_point(data, states.sizes[0], arcs, slot, query.goal[0], query.goal[1], radius):
         _append(states, slot, GOAL)
-    begin = query.own if slot // 2 < query.own else 0
-    for other in range(2 * begin, 2 * len(arcs)):
-        if other // 2 != slot // 2:
-            row = states.data[states.sizes[0]]
-            if joined(row, arcs, slot, other, query.radius):
-                _append(states, slot, other)
+    own = slot // 2
+    for other in range(query.own if own < query.own else 0, len(arcs)):
+        if other != own:
+            bits = join(data, states.sizes[0], arcs, slot, other, radius)
+            if bits & 1:
+                _append(states, slot, 2 * other)
+            if bits & 2:
+                _append(states, slot, 2 * other + 1)
 
 
 @njit(cache=True)
 def _begin(states: States, query: Query) -> None:
     """List the tangents from the start to every arc, and straight to the goal."""
     x, y = query.start[0], query.start[1]
-    row = states.data[states.sizes[0]]
-    row[LEAVE] = row[ARRIVE] = 0.0
-    row[FROM_X], row[FROM_Y], row[TO_X], row[TO_Y] = x, y, query.goal[0], query.goal[1]
-    row[LENGTH] = math.hypot(query.goal[0] - x, query.goal[1] - y)
+    data, k = states.data, states.sizes[0]
+    data[k, LEAVE] = data[k, ARRIVE] = 0.0
+    data[k, FROM_X], data[k, FROM_Y] = x, y
+    data[k, TO_X], data[k, TO_Y] = query.goal[0], query.goal[1]
+    data[k, LENGTH] = math.hypot(query.goal[0] - x, query.goal[1] - y)
     _relax(states, query, _append(states, -1, GOAL), 0.0, -1)
     for slot in range(2 * len(query.arcs)):
-        row = states.data[states.sizes[0]]
+        k = states.sizes[0]
         # What arrives from a point is what leaves for it in the opposite sense, reversed.
-        if join_point(row, query.arcs, slot ^ 1, x, y, query.radius):
-            row[ARRIVE] = -row[LEAVE]
-            row[FROM_X], row[TO_X] = row[TO_X], row[FROM_X]
-            row[FROM_Y], row[TO_Y] = row[TO_Y], row[FROM_Y]
+        if join_point(data, k, query.arcs, slot ^ 1, x, y, query.radius):
+            data[k, ARRIVE] = -data[k, LEAVE]
+            data[k, TO_X], data[k, TO_Y] = data[k, FROM_X], data[k, FROM_Y]
+            data[k, FROM_X], data[k, FROM_Y] = x, y
             _relax(states, query, _append(states, -1, slot), 0.0, -1)
 
 
@@ -275,7 +277,7 @@ def search(scene: Scene, tangents: Tangents, query: Query) -> tuple[float, Float
     own, arcs = len(tangents.target), len(query.arcs)
     new = arcs - query.own
     # Each slot lists its tangents once; the start may have two for every arc.
-    extra = 2 * arcs + 2 * new * 2 * arcs + 2 * query.own * 2 * new + 4 * arcs + 4
+    extra = 2 + 2 * arcs + 2 * new * 2 * arcs + 2 * query.own * 2 * new + 4 * arcs + 4
     states = states_of(tangents, 2 * arcs, extra)
     _begin(states, query)
     while states.sizes[1] > 0:

@@ -45,110 +45,107 @@ class Tangents(NamedTuple):
 
 
 @njit(cache=True)
-def on_arc(arc: Floats, nx: float, ny: float) -> bool:
+def on_arc(arcs: Floats, a: int, nx: float, ny: float) -> bool:
     """Whether a unit direction lies on an arc."""
-    return arc[MID_X] * nx + arc[MID_Y] * ny >= arc[COS_HALF] - ANGLE_SLACK
+    return arcs[a, MID_X] * nx + arcs[a, MID_Y] * ny >= arcs[a, COS_HALF] - ANGLE_SLACK
 
 
 @njit(cache=True)
-def progress(arc: Floats, nx: float, ny: float, sense: int) -> float:
+def progress(arcs: Floats, slot: int, nx: float, ny: float) -> float:
     """How far round its arc a unit direction lies, radians in [-half, half]."""
-    turn = math.atan2(cross(arc[MID_X], arc[MID_Y], nx, ny), arc[MID_X] * nx + arc[MID_Y] * ny)
-    if sense == 1:
+    a = slot // 2
+    mid_x, mid_y, half = arcs[a, MID_X], arcs[a, MID_Y], arcs[a, HALF]
+    turn = math.atan2(cross(mid_x, mid_y, nx, ny), mid_x * nx + mid_y * ny)
+    if slot % 2 == 1:
         turn = -turn
-    return min(arc[HALF], max(-arc[HALF], turn))
+    return min(half, max(-half, turn))
 
 
 @njit(cache=True)
-def from_point(
-    px: float, py: float, arc: Floats, sense: int, radius: float
-) -> tuple[bool, float, float]:
-    """Touching direction of the tangent from a point that goes on round the arc in a sense.
-
-    A tangent that leaves the arc in a sense and ends in the point touches where one from the point
-    touches in the opposite sense.
-    """
-    ex, ey = px - arc[X], py - arc[Y]
+def join_point(
+    data: Floats, row: int, arcs: Floats, slot: int, x: float, y: float, radius: float
+) -> bool:
+    """Write the tangent that leaves a slot for a point into a row; False where there is none."""
+    a = slot // 2
+    ex, ey = x - arcs[a, X], y - arcs[a, Y]
     distance = math.sqrt(ex * ex + ey * ey)
     if distance == 0.0:
-        return False, 0.0, 0.0
+        return False
     ex, ey = ex / distance, ey / distance
     # A point on the circle may lie the last bit inside it.
     c = min(1.0, radius / distance)
     s = math.sqrt(1.0 - c * c)
-    if sense == 1:
+    # Counter-clockwise, the string leaves before it has turned as far as the point's direction.
+    if slot % 2 == 0:
         s = -s
     nx, ny = c * ex - s * ey, s * ex + c * ey
-    return on_arc(arc, nx, ny), nx, ny
+    if not on_arc(arcs, a, nx, ny):
+        return False
+    data[row, LEAVE], data[row, ARRIVE] = progress(arcs, slot, nx, ny), 0.0
+    data[row, FROM_X], data[row, FROM_Y] = arcs[a, X] + radius * nx, arcs[a, Y] + radius * ny
+    data[row, TO_X], data[row, TO_Y] = x, y
+    data[row, LENGTH] = math.hypot(x - data[row, FROM_X], y - data[row, FROM_Y])
+    return True
 
 
 @njit(cache=True)
-def between(
-    first: Floats, sense: int, second: Floats, end_sense: int, radius: float
-) -> tuple[bool, float, float, float, float]:
-    """Touching directions of the tangent that leaves one arc and arrives on another."""
-    dx, dy = second[X] - first[X], second[Y] - first[Y]
-    distance = math.sqrt(dx * dx + dy * dy)
-    if distance == 0.0:
-        return False, 0.0, 0.0, 0.0, 0.0
+def join(data: Floats, row: int, arcs: Floats, slot: int, b: int, radius: float) -> int:
+    """Write the tangents from a slot to another arc, at most two, from a row on.
+
+    Returns a bit for each sense in which they arrive: 1 counter-clockwise, 2 clockwise; the
+    counter-clockwise one comes first. Scalars only: this is the innermost loop of everything.
+    """
+    a = slot // 2
+    dx, dy = arcs[b, X] - arcs[a, X], arcs[b, Y] - arcs[a, Y]
+    square = dx * dx + dy * dy
+    if square == 0.0:
+        return 0
+    distance = math.sqrt(square)
     dx, dy = dx / distance, dy / distance
-    # Counter-clockwise the corner is on the left, so it touches on the right: (dy, -dx).
-    side = 1.0 if sense == 0 else -1.0
-    if sense == end_sense:
-        nx, ny = side * dy, -side * dx
-        return on_arc(first, nx, ny) and on_arc(second, nx, ny), nx, ny, nx, ny
+    # Counter-clockwise the corner is on the left, so the string touches on its right: (dy, -dx).
+    side = 1.0 if slot % 2 == 0 else -1.0
+    bits, same = 0, 1 << (slot % 2)
+    nx, ny = side * dy, -side * dx
+    if on_arc(arcs, a, nx, ny) and on_arc(arcs, b, nx, ny):
+        _write(data, row, arcs, slot, nx, ny, 2 * b + slot % 2, nx, ny, radius)
+        bits = same
     s = 2.0 * radius / distance
-    if s > 1.0:
-        return False, 0.0, 0.0, 0.0, 0.0
-    c = math.sqrt(1.0 - s * s)
-    # The string crosses over from one side to the other: turned by asin(s) from the centres' line.
-    ux, uy = c * dx - side * s * dy, side * s * dx + c * dy
-    nx, ny = side * uy, -side * ux
-    return on_arc(first, nx, ny) and on_arc(second, -nx, -ny), nx, ny, -nx, -ny
+    if s <= 1.0:
+        c = math.sqrt(1.0 - s * s)
+        # The string crosses the line of centres at asin(s), to touch on the other side.
+        ux, uy = c * dx - side * s * dy, side * s * dx + c * dy
+        nx, ny = side * uy, -side * ux
+        if on_arc(arcs, a, nx, ny) and on_arc(arcs, b, -nx, -ny):
+            if bits == 1:
+                row += 1
+            elif bits:
+                data[row + 1] = data[row]
+            _write(data, row, arcs, slot, nx, ny, 2 * b + 1 - slot % 2, -nx, -ny, radius)
+            bits |= 3 - same
+    return bits
 
 
 @njit(cache=True)
-def _record(
-    row: Floats,
-    first: Floats,
-    sense: int,
+def _write(
+    data: Floats,
+    row: int,
+    arcs: Floats,
+    slot: int,
     nx: float,
     ny: float,
-    second: Floats,
-    end_sense: int,
+    other: int,
     mx: float,
     my: float,
     radius: float,
 ) -> None:
-    row[LEAVE] = progress(first, nx, ny, sense)
-    row[ARRIVE] = progress(second, mx, my, end_sense)
-    row[FROM_X], row[FROM_Y] = first[X] + radius * nx, first[Y] + radius * ny
-    row[TO_X], row[TO_Y] = second[X] + radius * mx, second[Y] + radius * my
-    row[LENGTH] = math.hypot(row[TO_X] - row[FROM_X], row[TO_Y] - row[FROM_Y])
-
-
-@njit(cache=True)
-def joined(row: Floats, arcs: Floats, slot: int, other: int, radius: float) -> bool:
-    """Write the tangent from slot to slot into a row; False where there is none."""
-    first, second = arcs[slot // 2], arcs[other // 2]
-    sense, end_sense = slot % 2, other % 2
-    there, nx, ny, mx, my = between(first, sense, second, end_sense, radius)
-    if there:
-        _record(row, first, sense, nx, ny, second, end_sense, mx, my, radius)
-    return there
-
-
-@njit(cache=True)
-def join_point(row: Floats, arcs: Floats, slot: int, x: float, y: float, radius: float) -> bool:
-    """Write the tangent that leaves a slot for a point into a row; False where there is none."""
-    arc, sense = arcs[slot // 2], slot % 2
-    there, nx, ny = from_point(x, y, arc, 1 - sense, radius)
-    if there:
-        row[LEAVE], row[ARRIVE] = progress(arc, nx, ny, sense), 0.0
-        row[FROM_X], row[FROM_Y] = arc[X] + radius * nx, arc[Y] + radius * ny
-        row[TO_X], row[TO_Y] = x, y
-        row[LENGTH] = math.hypot(x - row[FROM_X], y - row[FROM_Y])
-    return there
+    a, b = slot // 2, other // 2
+    data[row, LEAVE] = progress(arcs, slot, nx, ny)
+    data[row, ARRIVE] = progress(arcs, other, mx, my)
+    data[row, FROM_X], data[row, FROM_Y] = arcs[a, X] + radius * nx, arcs[a, Y] + radius * ny
+    data[row, TO_X], data[row, TO_Y] = arcs[b, X] + radius * mx, arcs[b, Y] + radius * my
+    data[row, LENGTH] = math.hypot(
+        data[row, TO_X] - data[row, FROM_X], data[row, TO_Y] - data[row, FROM_Y]
+    )
 
 
 @njit(cache=True)
@@ -156,29 +153,40 @@ def _all_pairs(scene: Scene, arcs: Floats, radius: float) -> tuple[Ints, Ints, F
     source = np.empty(1024, dtype=np.int64)
     target = np.empty(1024, dtype=np.int64)
     data = np.empty((1024, 7))
-    row = np.empty(7)
+    found = np.empty((2, 7))
     count = 0
-    for a in range(len(arcs)):
-        for b in range(a + 1, len(arcs)):
-            for kind in range(4):
-                slot, other = 2 * a + kind // 2, 2 * b + kind % 2
-                there = joined(row, arcs, slot, other, radius)
-                if not there or not segment_clear(
-                    scene, row[FROM_X], row[FROM_Y], row[TO_X], row[TO_Y], radius - SLACK_M
-                ):
+    for slot in range(2 * len(arcs)):
+        for b in range(slot // 2 + 1, len(arcs)):
+            bits = join(found, 0, arcs, slot, b, radius)
+            row = -1
+            for sense in range(2):
+                if not bits & (1 << sense):
+                    continue
+                row += 1
+                x, y, e, f = (
+                    found[row, FROM_X],
+                    found[row, FROM_Y],
+                    found[row, TO_X],
+                    found[row, TO_Y],
+                )
+                if not segment_clear(scene, x, y, e, f, radius - SLACK_M):
                     continue
                 if count + 2 > len(source):
                     source = np.concatenate((source, np.empty_like(source)))
                     target = np.concatenate((target, np.empty_like(target)))
                     data = np.concatenate((data, np.empty_like(data)))
+                other = 2 * b + sense
                 source[count], target[count] = slot, other
-                data[count] = row
+                data[count] = found[row]
                 # Backwards: opposite senses, and progress counts from the other end.
                 source[count + 1], target[count + 1] = other ^ 1, slot ^ 1
-                data[count + 1, LEAVE], data[count + 1, ARRIVE] = -row[ARRIVE], -row[LEAVE]
-                data[count + 1, LENGTH] = row[LENGTH]
-                data[count + 1, FROM_X], data[count + 1, FROM_Y] = row[TO_X], row[TO_Y]
-                data[count + 1, TO_X], data[count + 1, TO_Y] = row[FROM_X], row[FROM_Y]
+                data[count + 1, LEAVE], data[count + 1, ARRIVE] = (
+                    -found[row, ARRIVE],
+                    -found[row, LEAVE],
+                )
+                data[count + 1, LENGTH] = found[row, LENGTH]
+                data[count + 1, FROM_X], data[count + 1, FROM_Y] = e, f
+                data[count + 1, TO_X], data[count + 1, TO_Y] = x, y
                 count += 2
     return source[:count], target[:count], data[:count]
 
