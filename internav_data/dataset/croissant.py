@@ -24,6 +24,7 @@ _CONTEXT: dict[str, Any] = {
     "conformsTo": "dct:conformsTo",
     "data": {"@id": "cr:data", "@type": "@json"},
     "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
+    "equivalentProperty": "cr:equivalentProperty",
     "examples": {"@id": "cr:examples", "@type": "@json"},
     "extract": "cr:extract",
     "field": "cr:field",
@@ -43,6 +44,7 @@ _CONTEXT: dict[str, Any] = {
     "regex": "cr:regex",
     "repeated": "cr:repeated",
     "replace": "cr:replace",
+    "samplingRate": "cr:samplingRate",
     "separator": "cr:separator",
     "source": "cr:source",
     "subField": "cr:subField",
@@ -97,7 +99,8 @@ def _record_set(spec: TableSpec[Any]) -> dict[str, Any]:
         made = _field(field.node, f"{spec.name}/{field.name}", source, "$")
         if field.name in notes:
             made["description"] = " ".join(notes[field.name].split())
-        fields.append(made)
+        if made.get("subField") != []:
+            fields.append(made)
     return {
         "@type": "cr:RecordSet",
         "@id": spec.name,
@@ -114,13 +117,18 @@ def _field(node: Node, path: str, source: dict[str, Any], where: str) -> dict[st
         node, where = node.item, f"{where}[*]"
     if isinstance(node, Leaf):
         made["dataType"] = _TYPES.get(node.kind, "sc:Integer")
-        step = {} if where == "$" else {"transform": {"jsonPath": where}}
+        step = {} if not where.strip("$[*]") else {"transform": {"jsonPath": where}}
         return made | {"source": source | step}
     members: list[tuple[str, Node]] = []
     if isinstance(node, Coordinates):
         members = [(name, node.leaf) for name in node.names]
     elif isinstance(node, Record):
-        members = [(field.name, field.node) for field in node.fields]
+        # The reference reader has no word for lists within lists of structs: schemas/ has.
+        members = [
+            (field.name, field.node)
+            for field in node.fields
+            if not isinstance(field.node, Sequence)
+        ]
     elif isinstance(node, Keyed):
         raise TypeError(f"{path}: a mapping has no columns")
     made["subField"] = [

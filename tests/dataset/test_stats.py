@@ -1,0 +1,116 @@
+"""Statistics from columns against counting record by record; what else lies beside the data."""
+
+from __future__ import annotations
+
+import json
+import statistics
+from collections import Counter
+
+import pytest
+
+from internav_data.dataset import compute_stats, load_dataset, read_manifest
+from internav_data.dataset.jsonschemas import descriptions
+from internav_data.dataset.nodes import Record, Sequence
+from internav_data.dataset.tables import TABLES
+
+
+@pytest.mark.parametrize("split", [None, "train", "val"])
+def test_statistics_are_those_of_the_records(dataset_folder, split):
+    ds = load_dataset(dataset_folder, split)
+    episodes = list(ds)
+    stats = compute_stats(ds)
+    assert stats == compute_stats(dataset_folder, split)
+    assert stats["episodes"] == len(episodes)
+    assert stats["scenes"] == len({e.scene_id for e in episodes})
+    for row, (low, high) in zip(stats["table2"], ((1, 2), (3, 5), (6, 10)), strict=True):
+        part = [e for e in episodes if low <= e.room_count <= high]
+        assert row["rooms"] == f"{low}-{high}"
+        assert row["episodes"] == len(part)
+        assert row["scenes"] == len({e.scene_id for e in part})
+        assert row["ratio"] == pytest.approx(len(part) / len(episodes), abs=1e-6)
+        if part:
+            mean = {
+                "obstacle_num": statistics.mean(len(e.obstacles) for e in part),
+                "distance_m": statistics.mean(0.25 * e.clear_steps for e in part),
+                "cross_room_num": statistics.mean(e.rooms_on_way for e in part),
+            }
+            assert {k: row[k] for k in mean} == pytest.approx(mean, abs=1e-6)
+        assert row["blocked"] == sum(e.mode == "blocked" for e in part)
+        assert row["sealed"] == sum(e.sealed for e in part)
+    obstacles = [o for e in episodes for o in e.obstacles]
+    assert stats["obstacle_types"] == Counter(o.type for o in obstacles)
+    assert stats["obstacles_pushable"] == sum(o.pushable for o in obstacles)
+    assert stats["obstacles_pickable"] == sum(o.pickable for o in obstacles)
+    assert stats["obstacles_fixed"] == sum(not (o.pushable or o.pickable) for o in obstacles)
+    assert stats["modes"] == Counter(e.mode for e in episodes)
+    blocked = [e for e in episodes if e.mode == "blocked"]
+    share = sum(e.sealed for e in blocked) / len(blocked)
+    assert stats["sealed_share_of_blocked"] == pytest.approx(share, abs=1e-6)
+    assert stats["room_count"] == Counter(str(e.room_count) for e in episodes)
+    longer = [e.steps - e.clear_steps for e in episodes if e.mode == "lengthened"]
+    assert stats["detour_steps"]["median"] == statistics.median(longer)
+    assert stats["clear_m"]["mean"] == pytest.approx(
+        statistics.mean(e.clear_m for e in episodes), abs=1e-6
+    )
+
+
+def test_stats_file_is_what_compute_stats_says(dataset_folder):
+    stored = json.loads((dataset_folder / "stats.json").read_text())
+    assert stored == json.loads(json.dumps(compute_stats(dataset_folder)))
+
+
+def test_statistics_of_nothing(tmp_path):
+    from internav_data.dataset import Identity, assemble, open_work
+
+    identity = Identity("test", "1", 0, 1, "0", {})
+    open_work(tmp_path, identity)
+    assemble(tmp_path, identity, [], 0)
+    stats = compute_stats(tmp_path)
+    assert stats["episodes"] == 0
+    assert [row["ratio"] for row in stats["table2"]] == [0, 0, 0]
+    assert list(load_dataset(tmp_path)) == []
+
+
+def test_card_names_every_file_and_column(dataset_folder):
+    yaml = pytest.importorskip("yaml")
+    text = (dataset_folder / "README.md").read_text()
+    _, front, body = text.split("---\n", 2)
+    configs = yaml.safe_load(front)["configs"]
+    assert [c["config_name"] for c in configs if c.get("default")] == ["episodes"]
+    for config in configs:
+        files = config["data_files"]
+        if isinstance(files, str):
+            assert (dataset_folder / files).is_file()
+            continue
+        assert {f["split"] for f in files} == {"train", "val", "test"}
+        for entry in files:
+            found = sorted(p.name for p in dataset_folder.glob(entry["path"]))
+            named = read_manifest(dataset_folder).of(config["config_name"], entry["split"])
+            assert found == [f.path.rsplit("/")[-1] for f in named]
+    for spec in TABLES[:2]:
+        assert all(f"| `{name}` |" in body for name in spec.schema.names)
+
+
+def test_croissant_names_every_file_and_only_known_columns(dataset_folder):
+    said = json.loads((dataset_folder / "croissant.json").read_text())
+    files = {f["@id"]: f for f in said["distribution"] if f["@type"] == "cr:FileObject"}
+    manifest = read_manifest(dataset_folder)
+    assert {f.path: f.sha256 for f in manifest.files} == {
+        name: f["sha256"] for name, f in files.items()
+    }
+    for record_set, spec in zip(said["recordSet"], TABLES, strict=False):
+        columns = [f["name"] for f in record_set["field"]]
+        left_out = set(spec.schema.names) - set(columns)
+        assert left_out == ({"node_paths"} if spec.name == "episodes" else set())
+        assert all("dataType" in f or f["subField"] for f in record_set["field"])
+
+
+def test_no_field_of_the_records_has_a_lost_docstring():
+    def count(node):
+        if isinstance(node, Sequence):
+            return count(node.item)
+        if isinstance(node, Record):
+            return len(descriptions(node.cls)) + sum(count(f.node) for f in node.fields)
+        return 0
+
+    assert [count(spec.node) for spec in TABLES] >= [8, 8, 6]
