@@ -129,9 +129,10 @@ class Bullet:
             frictionERP=0.2,
             physicsClientId=client,
         )
-        # A dummy visual: without one Bullet makes a visual mesh for every collision shape.
+        # A dummy visual: without one Bullet makes a visual mesh for every collision shape, and a
+        # sphere's many triangles alone would cost two thirds of a settle.
         visual = pybullet.createVisualShape(
-            pybullet.GEOM_SPHERE, radius=0.01, physicsClientId=client
+            pybullet.GEOM_BOX, halfExtents=(0.01, 0.01, 0.01), physicsClientId=client
         )
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
         floor = pybullet.createMultiBody(0.0, plane, visual, physicsClientId=client)
