@@ -10,6 +10,9 @@ import click
 
 from internav_cli.options import JSON, config_from, config_options, positive, progress
 
+NAMED = 10
+"""Quarantined scenes that are named at the end."""
+
 
 @click.command(
     "generate",
@@ -93,8 +96,11 @@ def _generate(out: Path, config: Any, scenes: int, workers: int, *, as_json: boo
 
     report = generate(out, config, scenes, workers, progress())
     click.echo(summary(report), err=True)
-    for scene_id, reason in report.quarantined:
+    for scene_id, reason in report.quarantined[:NAMED]:
         click.echo(f"quarantined {scene_id}: {reason}", err=True)
+    if len(report.quarantined) > NAMED:
+        rest = len(report.quarantined) - NAMED
+        click.echo(f"and {rest} more quarantined: manifest.json names them", err=True)
     if as_json:
         click.echo(json.dumps(report.plain()))
     return report.exit_code

@@ -251,7 +251,8 @@ class Crew:
             if deaths[worker.task] < MAX_DEATHS:
                 todo.appendleft(worker.task)
             else:
-                yield Failed(worker.task, f"{message.cause}, {MAX_DEATHS} times")
+                reason = f"{message.cause}, {MAX_DEATHS} times"
+                yield Failed(worker.task, reason, MAX_DEATHS)
 
     def _wind_down(self) -> Iterator[Any]:
         """Wait for what is under way, so that it need not be done again."""

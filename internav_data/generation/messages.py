@@ -41,6 +41,8 @@ class Failed:
 
     task: Any
     reason: str
+    attempts: int
+    """How often it was tried."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ import shutil
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from internav_data import __version__
 from internav_data.dataset import (
     Identity,
     assemble,
@@ -31,11 +32,9 @@ from internav_data.generation.messages import Done
 from internav_data.generation.progress import Progress
 from internav_data.generation.report import Report
 from internav_data.generation.scenes import (
-    ATTEMPTS,
     ScenePayload,
     asset_folders,
     scene_maker,
-    version,
 )
 from internav_data.houses.quota import room_count
 from internav_data.houses.splits import split_of_scene
@@ -146,7 +145,7 @@ def identity_for(config: GenerationConfig, assets: Catalogue) -> Identity:
     """Return what makes another run the same dataset."""
     return Identity(
         generator=GENERATOR,
-        generator_version=version(),
+        generator_version=__version__,
         seed=config.seed,
         catalogue_version=assets.version,
         catalogue_digest=assets.digest,
@@ -200,7 +199,8 @@ def _make(crew: Crew, plan: _Plan, progress: Progress, work: Path) -> None:
         else:
             progress.say(f"scene-{scene:06d} is quarantined: {result.reason}")
             split = split_of_scene(scene)
-            write_quarantine(work, scene, result.reason, split=split, attempts=ATTEMPTS)
+            attempts = result.attempts
+            write_quarantine(work, scene, result.reason, split=split, attempts=attempts)
         progress.scene(episodes, expected=plan.expected(scene))
         if not before and progress.quarantined == progress.scenes >= HOPELESS:
             raise _hopeless(work.parent, progress.scenes, result.reason)

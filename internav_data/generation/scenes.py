@@ -92,13 +92,6 @@ def scene_maker(payload: ScenePayload) -> Callable[[int], int]:
     return make
 
 
-def version() -> str:
-    """Return the release of this package: another one may make other scenes."""
-    from importlib import metadata  # noqa: PLC0415 - slow to import, needed once
-
-    return metadata.version("internav-data")
-
-
 def asset_folders(config: GenerationConfig) -> tuple[Path, ...]:
     """Return the folders of the user's own meshes."""
     return tuple(Path(folder) for folder in config.assets)

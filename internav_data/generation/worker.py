@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from internav_data.generation.messages import Done, Failed, Fatal, Ready
+from internav_data.generation.scenes import ATTEMPTS
 from internav_data.records.errors import InternavError, QuarantineError
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ def _answer(work: Callable[[Any], Any], task: Any) -> Done | Failed | Fatal:  # 
     try:
         return Done(task, work(task))
     except QuarantineError as error:
-        return Failed(task, str(error))
+        return Failed(task, str(error), ATTEMPTS)
     except InternavError as error:
         return Fatal(type(error).__name__, str(error))
     except OSError as error:
@@ -65,7 +66,7 @@ def _answer(work: Callable[[Any], Any], task: Any) -> Done | Failed | Fatal:  # 
     except MemoryError:
         os._exit(1)  # a new process may have more luck: the parent tries again
     except Exception as error:  # noqa: BLE001 - a bug in one scene must not end the run
-        return Failed(task, _told(error))
+        return Failed(task, _told(error), 1)
 
 
 def _told(error: Exception) -> str:
