@@ -38,6 +38,8 @@ WHIMS = (0.6, 2.0, 4.0, 4.0, 4.0)
 """How much chance there is in each of the door trees that a plan is tried with."""
 DEPTH_WEIGHT = 10.0
 """What one room more or less on the way than asked for costs."""
+SLIVER = 2.9
+"""Rooms that are longer than this times their width are corridors."""
 LEAST_JOG_CM = 50
 """Parallel walls nearer than this, side by side or end to end, are no architecture."""
 DAYLIGHT_CM = 130
@@ -71,13 +73,16 @@ def clear_area_m2(plan: Plan, room: int) -> float:
     return (plan.area_cm2(room) - HALF_WALL_CM * around + 4 * HALF_WALL_CM**2) / 1e4
 
 
-def _room_score(plan: Plan, room: int, spec: RoomSpec) -> float | None:
+def _room_score(plan: Plan, room: int, spec: RoomSpec, *, lenient: bool) -> float | None:
     """How far one room is from what it should be; None where it breaks its standard."""
     main = plan.main_rectangle(room)
     short, long = clear_size_m(main)
     clear = clear_area_m2(plan, room)
     standard = spec.standard
-    if short < standard.width_m or not standard.low_m2 <= clear <= standard.high_m2 * 1.3:
+    if short < standard.width_m or clear < standard.low_m2:
+        return None
+    odd = clear > standard.high_m2 * 1.3 or (long / short > SLIVER and spec.type != "hall")
+    if odd and not lenient:
         return None
     area = plan.area_cm2(room) / 1e4
     score = 3.0 * math.log(area / spec.area_m2) ** 2
@@ -158,14 +163,19 @@ def judged(
     least_door_cm: int,
     rng: Generator,
     rooms_on_way: float | None = None,
+    *,
+    lenient: bool = False,
 ) -> FloorPlan | None:
-    """Score a plan; None where a room breaks its standard or cannot be reached."""
+    """Score a plan; None where a room breaks its standard or cannot be reached.
+
+    The lenient judge, who sees last resorts, keeps to least areas and widths alone.
+    """
     types = tuple(spec.type for spec in specs)
     if len(plan.cells) != len(specs):
         return None
     score = 0.0
     for room, spec in enumerate(specs):
-        room_score = _room_score(plan, room, spec)
+        room_score = _room_score(plan, room, spec, lenient=lenient)
         if room_score is None:
             return None
         score += room_score
@@ -240,7 +250,8 @@ def choose_floor_plan(
             best = found
     if best is None:
         layout = row(specs)
-        best = judged(Plan.of([layout[k] for k in range(len(specs))]), specs, least, rng)
+        plan = Plan.of([layout[k] for k in range(len(specs))])
+        best = judged(plan, specs, least, rng, lenient=True)
     if best is None:
         raise QuarantineError(
             f"scene {scene}: no floor plan keeps the {config.preset} standards for "

@@ -228,7 +228,8 @@ def row(specs: Sequence[RoomSpec]) -> Layout:
     )
     deepest = max(300, _least(specs, rest))
     largest = max(specs[k].area_m2 for k in rest) * 1e4
-    depth = max(deepest, snapped(math.sqrt(largest)))
+    # Not deeper than wide for the largest: the smallest would become slivers.
+    depth = max(deepest, snapped(0.75 * math.sqrt(largest)))
     layout: Layout = {}
     left = 0
     for k in rest:

@@ -50,6 +50,18 @@ def test_paper_houses_have_the_areas_of_procthor(assets):
         assert 21.0 * n < area < 30.0 * n, n
 
 
+@pytest.mark.parametrize("preset", ["paper", "realistic"])
+@pytest.mark.parametrize(
+    "rooms",
+    ["bathroom:10", "storage:10", "hall:10", "hall,bedroom:9", "storage,living", "studio:5"],
+)
+def test_odd_programmes_have_a_plan(preset, rooms):
+    config = HouseConfig(preset=preset, rooms=rooms)
+    for scene in range(3):
+        specs = programme(0, scene, config, 0)
+        assert len(choose_floor_plan(0, scene, config, specs, 0).types) == len(specs)
+
+
 def test_candidates_make_plans_better():
     def score(candidates):
         config = HouseConfig(rooms="7", candidates=candidates)
@@ -73,7 +85,8 @@ def test_the_plain_row_serves_every_programme(oracle):
             layout = row(specs)
             plan = Plan.of([layout[k] for k in range(len(specs))])
             rng = generator(0, Purpose.FLOOR_PLAN)
-            assert judged(plan, specs, LEAST_DOOR_CM[preset], rng) is not None, (preset, scene)
+            least = LEAST_DOOR_CM[preset]
+            assert judged(plan, specs, least, rng, lenient=True) is not None, (preset, scene)
 
 
 def test_bathrooms_are_not_the_way_through_where_avoidable(sample):
