@@ -17,6 +17,15 @@ import numpy as np
 from numba import njit
 
 from internav_data.geometry.planar import cross, inside
+from internav_data.navigation.shadows import (
+    ALL,
+    FULL_TURN,
+    SOME,
+    TOUCH_M,
+    far_from,
+    nearest,
+    shadow,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,124 +34,8 @@ if TYPE_CHECKING:
     Ints = NDArray[np.int64]
 
 X, Y, MID_X, MID_Y, HALF, COS_HALF = range(6)
-NONE, SOME, ALL = 0, 1, 2
-TOUCH_M = 1e-9
-"""Polygons nearer than this touch: walls in one line, furniture flush with each other."""
 TINY_RAD = 1e-10
 """A shorter arc is what rounding leaves where polygons are flush; nothing turns there."""
-FULL_TURN = 2.0 * math.pi
-
-
-@njit(cache=True)
-def wrapped(angle: float) -> float:
-    """Bring an angle into (-pi, pi]."""
-    while angle > math.pi:
-        angle -= FULL_TURN
-    while angle <= -math.pi:
-        angle += FULL_TURN
-    return angle
-
-
-@njit(cache=True)
-def nearest(
-    x: float, y: float, vertices: Floats, start: int, stop: int
-) -> tuple[float, float, float]:
-    """Return the point of a convex polygon's outline nearest to (x, y), and its distance."""
-    best, best_x, best_y = math.inf, 0.0, 0.0
-    previous = stop - 1
-    for k in range(start, stop):
-        ax, ay = vertices[previous, 0], vertices[previous, 1]
-        dx, dy = vertices[k, 0] - ax, vertices[k, 1] - ay
-        length = dx * dx + dy * dy
-        t = 0.0
-        if length > 0.0:
-            t = min(1.0, max(0.0, ((x - ax) * dx + (y - ay) * dy) / length))
-        px, py = ax + t * dx, ay + t * dy
-        d = (px - x) * (px - x) + (py - y) * (py - y)
-        if d < best:
-            best, best_x, best_y = d, px, py
-        previous = k
-    return best_x, best_y, math.sqrt(best)
-
-
-@njit(cache=True)
-def _touching_shadow(
-    x: float, y: float, vertices: Floats, start: int, stop: int
-) -> tuple[int, float, float]:
-    """Shadow of a polygon that touches the corner: all but its own normal cone there."""
-    mid_x = vertices[start:stop, 0].mean() - x
-    mid_y = vertices[start:stop, 1].mean() - y
-    middle = math.atan2(mid_y, mid_x)
-    low, high = 0.0, 0.0
-    for k in range(start, stop):
-        dx, dy = vertices[k, 0] - x, vertices[k, 1] - y
-        if dx * dx + dy * dy > TOUCH_M * TOUCH_M:
-            turn = wrapped(math.atan2(dy, dx) - middle)
-            low, high = min(low, turn), max(high, turn)
-    if high - low >= math.pi - TOUCH_M:
-        return ALL, 0.0, 0.0
-    return SOME, middle + low - math.pi / 2.0, middle + high + math.pi / 2.0
-
-
-@njit(cache=True)
-def far_from(x: float, y: float, boxes: Floats, k: int, reach: float) -> bool:
-    """Whether a point is farther than `reach` from a box."""
-    dx = max(0.0, boxes[k, 0] - x, x - boxes[k, 2])
-    dy = max(0.0, boxes[k, 1] - y, y - boxes[k, 3])
-    return dx * dx + dy * dy >= reach * reach
-
-
-@njit(cache=True)
-def shadow(
-    x: float, y: float, radius: float, vertices: Floats, start: int, stop: int
-) -> tuple[int, float, float]:
-    """Which directions u a convex polygon denies to the disc's middle at corner + radius * u.
-
-    A disc round the corner meets the polygon on *one* interval of directions: it is the union,
-    over the polygon's connected set of points within two radii, of arcs that move continuously.
-    Its ends come from the polygon's vertices or from its edges' offset lines.
-
-    Returns (NONE | SOME | ALL, low, high): radians, low < high.
-    """
-    near_x, near_y, distance = nearest(x, y, vertices, start, stop)
-    within = inside(x, y, vertices, start, stop)
-    if within and distance > TOUCH_M:
-        return ALL, 0.0, 0.0
-    if distance >= 2.0 * radius:
-        return NONE, 0.0, 0.0
-    if distance <= TOUCH_M:
-        return _touching_shadow(x, y, vertices, start, stop)
-    middle = math.atan2(near_y - y, near_x - x)
-    spread = math.acos(distance / (2.0 * radius))
-    low, high = -spread, spread
-    previous = stop - 1
-    for k in range(start, stop):
-        ax, ay = vertices[previous, 0], vertices[previous, 1]
-        bx, by = vertices[k, 0], vertices[k, 1]
-        previous = k
-        d = math.sqrt((bx - x) * (bx - x) + (by - y) * (by - y))
-        if d < 2.0 * radius:
-            turn = wrapped(math.atan2(by - y, bx - x) - middle)
-            spread = math.acos(d / (2.0 * radius))
-            low, high = min(low, turn - spread), max(high, turn + spread)
-        ex, ey = bx - ax, by - ay
-        length = math.sqrt(ex * ex + ey * ey)
-        if length == 0.0:
-            continue
-        ex, ey = ex / length, ey / length
-        height = cross(x - ax, y - ay, ex, ey)  # along the outward normal (ey, -ex)
-        if not 0.0 <= height < 2.0 * radius:
-            continue
-        normal = math.atan2(-ex, ey)
-        opening = math.acos(1.0 - height / radius)
-        for side in (-1.0, 1.0):
-            angle = normal + side * opening
-            foot = (x + radius * math.cos(angle) - ax) * ex
-            foot += (y + radius * math.sin(angle) - ay) * ey
-            if 0.0 <= foot <= length:
-                turn = wrapped(angle - middle)
-                low, high = min(low, turn), max(high, turn)
-    return SOME, middle + low, middle + high
 
 
 @njit(cache=True)
@@ -210,7 +103,51 @@ def near_ids(boxes: Floats, box: Floats, reach: float) -> Ints:
 
 
 @njit(cache=True)
-def free_arcs(  # noqa: C901 - corners of polygons against polygons of two groups
+def _buried(x: float, y: float, vertices: Floats, offsets: Ints, boxes: Floats, ids: Ints) -> bool:
+    """Whether a point lies within one of some polygons, deeper than touching: a cheap refusal."""
+    for o in ids:
+        if not far_from(x, y, boxes, o, 0.5 * TOUCH_M) and inside(
+            x, y, vertices, offsets[o], offsets[o + 1]
+        ):
+            _, _, depth = nearest(x, y, vertices, offsets[o], offsets[o + 1])
+            if depth > TOUCH_M:
+                return True
+    return False
+
+
+@njit(cache=True)
+def _cast(
+    pieces: Floats,
+    count: int,
+    corner: tuple[float, float, float, float],
+    radius: float,
+    vertices: Floats,
+    offsets: Ints,
+    boxes: Floats,
+    ids: Ints,
+    skip: int,
+) -> int:
+    """Add the shadows of some polygons to a corner's cone (x, y, begin, width).
+
+    Returns how many pieces there are, -1 once one of them covers the whole cone.
+    """
+    x, y, begin, width = corner
+    for o in ids:
+        if o == skip or far_from(x, y, boxes, o, 2.0 * radius):
+            continue
+        state, low, high = shadow(x, y, radius, vertices, offsets[o], offsets[o + 1])
+        if state == ALL:
+            return -1
+        if state == SOME:
+            first = count
+            count = _cover(pieces, count, begin, width, low, high)
+            if count > first and pieces[first, 0] <= 0.0 and pieces[first, 1] >= width:
+                return -1
+    return count
+
+
+@njit(cache=True)
+def free_arcs(
     vertices: Floats,
     offsets: Ints,
     boxes: Floats,
@@ -224,30 +161,23 @@ def free_arcs(  # noqa: C901 - corners of polygons against polygons of two group
     found = np.empty((len(pieces) + 1, 6))
     out = np.empty((2 * len(vertices) + 8, 6))
     size = 0
-    for polygon in range(len(boxes)):
-        start, stop = offsets[polygon], offsets[polygon + 1]
-        own = near_ids(boxes, boxes[polygon], 2.0 * radius)
-        foreign = near_ids(other_boxes, boxes[polygon], 2.0 * radius)
-        for k in range(start, stop):
-            x, y = vertices[k, 0], vertices[k, 1]
-            begin, width = cone(vertices, start, stop, k)
-            count, state = 0, NONE
-            for o in own:
-                if state == ALL:
-                    break
-                if o != polygon and not far_from(x, y, boxes, o, 2.0 * radius):
-                    state, low, high = shadow(x, y, radius, vertices, offsets[o], offsets[o + 1])
-                    if state == SOME:
-                        count = _cover(pieces, count, begin, width, low, high)
-            for o in foreign:
-                if state == ALL:
-                    break
-                if not far_from(x, y, other_boxes, o, 2.0 * radius):
-                    a, b = other_offsets[o], other_offsets[o + 1]
-                    state, low, high = shadow(x, y, radius, others, a, b)
-                    if state == SOME:
-                        count = _cover(pieces, count, begin, width, low, high)
-            if state == ALL or width <= TINY_RAD:
+    for k in range(len(boxes)):
+        own = near_ids(boxes, boxes[k], 2.0 * radius)
+        foreign = near_ids(other_boxes, boxes[k], 2.0 * radius)
+        for v in range(offsets[k], offsets[k + 1]):
+            x, y = vertices[v, 0], vertices[v, 1]
+            if _buried(x, y, vertices, offsets, boxes, own) or _buried(
+                x, y, others, other_offsets, other_boxes, foreign
+            ):
+                continue
+            begin, width = cone(vertices, offsets[k], offsets[k + 1], v)
+            corner = (x, y, begin, width)
+            count = _cast(pieces, 0, corner, radius, vertices, offsets, boxes, own, k)
+            if count >= 0:
+                count = _cast(
+                    pieces, count, corner, radius, others, other_offsets, other_boxes, foreign, -1
+                )
+            if count < 0 or width <= TINY_RAD:
                 continue
             arcs = _gaps(pieces, count, x, y, begin, width, found)
             while size + arcs > len(out):

@@ -17,7 +17,8 @@ import numpy as np
 from numba import njit
 
 from internav_data.geometry.planar import cross, inside, segments_cross
-from internav_data.navigation.arcs import near_ids, nearest
+from internav_data.navigation.arcs import near_ids
+from internav_data.navigation.shadows import nearest
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
