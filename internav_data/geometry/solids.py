@@ -61,18 +61,14 @@ def part_corners(part: Part) -> NDArray[np.float64]:
 
 
 @lru_cache(maxsize=4096)
-def _corners(parts: tuple[Part, ...]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    corners = [part_corners(part) for part in parts]
+def asset_corners(asset: Asset) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Corners of all parts (n, 3) and where each part's begin (parts + 1,); cached, read-only."""
+    corners = [part_corners(part) for part in asset.parts]
     offsets = np.cumsum([0, *(len(c) for c in corners)]).astype(np.int64)
     stacked = np.vstack(corners)
     stacked.flags.writeable = False
     offsets.flags.writeable = False
     return stacked, offsets
-
-
-def asset_corners(asset: Asset) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Corners of all parts (n, 3) and where each part's begin (parts + 1,); cached, read-only."""
-    return _corners(asset.parts)
 
 
 def asset_bounds(asset: Asset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -97,9 +93,10 @@ _FILLED = {"box": 1.0, "cylinder": math.pi / 4.0, "sphere": math.pi / 6.0}
 
 
 @lru_cache(maxsize=4096)
-def _centre_of_mass(parts: tuple[Part, ...]) -> Vec3:
+def centre_of_mass(asset: Asset) -> Vec3:
+    """Centre of mass in the asset's frame, as if all its parts were equally dense, metres."""
     total, moment = 0.0, np.zeros(3)
-    for part in parts:
+    for part in asset.parts:
         if part.shape == "hull":
             volume, centroid = _hull_mass(part_corners(part))
         else:
@@ -109,8 +106,3 @@ def _centre_of_mass(parts: tuple[Part, ...]) -> Vec3:
         moment += volume * centroid
     x, y, z = (round_m(c / total) for c in moment)
     return (x, y, z)
-
-
-def centre_of_mass(asset: Asset) -> Vec3:
-    """Centre of mass in the asset's frame, as if all its parts were equally dense, metres."""
-    return _centre_of_mass(asset.parts)

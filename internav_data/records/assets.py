@@ -57,3 +57,7 @@ class Asset:
     blocks: bool
     """False for what an agent walks over (rugs) or under: it has no footprint."""
     parts: tuple[Part, ...]
+
+    def __hash__(self) -> int:
+        """Assets key many caches; their id tells them apart, equality settles the rest."""
+        return hash(self.asset_id)
