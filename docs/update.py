@@ -1,0 +1,84 @@
+"""Write into README and docs what the code says: settings, commands, pictures.
+
+    python docs/update.py             # texts
+    python docs/update.py --pictures  # and the pictures
+
+`tests/test_docs.py` fails when the texts are out of date.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from internav_cli.main import COMMANDS
+
+ROOT = Path(__file__).resolve().parents[1]
+PICTURED = (0, 6, 0)
+"""Seed, scene and episode of the picture."""
+
+
+def settings() -> str:
+    """Return all settings with their defaults."""
+    from internav_data.generation import GenerationConfig  # noqa: PLC0415 - --pictures needs more
+    from internav_data.generation.toml import config_toml  # noqa: PLC0415
+
+    return f"```toml\n{config_toml(GenerationConfig()).strip()}\n```"
+
+
+def commands() -> str:
+    """Return the commands as a table."""
+    rows = [f"| `internav-gen {name}` | {text} |" for name, text in COMMANDS.items()]
+    return "\n".join(["| | |", "|---|---|", *rows])
+
+
+def replaced(text: str, name: str, content: str) -> str:
+    """Put generated text between its two markers."""
+    begin, end = f"<!-- {name}: written by docs/update.py -->", f"<!-- end of {name} -->"
+    before, _, rest = text.partition(begin)
+    _, _, after = rest.partition(end)
+    return f"{before}{begin}\n{content}\n{end}{after}"
+
+
+def updated() -> dict[Path, str]:
+    """Return texts as they should be."""
+    readme, configuration = ROOT / "README.md", ROOT / "docs" / "configuration.md"
+    return {
+        readme: replaced(readme.read_text(encoding="utf-8"), "commands", commands()),
+        configuration: replaced(configuration.read_text(encoding="utf-8"), "settings", settings()),
+    }
+
+
+def draw_pictures() -> None:
+    """Draw the pictures of the README."""
+    import cv2  # noqa: PLC0415 - seconds, all of these
+
+    from internav_data import generate_episodes, generate_house  # noqa: PLC0415
+    from internav_data.catalog import catalogue  # noqa: PLC0415
+    from internav_data.views import draw_episode, write_png  # noqa: PLC0415
+    from internav_data.views.asset_sheet import draw_asset_sheet  # noqa: PLC0415
+
+    seed, scene, index = PICTURED
+    house = generate_house(seed=seed, scene=scene)
+    (episode,) = generate_episodes(house, count=1, first=index)
+    picture = draw_episode(house, episode, catalogue().assets, pixels=1000)
+    write_png(ROOT / "docs" / "episode.png", picture)
+    sheet = draw_asset_sheet(catalogue())
+    height, width = sheet.shape[:2]
+    smaller = cv2.resize(sheet, (1000, round(1000 * height / width)), interpolation=cv2.INTER_AREA)
+    write_png(ROOT / "docs" / "catalogue.png", smaller)
+
+
+def main() -> None:
+    """Write what has changed."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--pictures", action="store_true")
+    options = parser.parse_args()
+    for path, text in updated().items():
+        path.write_text(text, encoding="utf-8")
+    if options.pictures:
+        draw_pictures()
+
+
+if __name__ == "__main__":
+    main()

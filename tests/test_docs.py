@@ -1,0 +1,84 @@
+"""What README and docs say is so."""
+
+from __future__ import annotations
+
+import re
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+SNIPPET = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+
+@pytest.fixture(scope="module")
+def small_dataset(tmp_path_factory):
+    from internav_data.generation import generate, load_config
+
+    out = tmp_path_factory.mktemp("docs") / "dataset"
+    # The loop over ranks shares these among eight; snippets ask for houses of four rooms.
+    generate(out, load_config(overrides=["episodes_per_scene=4", "house.rooms=4"]), 4, workers=1)
+    return out
+
+
+def test_generated_texts_are_up_to_date():
+    updated = runpy.run_path(str(ROOT / "docs" / "update.py"))["updated"]
+    for path, text in updated().items():
+        assert path.read_text() == text, "run `python docs/update.py`"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_links_lead_somewhere(page):
+    for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text()):
+        assert (page.parent / target).exists(), target
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if SNIPPET.search(p.read_text())], ids=str)
+def test_python_in_the_docs_runs(page, small_dataset):
+    for snippet in SNIPPET.findall(page.read_text()):
+        code = snippet.replace("data/mine", str(small_dataset))
+        exec(compile(code, page.name, "exec"), {})  # noqa: S102 - our own words
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_commands_in_the_docs_exist_with_their_options(page):
+    from click.testing import CliRunner
+    from internav_cli.main import cli
+
+    for line in re.findall(r"^internav-gen .*$", page.read_text(), re.MULTILINE):
+        words = line.split("#")[0].split("|")[0].split(">")[0].split()
+        shown = CliRunner().invoke(cli, [words[1], "--help"]).output
+        for option in (w for w in words[2:] if w.startswith("--")):
+            assert option in shown, line
+
+
+def test_an_example_floor_plan_can_be_built():
+    from internav_data.houses import load_floor_plan
+
+    assert len(load_floor_plan(ROOT / "examples" / "floor_plan.toml").types) == 6
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.stem)
+def test_examples_run(example, small_dataset, tmp_path):
+    arguments = {
+        "contact_sheet": [small_dataset, tmp_path / "sheet.png", "--pixels", "120"],
+        "stream_episodes": [small_dataset],
+        "ways_in_a_house": ["--seed", "7", "--scene", "3"],
+    }[example.stem]
+    done = subprocess.run(
+        [sys.executable, example, *map(str, arguments)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout
+
+
+def test_tests_named_in_the_architecture_exist():
+    named = re.findall(r"`(test_\w+)` \((tests/[\w/.]+)\)", (ROOT / "ARCHITECTURE.md").read_text())
+    assert len(named) > 20
+    for name, path in named:
+        assert f"def {name}(" in (ROOT / path).read_text(), name
