@@ -17,6 +17,7 @@ from numba import njit
 
 from internav_data.navigation.arcs import HALF
 from internav_data.navigation.scene import SLACK_M, Scene, segment_clear, segment_clear_of
+from internav_data.navigation.states import CLOSED, OUT_OF_HEAP, States, pop, rise, states_of
 from internav_data.navigation.tangents import (
     ARRIVE,
     FROM_X,
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
     Ints = NDArray[np.int64]
 
 GOAL = -1
-OUT_OF_HEAP, CLOSED = -1, -2
 ORDER_SLACK = 1e-9
 """Arriving and leaving in one direction (along a wall) may differ by rounding, radians."""
 
@@ -61,99 +61,6 @@ class Query(NamedTuple):
     radius: float
 
 
-class States(NamedTuple):
-    """Tangents on the table: the house's own first, then those listed during the search.
-
-    Shapes (capacity,) each but data (capacity, 7); `link` chains the listed ones of a slot, whose
-    first is in `first` (slots,). `heap` holds states by `key`, `place` is where in it they are.
-    `sizes`: number of states, length of the heap.
-    """
-
-    target: Ints
-    data: Floats
-    cost: Floats
-    key: Floats
-    parent: Ints
-    place: Ints
-    tested: NDArray[np.bool_]
-    link: Ints
-    heap: Ints
-    first: Ints
-    listed: NDArray[np.bool_]
-    sizes: Ints
-
-
-@njit(cache=True)
-def states_of(tangents: Tangents, slots: int, extra: int) -> States:
-    """Lay out the table with room for `extra` listed tangents."""
-    own = len(tangents.target)
-    size = own + extra
-    # Only the house's part is filled in: pages that are never touched cost nothing.
-    target, data = np.empty(size, dtype=np.int64), np.empty((size, 7))
-    target[:own], data[:own] = tangents.target, tangents.data
-    cost, place = np.empty(size), np.empty(size, dtype=np.int64)
-    cost[:own], place[:own] = np.inf, OUT_OF_HEAP
-    tested = np.empty(size, dtype=np.bool_)
-    tested[:own] = False
-    sizes = np.array([own, 0])
-    return States(
-        target,
-        data,
-        cost,
-        np.empty(size),
-        np.empty(size, dtype=np.int64),
-        place,
-        tested,
-        np.empty(size, dtype=np.int64),
-        np.empty(size, dtype=np.int64),
-        np.full(slots, -1),
-        np.zeros(slots, dtype=np.bool_),
-        sizes,
-    )
-
-
-@njit(cache=True)
-def _rise(states: States, state: int, at: int) -> None:
-    """Move a state up the heap from a hole."""
-    while at > 0:
-        above = (at - 1) // 2
-        other = states.heap[above]
-        if states.key[other] <= states.key[state]:
-            break
-        states.heap[at] = other
-        states.place[other] = at
-        at = above
-    states.heap[at] = state
-    states.place[state] = at
-
-
-@njit(cache=True)
-def _pop(states: States) -> int:
-    """Take the state of least key; ties by the heap's own, deterministic order."""
-    best = states.heap[0]
-    states.place[best] = OUT_OF_HEAP
-    states.sizes[1] -= 1
-    size = states.sizes[1]
-    if size == 0:
-        return best
-    last = states.heap[size]
-    at = 0
-    while True:
-        child = 2 * at + 1
-        if child >= size:
-            break
-        if child + 1 < size and states.key[states.heap[child + 1]] < states.key[states.heap[child]]:
-            child += 1
-        if states.key[states.heap[child]] >= states.key[last]:
-            break
-        states.heap[at] = states.heap[child]
-        states.place[states.heap[at]] = at
-        at = child
-    states.heap[at] = last
-    states.place[last] = at
-    return best
-
-
 @njit(cache=True)
 def _relax(states: States, query: Query, state: int, cost: float, parent: int) -> None:
     if states.place[state] == CLOSED or cost >= states.cost[state]:
@@ -167,7 +74,7 @@ def _relax(states: States, query: Query, state: int, cost: float, parent: int) -
     if at == OUT_OF_HEAP:
         at = states.sizes[1]
         states.sizes[1] += 1
-    _rise(states, state, at)
+    rise(states, state, at)
 
 
 @njit(cache=True)
@@ -281,7 +188,7 @@ def search(scene: Scene, tangents: Tangents, query: Query) -> tuple[float, Float
     states = states_of(tangents, 2 * arcs, extra)
     _begin(states, query)
     while states.sizes[1] > 0:
-        state = _pop(states)
+        state = pop(states)
         if not states.tested[state]:
             if not _clear(scene, states, query, state, own):
                 states.place[state] = CLOSED
