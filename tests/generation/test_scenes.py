@@ -32,6 +32,14 @@ def test_python_makes_what_the_dataset_holds(dataset):
     assert generate_episodes(house, 1, first=1, config=CONFIG) == (held[1],)
 
 
+def test_real_scenes_have_the_same_bytes_for_any_workers(dataset, tmp_path):
+    generate(tmp_path / "d", CONFIG, 3, workers=3)
+    names = sorted(p.relative_to(dataset) for p in dataset.rglob("*") if p.is_file())
+    assert names
+    for name in names:
+        assert (tmp_path / "d" / name).read_bytes() == (dataset / name).read_bytes(), name
+
+
 def test_a_scene_again_is_compared(dataset, tmp_path):
     text, verdict = scene_again(CONFIG, 2, 1, dataset)
     assert "the same as in" in verdict
