@@ -1,6 +1,6 @@
 """A dataset proved right by independent, slower ways."""
 
 from internav_data.verification.findings import LEVELS, Finding, Findings, Level
-from internav_data.verification.validate import validate
+from internav_data.verification.levels import validate
 
 __all__ = ["LEVELS", "Finding", "Findings", "Level", "validate"]

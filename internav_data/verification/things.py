@@ -24,6 +24,8 @@ DOOR_CLEAR_M = 0.65
 """Free depth before a door, from the wall's face."""
 HALF_WALL_M = 0.06
 WALL_ID = -1
+REACHED = 0.5
+"""Share of a room's free nodes that more than must be joined to the house's largest component."""
 
 
 def wall_slabs(house: House) -> list[Slab]:
@@ -130,10 +132,13 @@ def check_ways_through(
     labels = ground.components()
     points = ground.points()
     main = np.bincount(labels[labels >= 0]).argmax() if (labels >= 0).any() else -1
-    joined = points[labels == main] if main >= 0 else points[:0]
     for room_id, room in rooms.items():
         shapely.prepare(room)
-        inside = shapely.intersects_xy(room, joined[:, 0], joined[:, 1])
+        inside = shapely.intersects_xy(room, points[:, 0], points[:, 1]) & (labels >= 0)
+        joined = int((inside & (labels == main)).sum())
         report.expect(
-            inside.any(), "house.reachable", f"room {room_id} reachable by the agent", "cut off"
+            joined > REACHED * int(inside.sum()),
+            "house.reachable",
+            f"room {room_id}: more than half of {int(inside.sum())} free nodes joined to the rest",
+            joined,
         )

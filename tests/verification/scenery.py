@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 
+from internav_data.dataset import Identity, assemble, open_work, write_scene_work
 from internav_data.records import (
     Asset,
     Door,
@@ -329,3 +330,74 @@ def episode(house, index, start, goal, obstacles, *, clear_m, way_m, yaw=90):
         expert=None,
         physics=Physics("bullet", "3.2.7", 0.1, 0.0001),
     )
+
+
+def taut(start, chain, goal, radius=0.2):
+    """Length of a string from start to goal round circles: (centre, +1 on its left, -1 right)."""
+    stops = [(start, 0.0), *((centre, radius * side) for centre, side in chain), (goal, 0.0)]
+    length, heading = 0.0, None
+    for (a, ra), (b, rb) in pairwise(stops):
+        gap = math.dist(a, b)
+        straight = math.sqrt(gap * gap - (rb - ra) ** 2)
+        direction = math.atan2(b[1] - a[1], b[0] - a[0]) - math.atan2(rb - ra, straight)
+        if heading is not None:
+            turn = math.remainder(direction - heading, math.tau)
+            assert turn * ra >= -1e-9, "the string does not touch this circle"
+            length += abs(turn) * radius
+        length += straight
+        heading = direction
+    return length
+
+
+def small_scenes():
+    """Three houses with two valid episodes each, lengths worked out as taut strings."""
+    return [_scene(0), _scene(1), _scene(2)]
+
+
+def _scene(number):
+    split = {0: "val", 1: "test"}.get(number, "train")
+    things = (
+        thing(0, "Table_1", 0, 1.0, 0.6),
+        thing(1, "Cupboard_1", 1, 6.0, 3.5),
+        thing(2, "Box_1", 1, 6.5, 0.5, yaw_deg=45.0),
+    )
+    house = replace(Grid(2, 1).house(number, things), split=split)
+    start, goal = (4, 8), (28, 8)
+    here, there = (1.0, 2.0), (7.0, 2.0)
+    made = []
+    for index in range(2):
+        if (number + index) % 2 == 0 and number == 0:
+            obstacles = [obstacle("Bar_1", 3.5, 2.0, yaw_deg=90.0)]
+            way_m = None
+        elif (number + index) % 2 == 0:
+            # A gap of 0.42 m beside the box: open for the disc, between two rows of the lattice.
+            obstacles = [obstacle("Box_2", 3.94, 1.82)]
+            way_m = taut(here, [((3.79, 2.02), -1), ((4.09, 2.02), -1)], there)
+        else:
+            obstacles = [obstacle("Box_1", 2.5, 2.0)]
+            way_m = taut(here, [((2.2, 1.7), 1), ((2.8, 1.7), 1)], there)
+        made.append(
+            episode(
+                house,
+                index,
+                start,
+                goal,
+                obstacles,
+                clear_m=6.0,
+                way_m=None if way_m is None else round(way_m, 4),
+            )
+        )
+    return house, made
+
+
+IDENTITY = Identity(
+    "internav-gen", "0", 0, 1, "0" * 64, {"episodes_per_scene": 2, "test_episodes_per_scene": 2}
+)
+
+
+def write_dataset(root, scenes, assets=None):
+    """Write scenes as a dataset, by the same road as the generator."""
+    work = open_work(root, IDENTITY)
+    for number, (house, episodes) in enumerate(scenes):
+        write_scene_work(work, number, house, episodes)
+    return assemble(root, IDENTITY, list((assets or ASSETS).values()), len(scenes))

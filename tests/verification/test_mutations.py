@@ -1,0 +1,441 @@
+"""A valid dataset is broken in one place at a time; the validator must name what broke."""
+
+import json
+from dataclasses import replace
+
+import pytest
+import scenery
+from scenery import ASSETS, obstacle, small_scenes, write_dataset
+
+from internav_data.dataset import read_manifest, write_manifest
+from internav_data.records import Pose
+from internav_data.records.errors import CorruptDataError, UsageError, ValidationError
+from internav_data.verification import validate
+
+
+@pytest.fixture(scope="module")
+def scenes():
+    return small_scenes()
+
+
+@pytest.fixture
+def dataset(tmp_path, scenes):
+    write_dataset(tmp_path / "ds", scenes)
+    return tmp_path / "ds"
+
+
+def predicates(findings):
+    return set(findings.by_predicate)
+
+
+def test_valid_dataset_is_valid_at_every_level(dataset):
+    for level in ("files", "schema", "geometry"):
+        findings = validate(dataset, level)
+        assert findings.ok, findings.summary()
+        assert findings.level == level
+    assert findings.checked["scenes"] == 3
+    assert findings.checked["episodes"] == 6
+    assert "valid" in findings.summary()
+    assert json.loads(findings.to_json())["ok"] is True
+    findings.raise_if_any()
+
+
+def test_workers_and_progress_change_nothing(dataset, monkeypatch):
+    told = []
+    alone = validate(dataset, progress=lambda *step: told.append(step))
+    assert told[-1] == ("geometry", 3, 3)
+    monkeypatch.setattr("internav_data.verification.levels.SCENES_A_UNIT", 1)
+    assert validate(dataset, workers=2) == alone
+
+
+def test_sample_looks_at_so_many_scenes(dataset):
+    assert validate(dataset, sample=1).checked["scenes"] == 1
+    assert validate(dataset, sample=1) == validate(dataset, sample=1)
+    assert validate(dataset, sample=99).checked["scenes"] == 3
+
+
+def test_arguments_are_judged(dataset, tmp_path):
+    with pytest.raises(UsageError, match="level"):
+        validate(dataset, "physics")
+    with pytest.raises(UsageError, match="sample"):
+        validate(dataset, sample=0)
+    with pytest.raises(UsageError, match="workers"):
+        validate(dataset, workers=0)
+    with pytest.raises(UsageError, match="no such folder"):
+        validate(tmp_path / "nowhere")
+    with pytest.raises(CorruptDataError, match=r"manifest\.json"):
+        validate(tmp_path)
+
+
+# files
+
+
+def shard(dataset, table="episodes"):
+    return sorted((dataset / "data" / table).glob("*.parquet"))[0]
+
+
+def test_one_byte_changed(dataset):
+    path = shard(dataset)
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    findings = validate(dataset)
+    assert "files.sha256" in predicates(findings)
+    assert all(f.file == path.relative_to(dataset).as_posix() for f in findings.found)
+    with pytest.raises(ValidationError, match=r"episodes/.*sha256|files\."):
+        findings.raise_if_any()
+
+
+def test_every_byte_of_a_shard_is_watched(dataset):
+    path = shard(dataset)
+    good = path.read_bytes()
+    for place in range(0, len(good), max(1, len(good) // 25)):
+        data = bytearray(good)
+        data[place] ^= 0x10
+        path.write_bytes(data)
+        assert "files.sha256" in predicates(validate(dataset, "files"))
+
+
+def test_truncated_shard(dataset):
+    path = shard(dataset)
+    path.write_bytes(path.read_bytes()[:-100])
+    assert {"files.bytes", "files.sha256"} <= predicates(validate(dataset))
+
+
+def test_missing_shard(dataset):
+    shard(dataset, "scenes").unlink()
+    assert "files.present" in predicates(validate(dataset))
+
+
+def test_unlisted_file(dataset):
+    (dataset / "data" / "episodes" / "extra.parquet").write_bytes(b"PAR1")
+    findings = validate(dataset)
+    assert predicates(findings) == {"files.unlisted"}
+    assert findings.found[0].file == "data/episodes/extra.parquet"
+
+
+def test_link_out_of_the_dataset(dataset, tmp_path):
+    path = shard(dataset)
+    path.rename(tmp_path / "elsewhere.parquet")
+    path.symlink_to(tmp_path / "elsewhere.parquet")
+    assert "files.inside" in predicates(validate(dataset))
+
+
+@pytest.mark.parametrize(
+    ("name", "predicate"),
+    [
+        ("rows", "files.rows"),
+        ("bytes", "files.bytes"),
+        ("sha256", "files.sha256"),
+        ("logical_digest", "files.logical-digest"),
+    ],
+)
+def test_manifest_says_another(dataset, name, predicate):
+    path = dataset / "manifest.json"
+    manifest = json.loads(path.read_text())
+    old = manifest["files"][0][name]
+    manifest["files"][0][name] = old + 1 if isinstance(old, int) else "0" * 64
+    path.write_text(json.dumps(manifest))
+    assert predicate in predicates(validate(dataset))
+
+
+def test_manifest_counts(dataset):
+    path = dataset / "manifest.json"
+    manifest = json.loads(path.read_text())
+    manifest["counts"]["val"]["episodes"] += 1
+    path.write_text(json.dumps(manifest))
+    assert predicates(validate(dataset)) == {"files.counts"}
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{", '{"format_version": 1}', '{"format_version": 99}'])
+def test_manifest_unreadable(dataset, text):
+    (dataset / "manifest.json").write_text(text)
+    assert predicates(validate(dataset)) == {"files.manifest"}
+
+
+def test_path_out_of_the_dataset(dataset):
+    path = dataset / "manifest.json"
+    manifest = json.loads(path.read_text())
+    manifest["files"][0]["path"] = "data/../../secret.parquet"
+    path.write_text(json.dumps(manifest))
+    assert predicates(validate(dataset)) == {"files.manifest"}
+
+
+# schema and geometry: the data are rewritten, with hashes that fit
+
+
+def change_episode(scenes, scene, index, /, **changes):
+    house, episodes = scenes[scene]
+    episodes = list(episodes)
+    episodes[index] = replace(episodes[index], **changes)
+    return [*scenes[:scene], (house, episodes), *scenes[scene + 1 :]]
+
+
+def change_obstacle(scenes, scene, index, /, **changes):
+    old = scenes[scene][1][index].obstacles
+    return change_episode(
+        scenes, scene, index, obstacles=(replace(old[0], **changes), *old[1:])
+    )
+
+
+def change_house(scenes, scene, **changes):
+    house, episodes = scenes[scene]
+    return [*scenes[:scene], (replace(house, **changes), episodes), *scenes[scene + 1 :]]
+
+
+def judged(tmp_path, scenes, assets=None):
+    write_dataset(tmp_path / "broken", scenes, assets)
+    return validate(tmp_path / "broken")
+
+
+EPISODE_CHANGES = {
+    "steps": ({"steps": 29}, "episode.steps"),
+    "clear steps": ({"clear_steps": 25}, "episode.clear-steps"),
+    "cut off": ({"steps": None}, "episode.steps"),
+    "sealed": ({"sealed": True}, "episode.sealed-way"),
+    "sealed and no way": ({"sealed": True, "way_m": None}, "episode.sealed"),
+    "clear length": ({"clear_m": 6.2}, "episode.clear-m"),
+    "clear length too short": ({"clear_m": 5.9}, "episode.clear-m-bounds"),
+    "way length": ({"way_m": 6.3}, "episode.way-m"),
+    "way length too short": ({"way_m": 6.01}, "episode.way-m"),
+    "mode": ({"mode": "blocked"}, "episode.mode"),
+    "rooms on the way": ({"rooms_on_way": 1}, "episode.rooms-on-way"),
+    "room paths": ({"room_paths": ()}, "episode.room-paths"),
+    "room paths cut": ({"room_paths_cut": True}, "episode.room-paths-cut"),
+    "node paths": ({"node_paths": ()}, "episode.node-paths"),
+    "node paths cut": ({"node_paths_cut": True}, "episode.node-paths-cut"),
+    "room count": ({"room_count": 3}, "schema.episodes.room_count"),
+    "obstacle count": ({"obstacle_count": 2}, "schema.episodes.obstacle_count"),
+    "split": ({"split": "train"}, "schema.episodes.split"),
+    "seed": ({"seed": 4}, "schema.episodes.seed"),
+    "index": ({"index": 5}, "schema.episodes.episode_id"),
+    "episode id": ({"episode_id": "scene-000000/0007"}, "schema.episodes.episode_id"),
+    "scene id": ({"scene_id": "scene-000044"}, "schema.episodes.scene_id"),
+    "unrounded": ({"way_m": 6.13181234}, "schema.episodes.way_m"),
+    "no obstacles": ({"obstacles": (), "obstacle_count": 0}, "episode.obstacle-count"),
+}
+
+
+@pytest.mark.parametrize("case", EPISODE_CHANGES)
+def test_episode_says_something_untrue(tmp_path, scenes, case):
+    changes, predicate = EPISODE_CHANGES[case]
+    findings = judged(tmp_path, change_episode(scenes, 0, 1, **changes))
+    assert predicate in predicates(findings), findings.summary()
+    assert {f.scene for f in findings.found if f.scene} <= {"scene-000000", "scene-000044"}
+
+
+END_CHANGES = {
+    "into a wall": ({"i": 4, "j": 0, "x": 1.0, "y": 0.0}, "episode.start-free"),
+    "out of the house": ({"i": 90, "j": 90, "x": 22.5, "y": 22.5}, "episode.start-free"),
+    "into a table": ({"i": 4, "j": 3, "x": 1.0, "y": 0.75}, "episode.start-free"),
+    "off its node": ({"x": 1.25}, "episode.start-node"),
+    "another room": ({"room": 1}, "episode.start-room"),
+    "no such room": ({"room": 7}, "schema.episodes.room"),
+    "another yaw": ({"yaw_deg": 45}, "episode.start-yaw"),
+    "under the obstacle": ({"i": 10, "j": 8, "x": 2.5, "y": 2.0}, "episode.start-uncovered"),
+    "near the goal": ({"i": 27, "j": 8, "x": 6.75, "y": 2.0, "room": 1}, "episode.clear-least"),
+}
+
+
+@pytest.mark.parametrize("case", END_CHANGES)
+def test_start_moved(tmp_path, scenes, case):
+    changes, predicate = END_CHANGES[case]
+    start = replace(scenes[0][1][1].start, **changes)
+    extra = {"clear_m": 0.25} if case == "near the goal" else {}
+    findings = judged(tmp_path, change_episode(scenes, 0, 1, start=start, **extra))
+    assert predicate in predicates(findings), findings.summary()
+
+
+OBSTACLE_CHANGES = {
+    "aside": ({"y": 2.25}, "episode.way-m"),
+    "into the wall": ({"x": 3.7, "y": 1.5}, "obstacle.overlap-house"),
+    "out of the house": ({"x": -3.0}, "obstacle.inside"),
+    "into the air": ({"z": 0.05}, "obstacle.floor"),
+    "unrounded": ({"x": 2.50004321}, "schema.episodes.obstacles.element.x"),
+    "not a unit": ({"quaternion": (0.0, 0.0, 0.1, 1.0)}, "schema.episodes.obstacles.element.quaternion"),
+    "w below 0": (
+        {"quaternion": (0.0, 0.0, 0.0, -1.0)},
+        "schema.episodes.obstacles.element.quaternion.w",
+    ),
+    "leaning": ({"quaternion": (0.052336, 0.0, 0.0, 0.99863)}, "obstacle.upright"),
+    "another mass": ({"mass_kg": 9.0}, "obstacle.mass_kg"),
+    "another friction": ({"friction": 0.5}, "obstacle.friction"),
+    "another type": ({"type": "Bar"}, "obstacle.type"),
+    "not pushable": ({"pushable": False}, "obstacle.pushable"),
+    "pickable": ({"pickable": True}, "obstacle.pickable"),
+    "unknown asset": ({"asset_id": "Ghost_1"}, "schema.episodes.asset"),
+    "furniture": ({"asset_id": "Cupboard_1"}, "obstacle.spawnable"),
+    "segment": ({"segment": 2}, "obstacle.segment"),
+    "settled too long": ({"settle_s": 1.5}, "schema.episodes.obstacles.element.settle_s"),
+    "sank in": ({"settle_penetration_m": 0.003}, "obstacle.penetration"),
+    "longest settle": ({"settle_s": 0.2}, "physics.settle"),
+    "deepest contact": ({"settle_penetration_m": 0.001}, "physics.penetration"),
+}
+
+
+@pytest.mark.parametrize("case", OBSTACLE_CHANGES)
+def test_obstacle_changed(tmp_path, scenes, case):
+    changes, predicate = OBSTACLE_CHANGES[case]
+    findings = judged(tmp_path, change_obstacle(scenes, 0, 1, **changes))
+    assert predicate in predicates(findings), findings.summary()
+
+
+def test_obstacle_moved_10_cm_out_of_the_gap(tmp_path, scenes):
+    findings = judged(tmp_path, change_obstacle(scenes, 2, 0, y=1.72))
+    assert predicates(findings) == {"episode.way-m"}
+
+
+def test_gap_shut_by_2_cm(tmp_path, scenes):
+    findings = judged(tmp_path, change_obstacle(scenes, 2, 0, y=1.85))
+    assert "episode.sealed" in predicates(findings), findings.summary()
+
+
+def test_obstacles_in_each_other(tmp_path, scenes):
+    one = scenes[0][1][1].obstacles[0]
+    changes = {"obstacles": (one, replace(one, asset_id="Box_2", type="Box")), "obstacle_count": 2}
+    assert "obstacle.overlap" in predicates(
+        judged(tmp_path, change_episode(scenes, 0, 1, **changes))
+    )
+
+
+def test_episode_dropped(tmp_path, scenes):
+    house, episodes = scenes[2]
+    findings = judged(tmp_path, [*scenes[:2], (house, episodes[:1])])
+    assert predicates(findings) == {"schema.episodes.per-scene"}
+
+
+def test_rows_in_another_order(tmp_path, scenes):
+    house, episodes = scenes[2]
+    findings = judged(tmp_path, [*scenes[:2], (house, episodes[::-1])])
+    assert "schema.episodes.order" in predicates(findings)
+
+
+def test_asset_of_another_mass(tmp_path, scenes):
+    assets = {**ASSETS, "Bar_1": replace(ASSETS["Bar_1"], mass_kg=1.0)}
+    findings = judged(tmp_path, scenes, assets)
+    assert predicates(findings) == {"obstacle.mass_kg"}
+
+
+def test_asset_of_another_shape(tmp_path, scenes):
+    assets = {**ASSETS, "Box_2": scenery.asset("Box_2", (0.3, 0.3, 0.6))}
+    assert "episode.way-m" in predicates(judged(tmp_path, scenes, assets))
+
+
+def test_scene_missing(dataset):
+    manifest = read_manifest(dataset)
+    write_manifest(dataset, replace(manifest, scenes=4))
+    assert predicates(validate(dataset)) == {"schema.scenes.all"}
+
+
+# houses
+
+
+def moved(thing, **changes):
+    return replace(thing, **changes)
+
+
+def house_cases(house):
+    doors, rooms, things = house.doors, house.rooms, house.things
+    door, first, last = doors[0], rooms[0], rooms[-1]
+    shifted = tuple((x + 0.5, y) for x, y in first.polygon)
+    return {
+        "door moved": ({"doors": (replace(door, y=door.y + 0.3),)}, "house.walls-gap"),
+        "door closed": ({"doors": (replace(door, open=False),)}, "house.room-graph"),
+        "door to itself": ({"doors": (replace(door, rooms=(0, 0)),)}, "schema.scenes.door-rooms"),
+        "door of another room": (
+            {"doors": (replace(door, rooms=(-1, 0)),)},
+            "house.door-rooms",
+        ),
+        "open entrance": ({"doors": (replace(door, rooms=(-1, 1)),)}, "house.entrance"),
+        "door of no room": ({"doors": (replace(door, rooms=(0, 9)),)}, "schema.scenes.door-rooms"),
+        "narrower door": ({"doors": (replace(door, width_m=0.8),)}, "house.walls-gap"),
+        "wider door": ({"doors": (replace(door, width_m=1.2),)}, "house.walls-closed"),
+        "higher door": ({"doors": (replace(door, height_m=2.3),)}, "house.walls-closed"),
+        "no wall": ({"walls": house.walls[1:]}, "house.walls-gap"),
+        "stray wall": (
+            {"walls": (*house.walls, replace(house.walls[0], x_min=2.0, x_max=2.1))},
+            "house.walls-stray",
+        ),
+        "graph": ({"room_graph": ()}, "house.room-graph"),
+        "house area": ({"area_m2": house.area_m2 + 1.0}, "house.area"),
+        "room area": ({"rooms": (replace(first, area_m2=9.0), last)}, "house.room-area"),
+        "room shifted": ({"rooms": (replace(first, polygon=shifted), last)}, "house.rooms-overlap"),
+        "room crossed": (
+            {"rooms": (replace(first, polygon=(*first.polygon[:1], *first.polygon[:0:-1])), last)},
+            "house.room-polygon",
+        ),
+        "room numbers": ({"rooms": (replace(first, room_id=3), last)}, "schema.scenes.room-ids"),
+        "room slanted": (
+            {"rooms": (replace(first, polygon=((0.0, 0.1), *first.polygon[1:])), last)},
+            "house.room-polygon",
+        ),
+        "outline": (
+            {"outline": ((0.0, 0.0), (8.0, 0.0), (8.0, 4.0), (0.0, 4.0))},
+            "house.rooms-tile",
+        ),
+        "thing in a wall": ({"things": (moved(things[0], y=0.3), *things[1:])}, "thing.overlap"),
+        "thing in a thing": (
+            {"things": (*things[:2], moved(things[2], x=6.0, y=3.3))},
+            "thing.overlap",
+        ),
+        "thing in another room": (
+            {"things": (moved(things[0], room=1), *things[1:])},
+            "thing.room",
+        ),
+        "thing before the door": (
+            {"things": (*things[:2], moved(things[2], x=4.4, y=2.0))},
+            "house.door-clear",
+        ),
+        "thing in the air": (
+            {"things": (*things[:2], moved(things[2], support=0))},
+            "thing.support",
+        ),
+        "thing below the floor": (
+            {"things": (*things[:2], moved(things[2], z=-0.1))},
+            "thing.support",
+        ),
+        "thing of another type": (
+            {"things": (*things[:2], moved(things[2], type="Table"))},
+            "thing.type",
+        ),
+        "unknown thing": (
+            {"things": (*things[:2], moved(things[2], asset_id="Ghost_1"))},
+            "schema.scenes.thing-asset",
+        ),
+        "thing twice": (
+            {"things": (*things[:2], moved(things[2], thing_id=1))},
+            "schema.scenes.thing-ids",
+        ),
+        "scene split": ({"split": "train"}, "schema.scenes.split"),
+        "scene seed": ({"seed": 3}, "schema.scenes.seed"),
+        "material": ({"materials": ()}, "schema.scenes.materials"),
+    }
+
+
+CASES = house_cases(small_scenes()[0][0])
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_house_says_something_untrue(tmp_path, scenes, case):
+    changes, predicate = CASES[case]
+    findings = judged(tmp_path, change_house(scenes, 0, **changes))
+    assert predicate in predicates(findings), findings.summary()
+
+
+def test_room_cut_off_by_furniture(tmp_path, scenes):
+    house = scenes[0][0]
+    barrier = [scenery.thing(3 + k, "Bar_1", 1, 4.9, 0.61 + 1.21 * k, yaw_deg=90.0) for k in range(3)]
+    barrier.append(scenery.thing(6, "Box_2", 1, 4.9, 3.83))
+    findings = judged(tmp_path, change_house(scenes, 0, things=(*house.things[:1], *barrier)))
+    assert "house.reachable" in predicates(findings), findings.summary()
+
+
+def test_things_of_a_group_may_interlock(tmp_path, scenes):
+    house = scenes[0][0]
+    beside = scenery.thing(3, "Box_2", 0, 1.0, 0.5, group=1)
+    together = (replace(house.things[0], group=1), *house.things[1:], beside)
+    assert judged(tmp_path, change_house(scenes, 0, things=together)).ok
+
+
+def test_pose_of_a_record_is_what_is_judged():
+    assert obstacle("Bar_1", 1.0, 2.0).pose == Pose(1.0, 2.0, 0.0, (0.0, 0.0, 0.0, 1.0))
