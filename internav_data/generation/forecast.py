@@ -29,7 +29,7 @@ MEGABYTE = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Forecast:
-    """What a run would take. Seconds are this machine's, side by side with nothing else."""
+    """What a run would take on this machine, by processor time: with nothing else running."""
 
     scenes: int
     episodes: int
@@ -112,16 +112,16 @@ def _sample(config: GenerationConfig, scenes: range) -> _Sample:
         if not sample.houses:
             # The first one compiles kernels and fills caches: made once unmeasured.
             reason = _tried(scene, config, known, 1) or reason
-        began = time.perf_counter()
+        began = time.process_time()
         try:
             build_scene(scene, config, known, episodes=1)
-            between = time.perf_counter()
+            between = time.process_time()
             built = build_scene(scene, config, known, episodes=1 + count)
         except QuarantineError as error:
             sample.failed += 1
             reason = str(error)
             continue
-        ended = time.perf_counter()
+        ended = time.process_time()
         # The second has `count` episodes more than the first: what differs is their cost.
         episodes_s = max(0.0, (ended - between) - (between - began))
         sample.episode_s += episodes_s / count * len(built.episodes)
