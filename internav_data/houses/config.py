@@ -39,17 +39,17 @@ class HouseConfig:
     """Path of a floor plan of your own (TOML or JSON); its rooms are furnished anew each scene."""
     scale: float = 1.0
     """Lengths of rooms times this; 1.1 makes houses 21 % larger. `paper` only."""
-    scale_small: float = 1.0
+    scale_small: float = 0.87
     """Further factor for houses of 1-2 rooms."""
-    scale_medium: float = 1.0
+    scale_medium: float = 0.88
     """Further factor for houses of 3-5 rooms."""
-    scale_large: float = 1.0
+    scale_large: float = 0.92
     """Further factor for houses of 6-10 rooms."""
     furnishing: float = 1.0
     """How much stands in a room beside what it cannot do without: 0 bare, 1 lived in, 2 crowded."""
-    loops: float = 0.45
+    loops: float = 0.95
     """Share of the sensible further doors that are built, so that there are ways round."""
-    wide_openings: float = 0.35
+    wide_openings: float = 0.95
     """Share of wide, double and open doorways where they make sense. `paper` only."""
     wings: float = 0.8
     """Share of drawn plans whose living room leads to rooms of its own: longer room paths."""
@@ -57,7 +57,7 @@ class HouseConfig:
     """Rooms on the way between two random points that plans of 3-5 rooms aim at. `paper` only."""
     rooms_on_way_large: float = 3.5
     """The same for 6-10 rooms. Doors of loops shorten it again."""
-    hall_from: int = 5
+    hall_from: int = 9
     """Houses of this many rooms and more have a hall."""
     candidates: int = 24
     """Floor plans drawn for each house; the most homelike one is taken."""
