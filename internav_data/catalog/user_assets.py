@@ -9,11 +9,12 @@ from __future__ import annotations
 import io
 import math
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from internav_data.catalog.convex import convex_pieces
+from internav_data.catalog.convex import Piece, convex_pieces
 from internav_data.catalog.user_manifest import MESH_SUFFIXES, MeshNote, read_notes
 from internav_data.records import Asset, Part
 from internav_data.records.errors import UsageError
@@ -92,6 +93,8 @@ def _asset(path: Path, note: MeshNote) -> Asset:
             f"set scale in assets.toml (perhaps {note.scale * guess:g}: are its units millimetres?)"
         )
     pieces = convex_pieces(path, points, faces, note.max_parts)
+    if note.lay_flat:
+        pieces = _laid_flat(pieces)
     parts, size = _fitted(path, pieces, colour)
     volume = sum(piece.volume for piece in pieces)
     mass = note.mass_kg if note.mass_kg is not None else max(0.01, _DENSITY_KG_M3 * volume)
@@ -109,6 +112,20 @@ def _asset(path: Path, note: MeshNote) -> Asset:
         blocks=True,
         parts=parts,
     )
+
+
+def _laid_flat(pieces: list[Piece]) -> list[Piece]:
+    """Turn pieces onto the face of their common hull that they rest on most surely."""
+    import trimesh  # noqa: PLC0415 - as in _read
+
+    hull = trimesh.convex.convex_hull(np.vstack([piece.corners for piece in pieces]))
+    volumes = np.array([piece.volume for piece in pieces])
+    middles = np.array([trimesh.convex.convex_hull(p.corners).center_mass for p in pieces])
+    turns, shares = trimesh.poses.compute_stable_poses(
+        hull, center_mass=volumes @ middles / volumes.sum(), sigma=0.0, n_samples=1
+    )
+    turn = turns[int(np.argmax(shares))][:3, :3]
+    return [replace(piece, corners=piece.corners @ turn.T) for piece in pieces]
 
 
 def _read(path: Path) -> tuple[Floats, NDArray[np.int64], RGB]:

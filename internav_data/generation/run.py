@@ -8,6 +8,7 @@ the order in which they end, nor any kill and resume, changes a byte.
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import shutil
 from dataclasses import dataclass
@@ -38,21 +39,25 @@ from internav_data.generation.scenes import (
 )
 from internav_data.houses.quota import room_count
 from internav_data.houses.splits import split_of_scene
+from internav_data.records import Pose
 from internav_data.records.errors import InternavError, QuarantineError, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
     from pathlib import Path
 
     from internav_data.catalog import Catalogue
     from internav_data.dataset import Manifest
     from internav_data.generation.config import GenerationConfig
+    from internav_data.records import Asset
 
 GENERATOR = "internav-gen"
 MAX_SCENES = 1_000_000
 """Scene ids have six digits."""
 HOPELESS = 20
 """When this many scenes fail before one succeeds, the config is at fault."""
+NAMED = 5
+"""So many meshes are named in one line."""
 TAIL = 8
 """Scenes a worker that are handed out largest first at the end, so that all end together."""
 
@@ -125,7 +130,27 @@ def generate(
 def _catalogue(config: GenerationConfig) -> Catalogue:
     from internav_data.catalog import catalogue  # noqa: PLC0415 - imported when needed
 
-    return catalogue(asset_folders(config))
+    assets = catalogue(asset_folders(config))
+    if config.assets:
+        ours = catalogue().assets
+        check_standing([a for asset_id, a in assets.assets.items() if asset_id not in ours])
+    return assets
+
+
+def check_standing(assets: Iterable[Asset]) -> None:
+    """Raise UsageError for meshes that do not stay where they are put: none would be spawned."""
+    from internav_data.world import settle  # noqa: PLC0415 - pybullet, for users with meshes
+    from internav_data.world.setting import UPRIGHT  # noqa: PLC0415 - as above
+
+    origin = Pose(0.0, 0.0, 0.0, UPRIGHT)
+    rests = ((asset.asset_id, settle(asset, origin, math.inf, tuple).refusal) for asset in assets)
+    fallen = [f"{asset_id} {refusal}" for asset_id, refusal in rests if refusal]
+    if fallen:
+        raise UsageError(
+            f"assets: {len(fallen)} of your meshes do not stay where they are put "
+            f"({', '.join(fallen[:NAMED])}{', …' if len(fallen) > NAMED else ''}); write "
+            "lay_flat = true or ignore = true for them in assets.toml, or turn them yourself"
+        )
 
 
 def check_counts(scenes: int, workers: int) -> None:

@@ -183,3 +183,13 @@ def test_a_hundred_real_meshes(tmp_path):
     assert time.perf_counter() - started < 900
     for asset in assets:
         check(asset)
+
+
+def test_lay_flat_turns_a_mesh_onto_its_broadest_face(tmp_path):
+    import trimesh
+
+    slab = trimesh.creation.box((0.6, 0.05, 0.8))
+    slab.apply_transform(trimesh.transformations.rotation_matrix(0.5, (1.0, 0.3, 0.0)))
+    (asset,) = load_user_assets(folder(tmp_path, toml="[default]\nlay_flat = true\n", mesh=slab))
+    check(asset)
+    assert asset.size[2] == pytest.approx(0.05, abs=1e-3)

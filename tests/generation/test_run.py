@@ -207,3 +207,17 @@ def test_a_run_killed_before_its_first_scene_does_not_bind_the_folder(tmp_path):
     (out / ".work").mkdir(parents=True)
     (out / ".work" / "identity.json").write_text('{"of": "another"}')
     assert made(out, 3).scenes == 3
+
+
+def test_meshes_that_tip_over_are_named_before_anything_is_written(tmp_path):
+    import trimesh
+
+    meshes = tmp_path / "meshes"
+    meshes.mkdir()
+    pole = trimesh.creation.box((0.05, 0.05, 1.2))
+    pole.apply_transform(trimesh.transformations.rotation_matrix(0.4, (1.0, 0.0, 0.0)))
+    pole.export(meshes / "pole.obj")
+    config = GenerationConfig(assets=(str(meshes),), episodes_per_scene=1)
+    with pytest.raises(UsageError, match=r"1 of your meshes .*Pole_user_pole .*lay_flat"):
+        generate(tmp_path / "out", config, 1, 1)
+    assert not (tmp_path / "out" / "manifest.json").exists()
