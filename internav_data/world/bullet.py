@@ -22,13 +22,14 @@ from typing import TYPE_CHECKING, Any
 
 from internav_data.geometry import asset_corners, centre_of_mass, multiply, rotation_matrix
 from internav_data.records import Pose
-from internav_data.world.setting import Rest
+from internav_data.world.setting import Motion, Rest
+from internav_data.world.sweeps import trail_of
 
 if TYPE_CHECKING:
     from types import ModuleType
 
     from internav_data.records import Asset, Vec3
-    from internav_data.world.setting import Body, Setting
+    from internav_data.world.setting import Body, Column, Setting, Shove
 
 
 def _import_quietly() -> ModuleType:
@@ -59,6 +60,9 @@ REST_SPIN = 0.01
 REST_STEPS = 10
 """A thing is at rest once it was slow for this many steps running."""
 SETTLE_LIMIT_S = 1.0
+PUSH_LIMIT_S = 5.0
+"""From letting go; what still rolls then stays where it is."""
+AGENT_HEIGHT_M = 1.8
 
 
 def _obj_text(asset: Asset) -> str:
@@ -111,6 +115,51 @@ class Bullet:
             reach_m=reach,
         )
 
+    def push(self, setting: Setting, shove: Shove) -> Motion:
+        """Push the first body along +x, let it go, and wait until all that moves is at rest."""
+        ids = self._build(setting)
+        moving = [k for k, body in enumerate(setting.bodies) if body.moves]
+        trails = [trail_of(setting.bodies[k].asset) for k in moving]
+        movers = [(ids[k], trail) for k, trail in zip(moving, trails, strict=True)]
+        for mover, trail in movers:
+            trail.follow(*pybullet.getBasePositionAndOrientation(mover, self._client))
+        gain = shove.force_n / setting.bodies[0].asset.mass_kg * STEP_S
+        pushes_left = round(shove.seconds / STEP_S)
+        calm, steps, limit = 0, 0, pushes_left + round(PUSH_LIMIT_S / STEP_S)
+        while steps < limit and calm < REST_STEPS:
+            if pushes_left:
+                # What is heavier than friction allows does not move, however long it is pushed.
+                pushes_left = self._shove(ids[0], shove, gain, pushes_left)
+            pybullet.stepSimulation(self._client)
+            steps += 1
+            slow = not pushes_left
+            for mover, trail in movers:
+                trail.follow(*pybullet.getBasePositionAndOrientation(mover, self._client))
+                if slow:
+                    speed, spin = pybullet.getBaseVelocity(mover, self._client)
+                    slow = math.hypot(*speed) < REST_SPEED and math.hypot(*spin) < REST_SPIN
+            calm = calm + 1 if slow else 0
+        return Motion(
+            poses=tuple(self._pose(ids[k], setting.bodies[k].asset) for k in moving),
+            sweeps=tuple(trail.box for trail in trails),
+            seconds=steps * STEP_S,
+            at_rest=calm >= REST_STEPS,
+        )
+
+    def _shove(self, identity: int, shove: Shove, gain: float, pushes_left: int) -> int:
+        """Push for one step; returns how many steps of pushing are left."""
+        speed, spin = pybullet.getBaseVelocity(identity, self._client)
+        if speed[0] + gain >= shove.speed_m_s:
+            # The last impulse: just what is missing.
+            missing = (shove.speed_m_s, speed[1], speed[2])
+            pybullet.resetBaseVelocity(identity, missing, spin, self._client)
+            return 0
+        middle, _ = pybullet.getBasePositionAndOrientation(identity, self._client)
+        pybullet.applyExternalForce(
+            identity, -1, (shove.force_n, 0.0, 0.0), middle, pybullet.WORLD_FRAME, self._client
+        )
+        return pushes_left - 1
+
     def _build(self, setting: Setting) -> list[int]:
         """Make the scene anew and return the ids of its bodies, in order."""
         client = self._client
@@ -137,7 +186,25 @@ class Bullet:
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
         floor = pybullet.createMultiBody(0.0, plane, visual, physicsClientId=client)
         self._surface(floor, FLOOR_FRICTION)
+        if setting.column is not None:
+            self._add_agent(setting.column, visual)
         return [self._add(body, visual) for body in setting.bodies]
+
+    def _add_agent(self, column: Column, visual: int) -> None:
+        shape = pybullet.createCollisionShape(
+            pybullet.GEOM_CYLINDER,
+            radius=column.radius_m,
+            height=AGENT_HEIGHT_M,
+            physicsClientId=self._client,
+        )
+        agent = pybullet.createMultiBody(
+            0.0,
+            shape,
+            visual,
+            basePosition=(column.x, column.y, AGENT_HEIGHT_M / 2.0),
+            physicsClientId=self._client,
+        )
+        self._surface(agent, FLOOR_FRICTION)
 
     def _add(self, body: Body, visual: int) -> int:
         asset, pose = body.asset, body.pose

@@ -23,6 +23,15 @@ class Body:
 
 
 @dataclass(frozen=True, slots=True)
+class Column:
+    """The agent's body: a fixed upright cylinder, 1.8 m high."""
+
+    x: float
+    y: float
+    radius_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class Setting:
     """A small scene: what can touch each other, everything else left out.
 
@@ -30,6 +39,8 @@ class Setting:
     """
 
     bodies: tuple[Body, ...]
+    column: Column | None = None
+    """The agent, where it takes part."""
 
 
 def wall_body(wall: Wall) -> Body:
@@ -37,7 +48,8 @@ def wall_body(wall: Wall) -> Body:
     size = (wall.x_max - wall.x_min, wall.y_max - wall.y_min, wall.z_max - wall.z_min)
     part = Part("box", (0.0, 0.0, size[2] / 2.0), size, UPRIGHT, (), (200, 200, 200), "stone")
     solid = Asset(
-        asset_id="wall",
+        # Assets are told apart by their ids first: one id for all would make every cache a list.
+        asset_id=f"wall {size[0]:.4f} {size[1]:.4f} {size[2]:.4f}",
         type="wall",
         size=size,
         mass_kg=1.0,
@@ -67,6 +79,36 @@ class Rest:
     """Farthest that any of its corners ever was from where it began, in the plane."""
 
 
+@dataclass(frozen=True, slots=True)
+class Shove:
+    """How the first body of a setting is pushed, along +x at its centre of mass.
+
+    A constant force until the body has the speed (the last impulse is scaled so that it has
+    exactly that) or the time is over; then it is let go. An infinite force gives the speed at once.
+    """
+
+    force_n: float
+    speed_m_s: float
+    seconds: float
+
+
+Box = tuple[float, float, float, float]
+"""Lowest x and y, highest x and y, metres."""
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Where a push led the moving bodies of a setting, in their order."""
+
+    poses: tuple[Pose, ...]
+    """Not rounded: the caller moves them into place first."""
+    sweeps: tuple[Box, ...]
+    """What each body's corners swept in the plane, its start included."""
+    seconds: float
+    """Simulated time from the first touch until at rest, or the time limit."""
+    at_rest: bool
+
+
 class Engine(Protocol):
     """A physics engine: pure functions from settings to plain data.
 
@@ -84,6 +126,9 @@ class Engine(Protocol):
 
     def settle(self, setting: Setting) -> Rest:
         """Let the first body of the setting fall until it rests; the others stay."""
+
+    def push(self, setting: Setting, shove: Shove) -> Motion:
+        """Push the first body along +x; bodies that move take part, the others stay."""
 
     def __hash__(self) -> int:
         """Engines are keys of caches of what they answered."""

@@ -1,0 +1,74 @@
+"""Quarter turns without trigonometry: pushes along the house's axes are solved along +x.
+
+Turning by quarters only swaps coordinates and signs, so that a push to the north is, to the last
+bit, the push to the east of a house turned by 90 degrees.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from internav_data.geometry import multiply, round_m, round_quaternion
+from internav_data.records import Pose
+
+if TYPE_CHECKING:
+    from internav_data.records import Quaternion, Vec2
+    from internav_data.world.setting import Box
+
+_HALF: Final = math.sqrt(0.5)
+TURNS: Final[tuple[Quaternion, ...]] = (
+    (0.0, 0.0, 0.0, 1.0),
+    (0.0, 0.0, _HALF, _HALF),
+    (0.0, 0.0, 1.0, 0.0),
+    (0.0, 0.0, -_HALF, _HALF),
+)
+"""Quaternions of 0, 90, 180 and 270 degrees counter-clockwise."""
+HEADINGS: Final[tuple[Vec2, ...]] = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
+"""Unit vectors of the four headings: +x, +y, -x, -y."""
+
+
+def turned(quarter: int, x: float, y: float) -> Vec2:
+    """Turn a vector counter-clockwise by quarters."""
+    c, s = HEADINGS[quarter % 4]
+    return c * x - s * y + 0.0, s * x + c * y + 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A frame at a point of the house, its +x along one of the four headings."""
+
+    x: float
+    y: float
+    heading: int
+
+    def enter(self, pose: Pose) -> Pose:
+        """Pose in this frame, rounded as stored ones are."""
+        x, y = turned(-self.heading, pose.x - self.x, pose.y - self.y)
+        turn = multiply(TURNS[-self.heading % 4], pose.quaternion)
+        return Pose(round_m(x), round_m(y), pose.z, round_quaternion(turn))
+
+    def leave(self, pose: Pose) -> Pose:
+        """Pose in the house, rounded as it will be stored."""
+        x, y = turned(self.heading, pose.x, pose.y)
+        turn = multiply(TURNS[self.heading], pose.quaternion)
+        return Pose(
+            round_m(self.x + x), round_m(self.y + y), round_m(pose.z), round_quaternion(turn)
+        )
+
+    def enter_point(self, point: Vec2) -> Vec2:
+        """Point in this frame, rounded."""
+        x, y = turned(-self.heading, point[0] - self.x, point[1] - self.y)
+        return round_m(x), round_m(y)
+
+    def leave_box(self, box: Box, margin: float) -> Box:
+        """Box in the house, grown by a margin."""
+        ax, ay = turned(self.heading, box[0], box[1])
+        bx, by = turned(self.heading, box[2], box[3])
+        return (
+            self.x + min(ax, bx) - margin,
+            self.y + min(ay, by) - margin,
+            self.x + max(ax, bx) + margin,
+            self.y + max(ay, by) + margin,
+        )

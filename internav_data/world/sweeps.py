@@ -1,0 +1,68 @@
+"""What a moving body sweeps in the plane, step by step."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numba import njit
+
+from internav_data.geometry import asset_corners, centre_of_mass
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from internav_data.records import Asset
+    from internav_data.world.setting import Box
+
+    Floats = NDArray[np.float64]
+
+
+@njit(cache=True)
+def _widen(
+    box: Floats, corners: Floats, px: float, py: float, qx: float, qy: float, qz: float, qw: float
+) -> None:
+    """Widen a box (low x, low y, high x, high y) to hold the turned and moved corners (n, 3)."""
+    s = 2.0 / (qx * qx + qy * qy + qz * qz + qw * qw)
+    a, b, c = 1.0 - s * (qy * qy + qz * qz), s * (qx * qy - qz * qw), s * (qx * qz + qy * qw)
+    d, e, f = s * (qx * qy + qz * qw), 1.0 - s * (qx * qx + qz * qz), s * (qy * qz - qx * qw)
+    for k in range(len(corners)):
+        u, v, w = corners[k, 0], corners[k, 1], corners[k, 2]
+        x, y = a * u + b * v + c * w + px, d * u + e * v + f * w + py
+        box[0], box[1] = min(box[0], x), min(box[1], y)
+        box[2], box[3] = max(box[2], x), max(box[3], y)
+
+
+@lru_cache(maxsize=4096)
+def _about_middle(asset: Asset) -> Floats:
+    """Corners (n, 3) from the centre of mass, about which Bullet turns a body."""
+    corners, _ = asset_corners(asset)
+    return corners - np.array(centre_of_mass(asset))
+
+
+@dataclass(slots=True)
+class Trail:
+    """The box that a body has swept so far."""
+
+    _corners: Floats
+    _box: Floats
+
+    def follow(
+        self, middle: tuple[float, float, float], turn: tuple[float, float, float, float]
+    ) -> None:
+        """Widen the box to where the body is now: its centre of mass and orientation."""
+        _widen(self._box, self._corners, middle[0], middle[1], *turn)
+
+    @property
+    def box(self) -> Box:
+        """Lowest x and y, highest x and y, metres."""
+        low_x, low_y, high_x, high_y = self._box.tolist()
+        return low_x, low_y, high_x, high_y
+
+
+def trail_of(asset: Asset) -> Trail:
+    """Begin an empty trail."""
+    return Trail(_about_middle(asset), np.array([math.inf, math.inf, -math.inf, -math.inf]))
