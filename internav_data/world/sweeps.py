@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numba import njit
 
-from internav_data.geometry import asset_corners, centre_of_mass
+from internav_data.geometry import asset_corners, centre_of_mass, transform
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from internav_data.records import Asset
+    from internav_data.records import Asset, Pose
     from internav_data.world.setting import Box
 
     Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
 
 
 @njit(cache=True)
@@ -66,3 +67,43 @@ class Trail:
 def trail_of(asset: Asset) -> Trail:
     """Begin an empty trail."""
     return Trail(_about_middle(asset), np.array([math.inf, math.inf, -math.inf, -math.inf]))
+
+
+@njit(cache=True)
+def _touching(boxes: Floats, low_x: float, low_y: float, high_x: float, high_y: float) -> Ints:
+    found = np.empty(len(boxes), dtype=np.int64)
+    count = 0
+    for k in range(len(boxes)):
+        if (
+            boxes[k, 0] < high_x
+            and boxes[k, 2] > low_x
+            and boxes[k, 1] < high_y
+            and boxes[k, 3] > low_y
+        ):
+            found[count] = k
+            count += 1
+    return found[:count]
+
+
+def touching(boxes: Floats, box: Box) -> list[int]:
+    """Which boxes (n, 4) overlap a box, ascending."""
+    rows: list[int] = _touching(boxes, *box).tolist()
+    return rows
+
+
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """Bounding box of a thing where it lies, metres."""
+
+    plan: Box
+    low_m: float
+    high_m: float
+
+
+def extent_of(asset: Asset, pose: Pose) -> Extent:
+    """Bounding box of all of a thing, its parts below 2 cm included."""
+    corners, _ = asset_corners(asset)
+    placed = transform(corners, pose)
+    low_x, low_y, low_z = placed.min(axis=0).tolist()
+    high_x, high_y, high_z = placed.max(axis=0).tolist()
+    return Extent((low_x, low_y, high_x, high_y), low_z, high_z)

@@ -1,0 +1,117 @@
+"""Drop: the first spot round the agent where a held thing comes to rest."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from internav_data.geometry import (
+    Polygons,
+    clearance,
+    footprint,
+    round_m,
+    round_quaternion,
+)
+from internav_data.geometry.planar import segment_polygon_distance
+from internav_data.navigation import CLEARANCE_M, RADIUS_M
+from internav_data.records import Pose
+from internav_data.world.frames import TURNS, turned
+from internav_data.world.settle import settle
+from internav_data.world.sight import axis_distance
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from internav_data.records import Asset, Vec2
+    from internav_data.world.setting import Body, Box
+    from internav_data.world.settle import Settled
+
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
+
+GAPS_M: Final = tuple(round(0.05 * k, 2) for k in range(1, 11))
+"""Distances from the agent's disc, nearest first."""
+BEARINGS_DEG: Final = (0, *(s * b for b in range(15, 180, 15) for s in (1, -1)), 180)
+"""From straight ahead to behind, left first."""
+ROOM_M: Final = 0.01
+"""Nothing may be nearer than this before it is let go."""
+NEAR_M: Final = 0.5
+"""What is farther away than this cannot be touched while a thing settles."""
+_AHEAD: Final = tuple((math.cos(math.radians(b)), math.sin(math.radians(b))) for b in BEARINGS_DEG)
+
+
+class Ground(NamedTuple):
+    """What a dropped thing must keep clear of."""
+
+    walls: Polygons
+    solid: Sequence[Polygons]
+    """Footprints of all that is fixed and of all that can move."""
+    bodies: Callable[[Box], Sequence[Body]]
+    """Gathers what can be touched in a box of the house."""
+
+
+def drop(asset: Asset, agent: Vec2, heading: int, ground: Ground) -> Settled | None:
+    """Try gap after gap at bearing after bearing; None where there is no room.
+
+    The thing stands upright, turned as the agent is.
+    """
+    turn = round_quaternion(TURNS[heading])
+    plan = _standing(asset, heading)
+    for gap in GAPS_M:
+        for ahead in _AHEAD:
+            ux, uy = turned(heading, *ahead)
+            spot = _spot(plan, agent, ux, uy, gap)
+            pose = Pose(*spot, 0.0, turn)
+            if _fits(plan, spot, agent, ground):
+                settled = _let_go(asset, pose, agent, ground)
+                if settled is not None:
+                    return settled
+    return None
+
+
+@lru_cache(maxsize=4096)
+def _standing(asset: Asset, heading: int) -> Polygons:
+    return footprint(asset, Pose(0.0, 0.0, 0.0, round_quaternion(TURNS[heading])))
+
+
+def _spot(plan: Polygons, agent: Vec2, ux: float, uy: float, gap: float) -> Vec2:
+    """Where the thing's near side is a gap away from the agent's disc."""
+    nearest = min((ux * x + uy * y for x, y in plan.vertices.tolist()), default=0.0)
+    far = RADIUS_M + gap - nearest
+    return round_m(agent[0] + far * ux), round_m(agent[1] + far * uy)
+
+
+def _fits(plan: Polygons, spot: Vec2, agent: Vec2, ground: Ground) -> bool:
+    """Whether there is room, and no wall in between."""
+    there = Polygons(plan.vertices + np.array(spot), plan.offsets)
+    if any(clearance(there, other, ROOM_M) < ROOM_M for other in ground.solid):
+        return False
+    walls = ground.walls
+    return not _crosses(*agent, *spot, walls.vertices, walls.offsets)
+
+
+@njit(cache=True)
+def _crosses(ax: float, ay: float, bx: float, by: float, vertices: Floats, offsets: Ints) -> bool:
+    for k in range(len(offsets) - 1):
+        start, stop = offsets[k], offsets[k + 1]
+        if segment_polygon_distance(ax, ay, bx, by, vertices, start, stop) == 0.0:
+            return True
+    return False
+
+
+def _let_go(asset: Asset, pose: Pose, agent: Vec2, ground: Ground) -> Settled | None:
+    reach = math.hypot(asset.size[0], asset.size[1]) / 2.0 + NEAR_M
+    box = (pose.x - reach, pose.y - reach, pose.x + reach, pose.y + reach)
+    settled = settle(asset, pose, ROOM_M, lambda: ground.bodies(box))
+    if settled.refusal:
+        return None
+    exact = footprint(asset, settled.pose)
+    if any(clearance(exact, other, ROOM_M) <= 0.0 for other in ground.solid):
+        return None
+    return settled if axis_distance(*agent, exact) >= CLEARANCE_M else None

@@ -1,0 +1,276 @@
+"""The world: a house, what can move in it, and the agent; one action at a time."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import struct
+from typing import TYPE_CHECKING
+
+from internav_data.geometry import Polygons, round_m
+from internav_data.navigation import SPACING_M
+from internav_data.records.errors import UsageError
+from internav_data.world.actions import START_HORIZON_DEG
+from internav_data.world.frames import HEADINGS
+from internav_data.world.push import AGENT_M, push
+from internav_data.world.setting import Body
+from internav_data.world.shells import placed_shell
+from internav_data.world.sight import REACH_M, Screen, axis_distance, view_from
+from internav_data.world.stage import Item, Stage, box_rows
+from internav_data.world.steps import act
+from internav_data.world.sweeps import touching
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from internav_data.navigation import Lattice
+    from internav_data.records import Asset, Episode, Pose, Vec2
+    from internav_data.world.actions import StepResult
+    from internav_data.world.push import Pushed, PushModel
+    from internav_data.world.setting import Box
+
+
+class World:
+    """A house, its movable things and an agent on the lattice.
+
+    The state is small and plain: the agent's node, quarter turn and horizon, each thing's pose, and
+    what is held. `step` is a function of it and the action alone, to the last bit.
+
+    Things are numbered: the house's movable furniture first (`stage.items`), then obstacles.
+
+    Attributes
+    ----------
+    stage : Stage
+        What never changes.
+    i, j, quarter, horizon_deg : int
+        The agent: node, quarter turns counter-clockwise from +x, how far it looks down.
+    held : int
+        Index of the thing in its hand, or -1.
+    items : tuple of Item
+        All things that can move; replaced, never changed.
+    lattice : Lattice
+        Of everything as it lies; replaced, never changed.
+    goal : (int, int)
+        Node to reach.
+    model : str
+        "force" or "kick".
+    """
+
+    __slots__ = (
+        "_boxes",
+        "_handles",
+        "goal",
+        "held",
+        "horizon_deg",
+        "i",
+        "items",
+        "j",
+        "lattice",
+        "model",
+        "quarter",
+        "stage",
+    )
+
+    stage: Stage
+    items: tuple[Item, ...]
+    lattice: Lattice
+    _boxes: NDArray[np.float64]
+    _handles: tuple[int, ...]
+
+    def __init__(
+        self,
+        stage: Stage,
+        obstacles: Iterable[tuple[Asset, Pose]],
+        start: tuple[int, int, int],
+        goal: tuple[int, int],
+        model: PushModel = "force",
+    ) -> None:
+        """Put obstacles and an agent (node i, j and quarter turn) into a house."""
+        extra = [Item.at(asset, pose) for asset, pose in obstacles]
+        self.stage = stage
+        self.lattice = stage.lattice.copy()
+        self._handles = stage.handles + tuple(self.lattice.add(e.footprint) for e in extra)
+        self.items = stage.items + tuple(extra)
+        self._boxes = box_rows(self.items)
+        self.i, self.j, self.quarter = start[0], start[1], start[2] % 4
+        self.horizon_deg = START_HORIZON_DEG
+        self.held = -1
+        self.goal = goal
+        self.model: PushModel = model
+
+    @staticmethod
+    def of_episode(
+        stage: Stage, episode: Episode, assets: Mapping[str, Asset], model: PushModel = "force"
+    ) -> World:
+        """Set up an episode at its start.
+
+        Raises
+        ------
+        UsageError
+            The stage is of another house.
+        """
+        if stage.house.scene_id != episode.scene_id:
+            raise UsageError(
+                f"World.of_episode: episode {episode.episode_id} belongs to {episode.scene_id}, "
+                f"got the house {stage.house.scene_id}; build the stage of its own house"
+            )
+        start, goal = episode.start, episode.goal
+        return World(
+            stage,
+            [(assets[o.asset_id], o.pose) for o in episode.obstacles],
+            (start.i, start.j, start.yaw_deg // 90),
+            (goal.i, goal.j),
+            model,
+        )
+
+    def copy(self) -> World:
+        """Return an independent world in the same state: only references are copied."""
+        other = object.__new__(World)
+        for name in World.__slots__:
+            setattr(other, name, getattr(self, name))
+        return other
+
+    def step(self, action: int) -> StepResult:
+        """Act. An action that fails changes nothing and says why."""
+        return act(self, action)
+
+    @property
+    def position(self) -> Vec2:
+        """The agent's axis, metres."""
+        return SPACING_M * self.i, SPACING_M * self.j
+
+    @property
+    def obstacles(self) -> range:
+        """Indices of the obstacles among `items`."""
+        return range(len(self.stage.items), len(self.items))
+
+    def steps(self) -> int | None:
+        """Lattice distance to the goal, things as they lie; None when cut off."""
+        return self.lattice.distance((self.i, self.j), self.goal)
+
+    def way_m(self) -> float | None:
+        """Any-angle distance to the goal, things as they lie; None when cut off."""
+        return self.way_between(self.position, self.goal_point)
+
+    def way_between(self, here: Vec2, there: Vec2) -> float | None:
+        """Any-angle distance between two points, things as they lie; None when cut off."""
+        home = self.stage.items
+        displaced = tuple(k for k, item in enumerate(home) if self.items[k] is not item)
+        loose = [self.items[k].footprint for k in (*displaced, *self.obstacles)]
+        way = self.stage.ways(displaced).distance(here, there, Polygons.joined(loose))
+        return None if way is None else round_m(way)
+
+    def clear_m(self) -> float | None:
+        """Any-angle distance to the goal without obstacles, furniture in its place."""
+        way = self.stage.clear_m(self.position, self.goal_point)
+        return None if way is None else round_m(way)
+
+    def target(self, *, pick: bool) -> int:
+        """Index of the closest visible thing to pick up, or to push; -1 without one."""
+        x, y = self.position
+        box = (x - REACH_M, y - REACH_M, x + REACH_M, y + REACH_M)
+        near = touching(self._boxes, box)
+        wanted = []
+        for k in near:
+            asset = self.items[k].asset
+            if asset.pickable if pick else asset.pushable:
+                wanted.append((self.away(k, x, y), k))
+        if not wanted:
+            return -1
+        shells = [placed_shell(item.asset, pose) for k in near for item, pose in [self._at(k)]]
+        fixed = [self.stage.fixed[k] for k in touching(self.stage.boxes, box)]
+        screen = Screen(shells + [placed_shell(body.asset, body.pose) for body in fixed])
+        view = view_from(x, y, HEADINGS[self.quarter], self.horizon_deg)
+        for _, k in sorted(wanted):
+            if screen.seen(view, near.index(k)):
+                return k
+        return -1
+
+    def pushed(self, index: int, heading: int, *, agent: bool = True) -> Pushed:
+        """Answer what pushing a thing along a heading of the house (0 … 3) would do."""
+        item, pose = self._at(index)
+        gap = math.inf
+        if agent:
+            x, y = self.position
+            box = (x - AGENT_M, y - AGENT_M, x + AGENT_M, y + AGENT_M)
+            loose = touching(self._boxes, box)
+            gap = min((self.away(k, x, y) for k in loose), default=math.inf)
+        return push(
+            item.asset,
+            pose,
+            heading,
+            lambda box: self.near(box, index),
+            self.position if agent else None,
+            agent_gap_m=gap,
+            model=self.model,
+        )
+
+    def put(self, changes: Iterable[tuple[int, Pose | None]]) -> None:
+        """Lay things elsewhere, or (pose None) take them off the floor: no questions asked."""
+        lattice = self.lattice.copy()
+        items, handles, boxes = list(self.items), list(self._handles), self._boxes.copy()
+        for k, pose in changes:
+            if items[k].pose is not None:
+                lattice.remove(handles[k])
+            home = self.stage.items[k] if k < len(self.stage.items) else None
+            back = home is not None and home.pose == pose
+            items[k] = home if back and home is not None else Item.at(items[k].asset, pose)
+            boxes[k] = items[k].box
+            handles[k] = -1 if pose is None else lattice.add(items[k].footprint)
+        self.lattice, self.items = lattice, tuple(items)
+        self._handles, self._boxes = tuple(handles), boxes
+
+    def digest(self) -> str:
+        """Sha256 of the state: equal for equal worlds, whatever happened before."""
+        goal, model = self.goal, self.model.encode()
+        parts = [self.stage.house.scene_id.encode(), model]
+        parts.append(
+            struct.pack("<7i", self.i, self.j, self.quarter, self.horizon_deg, self.held, *goal)
+        )
+        for item in self.items:
+            parts.append(item.asset.asset_id.encode())
+            if item.pose is not None:
+                p = item.pose
+                parts.append(struct.pack("<7d", p.x, p.y, p.z, *p.quaternion))
+        return hashlib.sha256(b"".join(struct.pack("<i", len(p)) + p for p in parts)).hexdigest()
+
+    def __eq__(self, other: object) -> bool:
+        """Whether another world is in the same state."""
+        return isinstance(other, World) and self.digest() == other.digest()
+
+    __hash__ = None  # type: ignore[assignment] # a world changes
+
+    @property
+    def goal_point(self) -> Vec2:
+        """Where the goal is, metres."""
+        return SPACING_M * self.goal[0], SPACING_M * self.goal[1]
+
+    def _at(self, index: int) -> tuple[Item, Pose]:
+        item = self.items[index]
+        if item.pose is None:
+            raise UsageError(
+                f"World: thing {index} ({item.asset.asset_id}) is held, it has no pose"
+            )
+        return item, item.pose
+
+    def away(self, index: int, x: float, y: float) -> float:
+        """Distance from the agent's axis to a thing's footprint (its box, where it has none)."""
+        item = self.items[index]
+        if len(item.footprint):
+            return axis_distance(x, y, item.footprint)
+        low_x, low_y, high_x, high_y = item.box
+        return math.hypot(max(low_x - x, 0.0, x - high_x), max(low_y - y, 0.0, y - high_y))
+
+    def near(self, box: Box, skip: int = -1) -> list[tuple[int, Body]]:
+        """Bodies that reach into a box: items by their index, then what is fixed."""
+        bodies = []
+        for k in touching(self._boxes, box):
+            if k != skip:
+                item, pose = self._at(k)
+                bodies.append((k, Body(item.asset, pose, moves=True)))
+        first = len(self.items)
+        bodies += [(first + k, self.stage.fixed[k]) for k in touching(self.stage.boxes, box)]
+        return bodies
