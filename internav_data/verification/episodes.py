@@ -171,7 +171,7 @@ class _Judge:
             self._bounds("way-m", episode.way_m, episode.clear_m, episode.steps)
             self._open_way(taken, episode.way_m)
         if exact:
-            fine = self._length(Sight(grown(site.blockers, FINE)), episode.clear_m * LOOK)
+            fine = self._length(site.fine_sight, episode.clear_m * LOOK)
             close = abs(fine - episode.clear_m) <= _slack(episode.clear_m)
             close = close or self._second_look([], episode.clear_m)
             self.expect(close, "clear-m-exact", f"{fine:.4f} m", episode.clear_m)
@@ -189,25 +189,24 @@ class _Judge:
 
     def _agrees(self, sight: Sight, stated: float) -> bool:
         found = self._length(sight, stated + _slack(stated))
-        return math.isfinite(found) and abs(found - stated) <= _slack(stated)
+        return abs(found - stated) <= _slack(stated)
 
     def _sight(self, taken: list[Geometry], chords: int, slack_m: float) -> Sight:
-        base = self.site.sight
-        if chords != COARSE or slack_m != 0.0:
+        if slack_m != 0.0:
             return Sight(grown([*self.site.blockers, *taken], chords, slack_m))
-        return Sight(base.base, grown(taken), base) if taken else base
+        base = self.site.sight if chords == COARSE else self.site.fine_sight
+        return Sight(base.base, grown(taken, chords), base) if taken else base
 
     def _second_look(self, taken: list[Geometry], stated: float) -> bool:
         """Whether finely cut arcs, or ties within the band, agree with what is stated."""
-        lengths = [
-            self._length(self._sight(taken, FINE, slack), stated * LOOK)
-            for slack in (0.0, -BAND_M, BAND_M)
-        ]
-        if abs(lengths[0] - stated) <= _slack(stated):
+        if self._agrees(self._sight(taken, FINE, 0.0), stated):
             return True
         # A gap as wide as the disc is open for the smaller disc and shut for the larger one.
-        low, high = lengths[1] - _slack(stated), lengths[2] + _slack(stated)
-        return lengths[2] - lengths[1] > _slack(stated) and low <= stated <= high
+        low, high = (
+            self._length(self._sight(taken, FINE, slack), stated * LOOK)
+            for slack in (-BAND_M, BAND_M)
+        )
+        return high - low > _slack(stated) and low - _slack(stated) <= stated <= high
 
     def _report(self, name: str, taken: list[Geometry], stated: float) -> None:
         found = self._length(self._sight(taken, COARSE, 0.0), math.inf)

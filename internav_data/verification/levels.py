@@ -14,6 +14,7 @@ from internav_data.records.errors import UsageError
 from internav_data.verification.files import check_file, check_listing, check_manifest
 from internav_data.verification.findings import LEVELS, Collector, Findings, Level, join
 from internav_data.verification.scenes import check_scene
+from internav_data.verification.shapes import Shapes
 from internav_data.verification.tables import check_tables, number_of
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from internav_data.dataset import DataFile, Manifest
-    from internav_data.records import Asset, Episode, House
+    from internav_data.records import Episode, House
 
     Progress = Callable[[str, int, int], None]
 
@@ -202,20 +203,20 @@ class _Reader:
         return [episode for episode in group if episode.scene_id == place.scene_id]
 
 
-_ASSETS: dict[str, dict[str, Asset]] = {}
-"""Of this process, by sha256 of their file: read once for all its units."""
+_SHAPES: dict[str, Shapes] = {}
+"""Of this process, by sha256 of the assets' file: worked out once for all its units."""
 
 
 def check_unit(unit: Unit) -> Collector:
     """Judge the geometry of some scenes."""
     key = unit.assets.sha256
-    if key not in _ASSETS:
-        _ASSETS.clear()
+    if key not in _SHAPES:
+        _SHAPES.clear()
         table = read_table(unit.root / unit.assets.path, ASSETS)
-        _ASSETS[key] = {asset.asset_id: asset for asset in from_table(table, ASSETS)}
+        _SHAPES[key] = Shapes({a.asset_id: a for a in from_table(table, ASSETS)})
     reader = _Reader(unit.root)
     reports = []
     for place in unit.places:
         file = place.episodes[0] if place.episodes else place.house[0]
-        reports.append(check_scene(reader.house(place), reader.episodes(place), _ASSETS[key], file))
+        reports.append(check_scene(reader.house(place), reader.episodes(place), _SHAPES[key], file))
     return join(reports)

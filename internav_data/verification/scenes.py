@@ -11,13 +11,14 @@ from internav_data.verification.site import Site
 from internav_data.verification.things import check_things, check_ways_through
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
-    from internav_data.records import Asset, Episode, House
+    from internav_data.records import Episode, House
+    from internav_data.verification.shapes import Shapes
 
 
 def check_scene(
-    house: House, episodes: Sequence[Episode], assets: Mapping[str, Asset], file: str = ""
+    house: House, episodes: Sequence[Episode], shapes: Shapes, file: str = ""
 ) -> Collector:
     """Judge a house and its episodes, sharing what they have in common.
 
@@ -28,15 +29,15 @@ def check_scene(
     episodes
         Episodes of that house. The finely cut visibility graph is built for the one in the
         middle of them.
-    assets
-        What `assets.parquet` says, by asset_id.
+    shapes
+        Of what `assets.parquet` says; worth keeping from scene to scene.
     file
         Path of the episodes' file, for findings.
 
     """
     report = Collector(file, house.scene_id)
     report.counts["scenes"] += 1
-    unknown = sorted({t.asset_id for t in house.things} - set(assets))
+    unknown = sorted({t.asset_id for t in house.things} - set(shapes.assets))
     rooms = check_rooms(house, report)
     check_doors(house, rooms, report)
     check_walls(house, rooms, report)
@@ -44,7 +45,7 @@ def check_scene(
         return report
     if len(rooms) < len(house.rooms) or "house.outline-polygon" in report.by_predicate:
         return report  # nothing can be measured in a house without proper rooms
-    site = Site(house, assets)
+    site = Site(house, shapes)
     check_things(house, rooms, site.shapes, report)
     check_ways_through(house, rooms, site.prints, site.ground, report)
     for number, episode in enumerate(episodes):

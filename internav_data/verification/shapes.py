@@ -120,6 +120,16 @@ def plan_of(corners: Floats, edges: Ints, low: float, high: float) -> Geometry |
     return _hull(points)
 
 
+def _uncovered(plans: list[Geometry]) -> list[Geometry]:
+    """Leave out what the largest plan covers: the union stays the same, the work does not."""
+    if not plans:
+        return []
+    largest = max(plans, key=shapely.area)
+    shapely.prepare(largest)
+    covered = shapely.covers(largest, np.array(plans, dtype=object))
+    return [largest, *(plan for plan, inside in zip(plans, covered, strict=True) if not inside)]
+
+
 class Shapes:
     """Footprints and slabs of assets at poses; hulls are worked out once for each asset."""
 
@@ -148,7 +158,7 @@ class Shapes:
             plan_of(corners, edges, STEP_OVER_M, AGENT_HEIGHT_M)
             for corners, edges in self._placed(asset_id, pose)
         ]
-        return [plan for plan in plans if plan is not None]
+        return _uncovered([plan for plan in plans if plan is not None])
 
     def slabs(self, asset_id: str, pose: Pose) -> list[Slab]:
         """Return every part's plan at its full height, and the heights it spans."""

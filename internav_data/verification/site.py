@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING
 import networkx as nx
 import numpy as np
 import shapely
-from shapely import Polygon, box
+from shapely import Point, Polygon, box
 
 from internav_data.records import OUTSIDE
 from internav_data.verification.ground import KEEP_M, Ground
-from internav_data.verification.shapes import AGENT_HEIGHT_M, STEP_OVER_M, Shapes
-from internav_data.verification.ways import FINE, Sight, grown
+from internav_data.verification.portals import Portals
+from internav_data.verification.shapes import AGENT_HEIGHT_M, STEP_OVER_M
+from internav_data.verification.ways import COARSE, FINE, Sight, grown
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from shapely import Geometry
 
-    from internav_data.records import Asset, House
+    from internav_data.records import House
+from internav_data.verification.shapes import Shapes
 
 MOST_PATHS = 64
 """Room paths and node paths listed at most."""
@@ -32,9 +32,9 @@ RoomPaths = tuple[tuple[int, ...], ...]
 class Site:
     """A house, its footprints, its lattice and its visibility graph without obstacles."""
 
-    def __init__(self, house: House, assets: Mapping[str, Asset]) -> None:
+    def __init__(self, house: House, shapes: Shapes) -> None:
         self.house = house
-        self.shapes = Shapes(assets)
+        self.shapes = shapes
         self.outline = Polygon(house.outline)
         self.walls: list[Geometry] = [
             box(w.x_min, w.y_min, w.x_max, w.y_max)
@@ -58,9 +58,27 @@ class Site:
         return int(np.bincount(labels).argmax()) if len(labels) else -1
 
     @cached_property
+    def _ground(self) -> tuple[Polygon, Point] | None:
+        """The outline and a node of the largest component."""
+        nodes = np.flatnonzero(self.components == self.main_component)
+        if self.main_component < 0:
+            return None
+        return self.outline, Point(self.ground.points()[nodes[0]])
+
+    @cached_property
+    def portals(self) -> Portals:
+        """Lower bounds of ways from room to room."""
+        return Portals(self.house)
+
+    @cached_property
     def sight(self) -> Sight:
         """The visibility graph without obstacles, arcs cut coarsely."""
-        return Sight(grown(self.blockers))
+        return Sight(grown(self.blockers, COARSE, ground=self._ground), portals=self.portals)
+
+    @cached_property
+    def fine_sight(self) -> Sight:
+        """The same, arcs cut finely."""
+        return Sight(grown(self.blockers, FINE, ground=self._ground), portals=self.portals)
 
     @cached_property
     def free(self) -> Geometry:
