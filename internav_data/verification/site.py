@@ -76,11 +76,6 @@ class Site:
         return Sight(grown(self.blockers, COARSE, ground=self._ground), portals=self.portals)
 
     @cached_property
-    def fine_sight(self) -> Sight:
-        """The same, arcs cut finely."""
-        return Sight(grown(self.blockers, FINE, ground=self._ground), portals=self.portals)
-
-    @cached_property
     def free(self) -> Geometry:
         """Where the disc's centre can be, arcs cut finely."""
         array = np.array(self.blockers, dtype=object)

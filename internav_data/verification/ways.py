@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import shapely
+from shapely import Polygon
 
 from internav_data.verification.ground import KEEP_M
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
-    from shapely import Geometry, Point, Polygon
+    from shapely import Geometry, Point
 
     from internav_data.verification.portals import Portals
 
@@ -229,6 +230,19 @@ def grown(
     get to are left out.
     """
     return Grown(polygons, KEEP_M + slack_m, chords, ground)
+
+
+def ellipse(first: tuple[float, float], second: tuple[float, float], length: float) -> Polygon:
+    """Return all points on ways of at most `length` between two points (a polygon around them)."""
+    straight = math.dist(first, second)
+    long, short = length / 2.0, math.sqrt(max(0.0, length * length - straight * straight)) / 2.0
+    heading = math.atan2(second[1] - first[1], second[0] - first[0])
+    middle = ((first[0] + second[0]) / 2.0, (first[1] + second[1]) / 2.0)
+    # Around, not inside: the sides of a 32-gon pass at 0.995 of its radius.
+    turns = np.linspace(0.0, 2.0 * math.pi, 32, endpoint=False)
+    u, v = 1.005 * long * np.cos(turns), 1.005 * short * np.sin(turns)
+    c, s = math.cos(heading), math.sin(heading)
+    return Polygon(np.column_stack([middle[0] + c * u - s * v, middle[1] + s * u + c * v]))
 
 
 def joined(
