@@ -38,6 +38,8 @@ WHIMS = (0.6, 2.0, 4.0, 4.0, 4.0)
 """How much chance there is in each of the door trees that a plan is tried with."""
 DEPTH_WEIGHT = 10.0
 """What one room more or less on the way than asked for costs."""
+THROUGH_BATHROOM = 12.0
+"""What each room that is reached only through a bathroom costs."""
 SLIVER = 2.9
 """Rooms that are longer than this times their width are corridors."""
 LEAST_JOG_CM = 50
@@ -111,6 +113,10 @@ def _through_private(types: Sequence[str], tree: Sequence[tuple[int, int]]) -> f
         if name in PRIVATE:
             doors = sum(1 for a, b in tree if room in {a, b} and types[a + b - room] in PUBLIC)
             score += 4.0 * max(0, doors - 1)
+        if name == "bathroom":
+            # A bathroom may hang off a bedroom; nobody should have to walk through one.
+            ways = sum(1 for edge in tree if room in edge)
+            score += THROUGH_BATHROOM * max(0, ways - 1)
     return score
 
 

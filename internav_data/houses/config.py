@@ -43,7 +43,7 @@ class HouseConfig:
     """Further factor for houses of 1-2 rooms."""
     scale_medium: float = 0.88
     """Further factor for houses of 3-5 rooms."""
-    scale_large: float = 0.92
+    scale_large: float = 0.96
     """Further factor for houses of 6-10 rooms."""
     furnishing: float = 1.0
     """How much stands in a room beside what it cannot do without: 0 bare, 1 lived in, 2 crowded."""
@@ -55,10 +55,11 @@ class HouseConfig:
     """Share of drawn plans whose living room leads to rooms of its own: longer room paths."""
     rooms_on_way_medium: float = 2.55
     """Rooms on the way between two random points that plans of 3-5 rooms aim at. `paper` only."""
-    rooms_on_way_large: float = 3.5
+    rooms_on_way_large: float = 3.8
     """The same for 6-10 rooms. Doors of loops shorten it again."""
-    hall_from: int = 9
-    """Houses of this many rooms and more have a hall."""
+    hall_from: int = 0
+    """Houses of this many rooms and more have a hall; 0 for the preset's own: 6 in `paper`, as
+    suits Table 2, 5 in `realistic`."""
     candidates: int = 24
     """Floor plans drawn for each house; the most homelike one is taken."""
     windows: bool = True
@@ -75,6 +76,10 @@ class HouseConfig:
         if self.floor_plan is not None and self.rooms:
             raise UsageError("rooms and floor_plan exclude each other: leave one of them out")
         return parse_rooms(self.rooms)
+
+    def halls_from(self) -> int:
+        """Return the number of rooms from which houses have a hall."""
+        return self.hall_from or (6 if self.preset == "paper" else 5)
 
     def scale_of(self, rooms: int) -> float:
         """Return the factor on lengths for a house of so many rooms."""
@@ -107,7 +112,7 @@ _BANDS: Mapping[str, tuple[float, float]] = {
     "wings": (0.0, 1.0),
     "rooms_on_way_medium": (2.0, 5.0),
     "rooms_on_way_large": (2.0, 6.0),
-    "hall_from": (3, 11),
+    "hall_from": (0, 11),
     "candidates": (1, 200),
 }
 

@@ -140,7 +140,7 @@ def programme(seed: int, scene: int, config: HouseConfig, attempt: int) -> tuple
         shares = SHARES
         if request.counts:
             shares = {count: SHARES[count] for count in request.counts}
-        types = _room_types(rng, room_count(seed, scene, shares), config.hall_from)
+        types = _room_types(rng, room_count(seed, scene, shares), config.halls_from())
     standards = _standards(types, config, rng)
     areas = _areas(standards, config, rng)
     return tuple(

@@ -186,7 +186,8 @@ def test_scale_makes_houses_larger(assets):
         return sum(build_house(2, k, config, assets).area_m2 for k in range(12))
 
     assert 1.15 < area(scale=1.1) / area() < 1.27
-    assert 1.15 < area(scale_medium=1.1) / area() < 1.27
+    medium = HouseConfig().scale_medium
+    assert 1.15 < area(scale_medium=1.1 * medium) / area() < 1.27
     assert area(scale_large=1.3) == area()
 
 
