@@ -1,6 +1,6 @@
 """internav against the baseline of `naive.py`: the same houses, the same answers, side by side.
 
-    python benchmarks/compare.py [--scenes 6] [--episodes 10] [--seed 0] [--out FILE]
+    python benchmarks/compare.py [--scenes 7] [--episodes 20] [--seed 0] [--out FILE]
 
 Both make the same number of episodes in the same houses in one process, what a house needs once
 included; what a process needs once (`internav_start_s`) is told apart. Then each judges the
@@ -43,7 +43,7 @@ ROOMS = ("1", "2", "3", "4", "5", "7", "9")
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scenes", type=int, default=len(ROOMS))
-    parser.add_argument("--episodes", type=int, default=10)
+    parser.add_argument("--episodes", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
