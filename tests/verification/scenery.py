@@ -7,7 +7,6 @@ from collections import deque
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-
 from internav_data.dataset import Identity, assemble, open_work, write_scene_work
 from internav_data.records import (
     Asset,
@@ -45,8 +44,11 @@ def asset(asset_id, size, parts=None, *, mass=8.0, spawnable=True):
 
 def table(asset_id, width, depth, height):
     legs = [
-        part("box", (x * (width - 0.06) / 2, y * (depth - 0.06) / 2, height / 2 - 0.02),
-             (0.06, 0.06, height - 0.04))
+        part(
+            "box",
+            (x * (width - 0.06) / 2, y * (depth - 0.06) / 2, height / 2 - 0.02),
+            (0.06, 0.06, height - 0.04),
+        )
         for x in (-1, 1)
         for y in (-1, 1)
     ]
@@ -115,7 +117,10 @@ class Grid:
             windows=(),
             walls=tuple(walls),
             things=tuple(things),
-            materials=(Material("oak", (120, 90, 60), "planks"), Material("white", (250,) * 3, "plain")),
+            materials=(
+                Material("oak", (120, 90, 60), "planks"),
+                Material("white", (250,) * 3, "plain"),
+            ),
             room_graph=tuple(sorted(d.rooms for d in doors)),
             area_m2=self.side**2 * len(rooms),
             assets=ASSETS,
@@ -124,7 +129,7 @@ class Grid:
     def number(self, column, row):
         return row * self.columns + column
 
-    def _doors_and_walls(self, lines_x, lines_y):
+    def _doors_and_walls(self, lines_x, lines_y):  # noqa: C901 - the same for both directions
         doors, walls = [], []
         for c, x in enumerate(lines_x):
             for r in range(self.rows):
@@ -171,8 +176,20 @@ def obstacle(asset_id, x, y, *, yaw_deg=0.0):
     turn = (0.0, 0.0, round(math.sin(half), 6), round(math.cos(half), 6))
     a = ASSETS[asset_id]
     return Obstacle(
-        asset_id, a.type, x, y, 0.0, turn, a.mass_kg, a.friction, a.pushable, a.pickable,
-        0, 0.1, 0.0001, None,
+        asset_id,
+        a.type,
+        x,
+        y,
+        0.0,
+        turn,
+        a.mass_kg,
+        a.friction,
+        a.pushable,
+        a.pickable,
+        0,
+        0.1,
+        0.0001,
+        None,
     )
 
 

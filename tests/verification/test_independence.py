@@ -1,0 +1,274 @@
+"""The validator's own geometry against closed forms, brute force and the generator's."""
+
+import ast
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scenery import ASSETS, Grid, brute_steps, obstacle, taut, thing
+from shapely import box
+
+import internav_data.verification
+from internav_data import geometry, navigation
+from internav_data.records import Part, Pose
+from internav_data.verification.findings import KEPT, Collector, join
+from internav_data.verification.ground import KEEP_M, Ground
+from internav_data.verification.overlaps import hulls_overlap, plans_overlap
+from internav_data.verification.portals import Portals
+from internav_data.verification.shapes import Shapes, plan_of, solid_of
+from internav_data.verification.site import Site
+from internav_data.verification.ways import FINE, Sight, ellipse, grown, joined
+
+HERE = Path(internav_data.verification.__file__).parent
+FORBIDDEN = ("navigation", "geometry", "world", "episodes", "houses", "generation", "catalog")
+
+
+def test_nothing_of_the_generator_is_imported():
+    for path in HERE.glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = []
+            if isinstance(node, ast.ImportFrom):
+                names = [node.module or ""]
+            elif isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            for name in names:
+                assert not name.startswith(tuple(f"internav_data.{f}" for f in FORBIDDEN)), path
+
+
+# shapes
+
+angles = st.floats(-1.0, 1.0)
+quaternions = st.tuples(angles, angles, angles, angles).filter(lambda q: math.hypot(*q) > 0.1)
+lengths = st.floats(0.05, 1.5).map(lambda v: round(v, 3))
+
+
+@st.composite
+def parts(draw):
+    shape = draw(st.sampled_from(["box", "cylinder", "sphere", "hull"]))
+    size = draw(st.tuples(lengths, lengths, lengths))
+    corners = ()
+    if shape == "hull":
+        corner = st.tuples(*[st.floats(-0.7, 0.7).map(lambda v: round(v, 3))] * 3)
+        corners = tuple(draw(st.lists(corner, min_size=4, max_size=12, unique=True)))
+    centre = draw(st.tuples(*[st.floats(-0.5, 0.5)] * 3))
+    return Part(shape, centre, size, draw(quaternions), corners, (1, 2, 3), "wood")
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(parts(), min_size=1, max_size=3), quaternions, st.floats(-0.5, 2.0))
+def test_footprints_are_those_of_the_generator(pieces, quaternion, z):
+    asset = replace(ASSETS["Box_1"], asset_id="Odd_1", parts=tuple(pieces))
+    pose = Pose(1.0, -2.0, z, quaternion)
+    mine = Shapes({"Odd_1": asset}).footprint("Odd_1", pose)
+    theirs = [shapely.convex_hull(shapely.multipoints(p)) for p in geometry.footprint(asset, pose)]
+    a, b = shapely.union_all(mine), shapely.union_all(theirs)
+    assert a.is_empty == b.is_empty
+    if not a.is_empty:
+        assert shapely.hausdorff_distance(a, b) < 1e-6
+        assert a.symmetric_difference(b).area < 1e-6
+
+
+def test_clipped_cone_by_hand():
+    # A pyramid 2 m high on a base of 2 x 2 m: at z = 1.8 it is 0.2 m wide, at z = 0.02 1.98 m.
+    corners = (
+        (-1.0, -1.0, 0.0),
+        (1.0, -1.0, 0.0),
+        (1.0, 1.0, 0.0),
+        (-1.0, 1.0, 0.0),
+        (0.0, 0.0, 2.0),
+    )
+    solid = solid_of(
+        Part("hull", (0.0,) * 3, (2.0,) * 3, (0.0, 0.0, 0.0, 1.0), corners, (1,) * 3, "")
+    )
+    plan = plan_of(solid.corners, solid.edges, 0.02, 1.8)
+    assert plan.bounds == pytest.approx((-0.99, -0.99, 0.99, 0.99))
+    top = plan_of(solid.corners, solid.edges, 1.8, 2.5)
+    assert top.bounds == pytest.approx((-0.1, -0.1, 0.1, 0.1))
+    assert plan_of(solid.corners, solid.edges, 2.1, 2.5) is None
+
+
+def test_what_does_not_block_has_no_footprint():
+    rug = replace(ASSETS["Box_1"], blocks=False)
+    assert (
+        Shapes({"Box_1": rug}).footprint("Box_1", Pose(0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 1.0))) == []
+    )
+
+
+# lattice
+
+
+def furnished(*things):
+    return Grid(2, 1).house(3, things)
+
+
+def test_steps_are_those_of_a_brute_force():
+    house = furnished(
+        thing(0, "Table_1", 0, 1.5, 2.5, yaw_deg=30.0), thing(1, "Drum_1", 1, 6.0, 2.0)
+    )
+    site = Site(house, Shapes(ASSETS))
+    for x, y, yaw in ((2.5, 2.0, 90.0), (3.3, 2.2, 75.0), (5.0, 1.5, 15.0)):
+        bar = obstacle("Bar_1", x, y, yaw_deg=yaw)
+        free = site.ground.with_obstacles(site.shapes.footprint("Bar_1", bar.pose))
+        goal = site.ground.node(28, 6)
+        found = site.ground.distances(goal, free)[site.ground.node(4, 6)]
+        brute = brute_steps(house, (4, 6), (28, 6), [bar])
+        assert found == (math.inf if brute is None else brute)
+
+
+def test_exact_ties_are_free():
+    # Walls 0.2 m from the node row y = 1: the row is free, 1 µm more and it is not.
+    outline = box(0.0, 0.0, 5.0, 2.0)
+    walls = [box(0.0, 0.0, 5.0, 0.8), box(0.0, 1.2, 5.0, 2.0)]
+    assert Ground(walls, outline).clear.nodes.sum() == 21
+    tight = [box(0.0, 0.0, 5.0, 0.800002), walls[1]]
+    assert Ground(tight, outline).clear.nodes.sum() == 0
+
+
+@settings(deadline=None, max_examples=25)
+@given(
+    st.lists(st.tuples(st.floats(0.3, 7.5), st.floats(0.3, 3.5), st.integers(0, 23)), max_size=5)
+)
+def test_lattice_is_that_of_the_generator(spots):
+    house = furnished(
+        *(
+            thing(k, "Bar_1", 0, round(x, 4), round(y, 4), yaw_deg=15.0 * turn)
+            for k, (x, y, turn) in enumerate(spots)
+        )
+    )
+    mine = Site(house, Shapes(ASSETS)).ground
+    theirs = navigation.Lattice.of(house)
+    assert mine.shape == theirs.shape
+    assert (mine.clear.nodes.reshape(mine.shape) == theirs.free).all()
+    goals = np.argwhere(theirs.free)
+    i, j = goals[len(goals) // 2]
+    steps = mine.distances(mine.node(int(i), int(j)), mine.clear).reshape(mine.shape)
+    assert (np.where(np.isfinite(steps), steps, -1) == theirs.distances(int(i), int(j))).all()
+
+
+# ways
+
+
+def test_way_round_a_box_is_a_taut_string():
+    sight = Sight(grown([box(1.0, -1.0, 2.0, 0.3)], FINE))
+    exact = taut((0.0, 0.0), [((1.0, 0.3), -1), ((2.0, 0.3), -1)], (3.0, 0.0), KEEP_M)
+    assert sight.length((0.0, 0.0), (3.0, 0.0), 9.0) == pytest.approx(exact, abs=1e-4)
+    assert sight.length((0.0, 0.0), (3.0, 0.0), 3.0) == math.inf
+    assert sight.length((0.0, 2.0), (3.0, 2.0), 9.0) == 3.0
+
+
+def test_way_between_two_boxes_bends_both_ways():
+    boxes = [box(1.0, -5.0, 1.5, 1.0), box(2.5, 0.0, 3.0, 5.0)]
+    chain = [((1.0, 1.0), -1), ((1.5, 1.0), -1), ((2.5, 0.0), 1), ((3.0, 0.0), 1)]
+    exact = taut((0.0, 0.0), chain, (4.0, 1.0), KEEP_M)
+    assert Sight(grown(boxes, FINE)).length((0.0, 0.0), (4.0, 1.0), 20.0) == pytest.approx(
+        exact, abs=4e-4
+    )
+
+
+def test_gap_as_wide_as_the_disc_is_open():
+    outline = box(-1.0, -1.0, 3.0, 3.0)
+    for gap, opened in ((0.4, True), (0.3999, False), (0.41, True)):
+        boxes = [box(1.0, -3.0, 1.5, 1.0), box(1.0, 1.0 + gap, 1.5, 5.0)]
+        length = Sight(grown(boxes)).length((0.0, 1.2), (2.5, 1.2), 9.0)
+        assert math.isfinite(length) == opened
+        taken = shapely.union_all(shapely.buffer(np.array(boxes), KEEP_M, quad_segs=FINE))
+        assert joined((0.0, 1.2), (2.5, 1.2), outline, taken) == opened
+
+
+@settings(deadline=None, max_examples=30)
+@given(
+    st.lists(
+        st.tuples(st.floats(0.5, 7.0), st.floats(0.5, 3.4), st.integers(0, 23)),
+        min_size=1,
+        max_size=4,
+    )
+)
+def test_ways_are_those_of_the_generator(spots):
+    house = furnished(thing(0, "Table_1", 0, 1.5, 2.5, yaw_deg=30.0))
+    site = Site(house, Shapes(ASSETS))
+    placed = [
+        obstacle("Bar_1", round(x, 4), round(y, 4), yaw_deg=15.0 * turn) for x, y, turn in spots
+    ]
+    taken = [p for o in placed for p in site.shapes.footprint(o.asset_id, o.pose)]
+    there = geometry.Polygons.joined(geometry.footprint(ASSETS["Bar_1"], o.pose) for o in placed)
+    start, goal = (0.5, 0.5), (7.25, 3.25)
+    theirs = navigation.WayFinder.of(house).distance(start, goal, there)
+    sight = Sight(site.sight.base, grown(taken), site.sight)
+    mine = sight.length(start, goal, 100.0)
+    near = [o for o in taken if shapely.dwithin(o, shapely.points([start, goal]), 0.21).any()]
+    if theirs is None or near:
+        cut = shapely.union_all(shapely.buffer(np.array(taken), KEEP_M, quad_segs=FINE))
+        assert theirs is not None or near or not joined(start, goal, site.free, cut)
+    else:
+        assert mine == pytest.approx(theirs, rel=0.001, abs=0.001)
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.tuples(st.integers(1, 31), st.integers(1, 31), st.integers(1, 31), st.integers(1, 31)))
+def test_portals_bound_from_below(nodes):
+    house = Grid(2, 2).house(3, (thing(0, "Table_1", 0, 1.5, 2.5), thing(1, "Bar_1", 3, 6.0, 6.0)))
+    site = Site(house, Shapes(ASSETS))
+    a, b = (0.25 * nodes[0], 0.25 * nodes[1]), (0.25 * nodes[2], 0.25 * nodes[3])
+    if not (site.free.covers(shapely.Point(a)) and site.free.covers(shapely.Point(b))):
+        return
+    plain = Sight(grown(site.blockers)).length(a, b, 100.0)
+    portals = Portals(house)
+    least = portals.least(portals.spots(np.array([a])), np.array(b))[0]
+    assert least <= plain + 1e-9
+    assert site.sight.length(a, b, 100.0) == pytest.approx(plain, abs=1e-9)
+
+
+def test_ellipse_holds_its_points():
+    shape = ellipse((1.0, 1.0), (3.0, 2.0), 4.0)
+    rng = np.random.default_rng(0)
+    for p in rng.uniform(-2.0, 6.0, (500, 2)):
+        if math.dist(p, (1.0, 1.0)) + math.dist(p, (3.0, 2.0)) <= 4.0:
+            assert shape.covers(shapely.Point(p))
+    assert shape.area < 1.03 * math.pi * 2.0 * math.sqrt(16.0 - 5.0) / 2.0
+
+
+# overlaps
+
+
+def cube(x, y, z, side=1.0):
+    return np.array(
+        [(x + a * side, y + b * side, z + c * side) for a in (0, 1) for b in (0, 1) for c in (0, 1)]
+    )
+
+
+def test_solids_overlap_only_when_all_three_axes_do():
+    assert hulls_overlap(cube(0, 0, 0), cube(0.9, 0.9, 0.9))
+    assert not hulls_overlap(cube(0, 0, 0), cube(1.0, 0, 0))
+    assert not hulls_overlap(cube(0, 0, 0), cube(0.9995, 0, 0))
+    assert not hulls_overlap(cube(0, 0, 0), cube(0.0, 0.5, 1.2))
+    assert not hulls_overlap(cube(0, 0, 0), cube(0, 0, 0)[:4])  # flat: no inside
+
+
+def test_plans_that_touch_do_not_overlap():
+    assert not plans_overlap(box(0, 0, 1, 1), box(1, 0, 2, 1))
+    assert not plans_overlap(box(0, 0, 1, 1), box(0.9995, 0, 2, 1))
+    assert plans_overlap(box(0, 0, 1, 1), box(0.99, 0, 2, 1))
+
+
+# findings
+
+
+def test_findings_are_counted_beyond_what_is_kept():
+    reports = []
+    for number in range(3):
+        report = Collector("file", f"scene-{number}")
+        for k in range(KEPT):
+            report.expect(False, "some.predicate", 0, k)
+        reports.append(report)
+    findings = join(reports[::-1]).findings("geometry")
+    assert findings.total == 3 * KEPT
+    assert len(findings.found) == KEPT
+    assert findings.by_predicate == {"some.predicate": 3 * KEPT}
+    assert findings.found == tuple(sorted(findings.found))
+    assert not findings.ok
+    assert "3000 findings" in findings.summary()
