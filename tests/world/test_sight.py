@@ -1,0 +1,121 @@
+"""What the agent sees, against rays sampled point by point through scipy's hulls."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial import Delaunay
+
+from internav_data.geometry import part_corners, transform, yaw_quaternion
+from internav_data.records import Asset, Part, Pose
+from internav_data.world.frames import HEADINGS
+from internav_data.world.shells import POINTS_AT_MOST, placed_shell, shell_of
+from internav_data.world.sight import CAMERA_M, REACH_M, Screen, _hidden, view_from
+
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+SHAPES = ("box", "cylinder", "sphere")
+
+
+def asset(name, parts):
+    return Asset(name, name, (1.0, 1.0, 1.0), 5.0, 0.6, True, False, True, True, tuple(parts))
+
+
+def part(shape, centre, size, turn=UPRIGHT):
+    return Part(shape, centre, size, turn, (), (120, 90, 60), "wood")
+
+
+def some_asset(rng, name):
+    parts = [
+        part(
+            SHAPES[int(rng.integers(3))],
+            tuple(rng.uniform((-0.3, -0.3, 0.2), (0.3, 0.3, 0.8))),
+            tuple(rng.uniform(0.1, 0.5, 3)),
+            yaw_quaternion(float(rng.uniform(0, 360))),
+        )
+        for _ in range(int(rng.integers(1, 6)))
+    ]
+    return asset(name, parts)
+
+
+def cube(side=0.3):
+    return asset(f"cube {side}", [part("box", (0.0, 0.0, side / 2), (side, side, side))])
+
+
+def test_rays_are_obstructed_where_samples_lie_inside_a_hull():
+    rng = np.random.default_rng(5)
+    checked = hidden = 0
+    for trial in range(40):
+        thing = some_asset(rng, f"thing {trial}")
+        pose = Pose(*rng.uniform(-0.2, 0.2, 3), yaw_quaternion(float(rng.uniform(0, 360))))
+        shell = placed_shell(thing, pose)
+        hulls = [Delaunay(transform(part_corners(p), pose)) for p in thing.parts]
+        for _ in range(5):
+            eye, end = rng.uniform(-1.5, 1.5, 3), rng.uniform((-0.4, -0.4, 0), (0.4, 0.4, 1))
+            samples = eye + np.linspace(0.0, 1.0, 800)[:, None] * (end - eye)
+            inside = sum(int((hull.find_simplex(samples) >= 0).sum()) for hull in hulls)
+            answer = _hidden(eye, end, shell.planes, shell.starts, -1)
+            if inside:
+                assert answer
+                hidden += 1
+            elif answer:
+                # Samples 3 mm apart may step over an edge: planes must agree that it is thin.
+                fine = eye + np.linspace(0.0, 1.0, 80_000)[:, None] * (end - eye)
+                assert any((hull.find_simplex(fine, tol=1e-6) >= 0).any() for hull in hulls)
+            checked += 1
+    assert checked == 200
+    assert 30 < hidden < 170
+
+
+def test_points_are_few_and_belong_to_their_parts():
+    rng = np.random.default_rng(1)
+    for trial in range(20):
+        thing = some_asset(rng, f"points {trial}")
+        shell = shell_of(thing)
+        assert len(thing.parts) < len(shell.points) <= POINTS_AT_MOST
+        for point, owner in zip(shell.points, shell.owners, strict=True):
+            planes = shell.planes[shell.starts[owner] : shell.starts[owner + 1]]
+            assert (planes[:, :3] @ point - planes[:, 3] <= 1e-6).all()
+
+
+def sees(things, place=0, *, heading=0, horizon=30, eye=(0.0, 0.0)):
+    screen = Screen([placed_shell(thing, pose) for thing, pose in things])
+    return screen.seen(view_from(*eye, HEADINGS[heading], horizon), place)
+
+
+@pytest.mark.parametrize("heading", range(4))
+def test_only_what_is_ahead_is_seen(heading):
+    x, y = HEADINGS[heading]
+    there = Pose(0.9 * x, 0.9 * y, 0.0, UPRIGHT)
+    for looking in range(4):
+        assert sees([(cube(), there)], heading=looking) == (looking == heading)
+
+
+def test_reach_is_measured_in_the_plane():
+    edge = math.sqrt(REACH_M**2 - 0.15**2) + 0.15  # its nearest corners lie 0.15 m aside
+    near, far = edge - 0.001, edge + 0.001
+    assert sees([(cube(), Pose(near, 0.0, 0.0, UPRIGHT))])
+    assert not sees([(cube(), Pose(far, 0.0, 0.0, UPRIGHT))])
+
+
+def test_the_horizon_decides_what_is_seen_of_the_floor():
+    flat = asset("flat", [part("box", (0.0, 0.0, 0.01), (0.02, 0.02, 0.02))])
+    # Depression d is in view while |d - horizon| <= 45 degrees.
+    for horizon in (-30, 0, 30, 60):
+        for x in (0.35, 0.5, 0.8, 1.1, 1.2):
+            down = [
+                math.degrees(math.atan2(CAMERA_M - z, x + dx))
+                for z in (0.0, 0.02)
+                for dx in (-0.01, 0.01)
+            ]
+            expected = any(abs(d - horizon) <= 45 for d in down)
+            assert sees([(flat, Pose(x, 0.0, 0.0, UPRIGHT))], horizon=horizon) == expected
+
+
+def test_what_stands_between_hides():
+    screen = asset("screen", [part("box", (0.0, 0.0, 0.9), (0.05, 2.0, 1.8))])
+    behind = (cube(), Pose(1.0, 0.0, 0.0, UPRIGHT))
+    assert sees([behind])
+    assert not sees([behind, (screen, Pose(0.5, 0.0, 0.0, UPRIGHT))])
+    assert sees([behind, (screen, Pose(1.4, 0.0, 0.0, UPRIGHT))])
+    low = asset("low", [part("box", (0.0, 0.0, 0.05), (0.05, 2.0, 0.1))])
+    assert sees([behind, (low, Pose(0.5, 0.0, 0.0, UPRIGHT))])
