@@ -41,9 +41,9 @@ class HouseConfig:
     """Lengths of rooms times this; 1.1 makes houses 21 % larger. `paper` only."""
     scale_small: float = 0.87
     """Further factor for houses of 1-2 rooms."""
-    scale_medium: float = 0.88
+    scale_medium: float = 0.89
     """Further factor for houses of 3-5 rooms."""
-    scale_large: float = 0.96
+    scale_large: float = 1.0
     """Further factor for houses of 6-10 rooms."""
     furnishing: float = 1.0
     """How much stands in a room beside what it cannot do without: 0 bare, 1 lived in, 2 crowded."""
@@ -53,9 +53,9 @@ class HouseConfig:
     """Share of wide, double and open doorways where they make sense. `paper` only."""
     wings: float = 0.8
     """Share of drawn plans whose living room leads to rooms of its own: longer room paths."""
-    rooms_on_way_medium: float = 2.55
+    rooms_on_way_medium: float = 2.7
     """Rooms on the way between two random points that plans of 3-5 rooms aim at. `paper` only."""
-    rooms_on_way_large: float = 3.8
+    rooms_on_way_large: float = 4.2
     """The same for 6-10 rooms. Doors of loops shorten it again."""
     hall_from: int = 0
     """Houses of this many rooms and more have a hall; 0 for the preset's own: 6 in `paper`, as
