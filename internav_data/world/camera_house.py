@@ -1,0 +1,98 @@
+"""A house's own surfaces in the arrays that the camera's kernels read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from internav_data.world.camera_models import Model, mesh_of
+from internav_data.world.camera_sheets import PLANE_AXES, house_tiles, room_boxes
+from internav_data.world.surfaces import look_row
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from internav_data.records import Door, House
+    from internav_data.world.camera_sheets import Tile
+    from internav_data.world.surfaces import Mesh
+
+
+@dataclass(frozen=True, slots=True)
+class Structure:
+    """A house's own surfaces: a model a room, of the rectangles seen from it, a part each."""
+
+    mesh: Mesh
+    labels: NDArray[np.int64]
+    """(parts,): instance id of each rectangle. Part and face have the same number."""
+    boxes: NDArray[np.float64]
+    """(boxes, 4): x_min, y_min, x_max, y_max of rooms' boxes, up to the walls' centre lines."""
+    box_rooms: NDArray[np.int64]
+    """(boxes,): index of the room."""
+    doors: NDArray[np.float64]
+    """(doors, 4, 3): corners of each open door's rectangle, on the wall's centre line."""
+    door_rooms: NDArray[np.int64]
+    """(doors, 2): indices of the rooms it joins."""
+
+
+def _corners(tile: Tile) -> NDArray[np.float64]:
+    """Four corners of a rectangle, counter-clockwise from the side it is seen from."""
+    sheet = tile.sheet
+    a, b = PLANE_AXES[sheet.axis]
+    (u0, v0), (u1, v1) = sheet.low, sheet.high
+    out = np.empty((4, 3))
+    out[:, sheet.axis] = sheet.at
+    out[:, a] = (u0, u1, u1, u0)
+    out[:, b] = (v0, v0, v1, v1)
+    # x and z span a plane whose normal is -y.
+    outwards = sheet.sign if sheet.axis != 1 else -sheet.sign
+    return out if outwards > 0 else out[::-1].copy()
+
+
+def _axes(tile: Tile) -> list[float]:
+    """Axes of u and v: the plane's own two, from the tile's origin."""
+    a, b = PLANE_AXES[tile.sheet.axis]
+    u, v = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+    u[a] = v[b] = 1.0
+    return [*u, -tile.origin[0], *v, -tile.origin[1]]
+
+
+def _door_corners(door: Door) -> list[list[float]]:
+    half = door.width_m / 2.0
+    dx, dy = (half, 0.0) if door.yaw_deg == 0.0 else (0.0, half)
+    low, high = (door.x - dx, door.y - dy), (door.x + dx, door.y + dy)
+    return [[*low, 0.0], [*high, 0.0], [*high, door.height_m], [*low, door.height_m]]
+
+
+def _model(tiles: Sequence[Tile]) -> Model:
+    """Return what is seen from one room as a model."""
+    model = Model([], [], [], [], [])
+    for tile in tiles:
+        model.vertices.append(_corners(tile))
+        model.faces.append([[0, 1, 2, 3]])
+        normal = [0.0, 0.0, 0.0]
+        normal[tile.sheet.axis] = float(tile.sheet.sign)
+        model.planes.append([*normal, tile.sheet.sign * tile.sheet.at])
+        model.axes.append(_axes(tile))
+        model.looks.append(look_row(tile.look))
+    return model
+
+
+def structure_of(house: House) -> Structure:
+    """Build a house's own surfaces."""
+    tiles = house_tiles(house)
+    by_room = [[t for t in tiles if t.room == room.room_id] for room in house.rooms]
+    index = {room.room_id: k for k, room in enumerate(house.rooms)}
+    boxes = [(box, k) for k, room in enumerate(house.rooms) for box in room_boxes(house, room)]
+    doors = [d for d in house.doors if d.open]
+    return Structure(
+        mesh_of([_model(seen) for seen in by_room]),
+        np.array([t.label for seen in by_room for t in seen], np.int64),
+        np.array([box for box, _ in boxes], np.float64).reshape(-1, 4),
+        np.array([k for _, k in boxes], np.int64),
+        np.array([_door_corners(d) for d in doors], np.float64).reshape(-1, 4, 3),
+        np.array([[index[r] for r in d.rooms] for d in doors], np.int64).reshape(-1, 2),
+    )

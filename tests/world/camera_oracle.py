@@ -1,0 +1,100 @@
+"""A ray caster that shares nothing with the camera but the records: trimesh, a ray a pixel."""
+
+import math
+
+import numpy as np
+import trimesh
+
+from internav_data.catalog import asset_mesh
+from internav_data.geometry import rotation_matrix
+from internav_data.navigation import room_of
+from internav_data.world.camera import EYE_HEIGHT_M
+
+FLOOR, CEILING, WALL, DOOR, WINDOW = -1, -2, -3, -4, -5
+
+
+def boxes(house):
+    """Walls, floor and ceiling slabs, panes: label, low corner, high corner."""
+    for w in house.walls:
+        entrance = any(
+            not d.open
+            and w.x_min - 1e-6 < d.x < w.x_max + 1e-6
+            and w.y_min - 1e-6 < d.y < w.y_max + 1e-6
+            and w.z_min == 0.0
+            for d in house.doors
+        )
+        low, high = (w.x_min, w.y_min, w.z_min), (w.x_max, w.y_max, w.z_max)
+        yield DOOR if entrance else WALL, low, high
+    xs, ys = [p[0] for p in house.outline], [p[1] for p in house.outline]
+    x0, x1, y0, y1 = min(xs), max(xs), min(ys), max(ys)
+    yield FLOOR, (x0, y0, -0.1), (x1, y1, 0.0)
+    top = house.rooms[0].ceiling_m
+    yield CEILING, (x0, y0, top), (x1, y1, top + 0.1)
+    for w in house.windows:
+        # A thin slab whose inner side is the pane.
+        axis = 1 if w.yaw_deg == 0.0 else 0
+        probe = [w.x, w.y]
+        probe[axis] += 0.1
+        inwards = 1.0 if room_of(house, *probe) == w.room else -1.0
+        low = [w.x - w.width_m / 2, w.y - w.width_m / 2, w.sill_m]
+        high = [w.x + w.width_m / 2, w.y + w.width_m / 2, w.sill_m + w.height_m]
+        middle = (w.x, w.y)[axis]
+        low[axis], high[axis] = sorted((middle, middle - inwards * 0.01))
+        yield WINDOW, tuple(low), tuple(high)
+
+
+def scene(house, instances, hidden=()):
+    """All triangles of a house (n, 3, 3), and whose they are (n,)."""
+    triangles, labels = [], []
+    for label, low, high in boxes(house):
+        box = trimesh.creation.box(bounds=[low, high])
+        triangles.append(box.triangles)
+        labels.append(np.full(len(box.faces), label))
+    for k, (asset, pose) in enumerate(instances):
+        if k in hidden:
+            continue
+        mesh = asset_mesh(asset)
+        turned = mesh.triangles @ rotation_matrix(pose.quaternion).T
+        triangles.append(turned + np.array([pose.x, pose.y, pose.z]))
+        labels.append(np.full(len(mesh.faces), 1 + k))
+    return np.concatenate(triangles), np.concatenate(labels)
+
+
+def rays(view, size):
+    """Unit forward (3,), and a direction (size * size, 3) a pixel, 1 m along the optical axis."""
+    yaw, down = math.radians(view.yaw_deg), math.radians(view.horizon_deg)
+    forward = np.array(
+        [math.cos(yaw) * math.cos(down), math.sin(yaw) * math.cos(down), -math.sin(down)]
+    )
+    right = np.array([math.sin(yaw), -math.cos(yaw), 0.0])
+    below = np.cross(forward, right)
+    at = (np.arange(size) + 0.5) / (size / 2) - 1.0
+    x, y = np.meshgrid(at, at)
+    return forward + x.ravel()[:, None] * right + y.ravel()[:, None] * below
+
+
+def cast(triangles, labels, view, size):
+    """Nearest triangle a ray, by brute force over all triangles: depth and ids (size, size)."""
+    eye = np.array([view.x, view.y, EYE_HEIGHT_M])
+    directions = rays(view, size)
+    a = triangles[:, 0]
+    e1, e2 = triangles[:, 1] - a, triangles[:, 2] - a
+    to_eye = eye - a
+    across = np.cross(to_eye, e1)
+    best = np.full(len(directions), np.inf)
+    ids = np.zeros(len(directions), np.int64)
+    for k, d in enumerate(directions):
+        # Moeller and Trumbore.
+        p = np.cross(d, e2)
+        det = np.einsum("ij,ij->i", e1, p)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inverse = 1.0 / det
+            u = np.einsum("ij,ij->i", to_eye, p) * inverse
+            v = across @ d * inverse
+            t = np.einsum("ij,ij->i", across, e2) * inverse
+        hit = (np.abs(det) > 1e-14) & (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 1e-6)
+        if hit.any():
+            where = np.flatnonzero(hit)
+            nearest = where[np.argmin(t[where])]
+            best[k], ids[k] = t[nearest], labels[nearest]
+    return best.reshape(size, size), ids.reshape(size, size)
