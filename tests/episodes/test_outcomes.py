@@ -1,0 +1,78 @@
+"""The counterfactual table says what the world does, and what fresh graphs measure."""
+
+import itertools
+
+import pytest
+
+from internav_data.catalog import catalogue
+from internav_data.episodes import build_episodes
+from internav_data.episodes.outcomes import PICK, PUSHES, outcomes_of
+from internav_data.geometry import Polygons
+from internav_data.houses import HouseConfig, build_house
+from internav_data.navigation import Lattice, WayFinder
+from internav_data.world import Stage, World
+
+
+@pytest.fixture(scope="module")
+def tables():
+    out = []
+    for scene in (0, 6):
+        house = build_house(0, scene, HouseConfig(), catalogue())
+        stage = Stage.of(house)
+        for episode in build_episodes(house, 3, catalogue().spawnable):
+            world = World.of_episode(stage, episode, catalogue().assets)
+            before = world.digest()
+            out.append((episode, world, outcomes_of(world)))
+            assert world.digest() == before
+    return out
+
+
+def test_every_obstacle_has_five(tables):
+    for episode, _, table in tables:
+        assert len(table) == len(episode.obstacles)
+        for obstacle, outcomes in zip(episode.obstacles, table, strict=True):
+            assert [o.action for o in outcomes] == [*PUSHES, PICK]
+            assert all(o.reason == "not pushable" for o in outcomes[:4]) != obstacle.pushable
+            assert (outcomes[4].reason == "not pickable") != obstacle.pickable
+            for outcome in outcomes:
+                assert outcome.success == (not outcome.reason)
+                assert outcome.opened == (
+                    outcome.success and episode.steps is None and outcome.steps is not None
+                )
+
+
+def test_failed_ones_leave_the_distances(tables):
+    for episode, _, table in tables:
+        for outcome in itertools.chain.from_iterable(table):
+            if not outcome.success:
+                assert (outcome.steps, outcome.way_m) == (episode.steps, episode.way_m)
+                assert outcome.displacement_m == 0.0
+            elif outcome.action != PICK:
+                assert outcome.displacement_m >= 0.05
+
+
+def test_distances_are_those_of_fresh_graphs(tables):
+    checked = 0
+    for episode, world, table in tables:
+        start, goal = (episode.start.i, episode.start.j), (episode.goal.i, episode.goal.j)
+        for index, outcomes in zip(world.obstacles, table, strict=True):
+            for heading, outcome in enumerate(outcomes):
+                if not outcome.success:
+                    continue
+                poses = {k: item.pose for k, item in enumerate(world.items)}
+                poses[index] = None
+                if outcome.action != PICK:
+                    pushed = world.pushed(index, heading, agent=False)
+                    poses |= {index: pushed.pose, **dict(pushed.moved)}
+                there = world.copy()
+                there.put(poses.items())
+                loose = [item.footprint for item in there.items]
+                everything = Polygons.joined([world.stage.footprints, *loose])
+                fresh = Lattice.of_polygons(everything, world.stage.house.outline)
+                assert outcome.steps == fresh.distance(start, goal)
+                way = WayFinder.of_polygons(everything).distance(
+                    (episode.start.x, episode.start.y), (episode.goal.x, episode.goal.y)
+                )
+                assert outcome.way_m == (None if way is None else pytest.approx(way, abs=2e-4))
+                checked += 1
+    assert checked >= 10
