@@ -15,7 +15,7 @@ from internav_data.verification.shapes import Slab
 if TYPE_CHECKING:
     from shapely import Geometry
 
-    from internav_data.records import Door, House
+    from internav_data.records import Door, House, Thing
     from internav_data.verification.findings import Collector
     from internav_data.verification.ground import Ground
     from internav_data.verification.shapes import Shapes
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 DOOR_CLEAR_M = 0.65
 """Free depth before a door, from the wall's face."""
 HALF_WALL_M = 0.06
+HANGS_M = 0.05
+"""What hangs is this close to its wall or ceiling."""
 WALL_ID = -1
 REACHED = 0.5
 """Share of a room's free nodes that more than must be joined to the house's largest component."""
@@ -66,7 +68,7 @@ def check_things(
                 f"{name} in room {thing.room}",
                 f"{beyond:.6f} m²",
             )
-        _check_support(house, thing.thing_id, own, report)
+        _check_support(house, thing, own, report)
     for a, b in overlapping_slabs(slabs, owners):
         if a == WALL_ID or groups[a] < 0 or groups[a] != groups[b]:
             what = "a wall" if a == WALL_ID else f"thing {a}"
@@ -76,23 +78,36 @@ def check_things(
 
 
 def _check_support(
-    house: House, thing_id: int, own: dict[int, list[Slab]], report: Collector
+    house: House, thing: Thing, own: dict[int, list[Slab]], report: Collector
 ) -> None:
-    thing = next(t for t in house.things if t.thing_id == thing_id)
-    low = min(slab.low for slab in own[thing_id])
-    if thing.support < 0:
+    """Judge that a thing stands on the floor or on its support, or hangs on a wall or ceiling."""
+    name = f"thing {thing.thing_id}"
+    slabs = own[thing.thing_id]
+    low, high = min(slab.low for slab in slabs), max(slab.high for slab in slabs)
+    plan = shapely.union_all([slab.plan for slab in slabs])
+    if thing.support >= 0:
+        held = any(
+            abs(slab.high - low) < DEPTH_M and shapely.intersects(slab.plan, plan)
+            for slab in own.get(thing.support, [])
+        )
         report.expect(
-            low > -DEPTH_M, "thing.support", f"thing {thing_id} on or above the floor", low
+            held, "thing.support", f"{name} standing on thing {thing.support}", "in the air"
         )
         return
-    plan = shapely.union_all([slab.plan for slab in own[thing_id]])
-    held = any(
-        abs(slab.high - low) < DEPTH_M and shapely.intersects(slab.plan, plan)
-        for slab in own.get(thing.support, [])
+    if abs(low) <= DEPTH_M:
+        report.expect(True, "thing.support", "", "")  # noqa: FBT003 - counted
+        return
+    ceiling = min((r.ceiling_m for r in house.rooms if r.room_id == thing.room), default=math.inf)
+    walls = [
+        box(w.x_min, w.y_min, w.x_max, w.y_max)
+        for w in house.walls
+        if w.z_min < high and w.z_max > low
+    ]
+    hangs = low > 0.0 and (
+        high > ceiling - HANGS_M or shapely.dwithin(plan, shapely.union_all(walls), HANGS_M)
     )
-    report.expect(
-        held, "thing.support", f"thing {thing_id} standing on thing {thing.support}", "in the air"
-    )
+    where = f"{name} on the floor, a wall or the ceiling"
+    report.expect(hangs, "thing.support", where, f"{low:.3f} m above the floor")
 
 
 def _before(door: Door) -> Polygon:

@@ -396,6 +396,10 @@ def house_cases(house):
             {"things": (*things[:2], moved(things[2], support=0))},
             "thing.support",
         ),
+        "thing hanging free": (
+            {"things": (*things[:2], moved(things[2], x=6.0, y=1.5, z=1.2))},
+            "thing.support",
+        ),
         "thing below the floor": (
             {"things": (*things[:2], moved(things[2], z=-0.1))},
             "thing.support",
@@ -443,6 +447,13 @@ def test_things_of_a_group_may_interlock(tmp_path, scenes):
     beside = scenery.thing(3, "Box_2", 0, 1.0, 0.5, group=1)
     together = (replace(house.things[0], group=1), *house.things[1:], beside)
     assert judged(tmp_path, change_house(scenes, 0, things=together)).ok
+
+
+def test_things_may_hang_on_walls(tmp_path, scenes):
+    house = scenes[0][0]
+    picture = scenery.thing(3, "Box_2", 0, 0.16, 2.5)
+    hung = (*house.things, replace(picture, z=1.9))
+    assert judged(tmp_path, change_house(scenes, 0, things=hung)).ok
 
 
 def test_pose_of_a_record_is_what_is_judged():
