@@ -24,6 +24,7 @@ from internav_data.geometry import asset_corners, centre_of_mass, multiply, rota
 from internav_data.records import Pose
 from internav_data.world.setting import Motion, Rest
 from internav_data.world.sweeps import trail_of
+from internav_data.world.wavefront import obj_text
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -60,24 +61,18 @@ REST_SPIN = 0.01
 REST_STEPS = 10
 """A thing is at rest once it was slow for this many steps running."""
 SETTLE_LIMIT_S = 1.0
+CREEP_STEPS = 24
+CREEP_M = REST_SPEED * CREEP_STEPS * STEP_S
+"""At rest is also what came no farther in 0.1 s than the rest speed allows: 0.1 mm, 1 mrad."""
+CREEP_RAD = REST_SPIN * CREEP_STEPS * STEP_S
 PUSH_LIMIT_S = 5.0
 """From letting go; what still rolls then stays where it is."""
 AGENT_HEIGHT_M = 1.8
-
-
-def _obj_text(asset: Asset) -> str:
-    """Wavefront text with one group a part; Bullet makes each group's hull a convex shape.
-
-    The triangles only name the corners: Bullet builds hulls from the points.
-    """
-    corners, starts = asset_corners(asset)
-    lines: list[str] = []
-    for part in range(len(starts) - 1):
-        first, last = int(starts[part]), int(starts[part + 1])
-        lines.append(f"o part{part}")
-        lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in corners[first:last].tolist()]
-        lines += [f"f {first + 1} {k + 1} {k + 2}" for k in range(first + 1, last - 1)]
-    return "\n".join(lines) + "\n"
+_ASLEEP = (
+    pybullet.ACTIVATION_STATE_ENABLE_SLEEPING
+    | pybullet.ACTIVATION_STATE_ENABLE_WAKEUP
+    | pybullet.ACTIVATION_STATE_SLEEP
+)
 
 
 @dataclass(slots=True, eq=False)
@@ -121,14 +116,19 @@ class Bullet:
         moving = [k for k, body in enumerate(setting.bodies) if body.moves]
         trails = [trail_of(setting.bodies[k].asset) for k in moving]
         movers = [(ids[k], trail) for k, trail in zip(moving, trails, strict=True)]
+        for mover, _ in movers[1:]:
+            # What is not touched neither trembles nor costs time; a touch wakes it.
+            pybullet.changeDynamics(
+                mover, -1, activationState=_ASLEEP, physicsClientId=self._client
+            )
         for mover, trail in movers:
             trail.follow(*pybullet.getBasePositionAndOrientation(mover, self._client))
         gain = shove.force_n / setting.bodies[0].asset.mass_kg * STEP_S
         pushes_left = round(shove.seconds / STEP_S)
-        calm, steps, limit = 0, 0, pushes_left + round(PUSH_LIMIT_S / STEP_S)
-        while steps < limit and calm < REST_STEPS:
+        calm, steps, rests = 0, 0, False
+        limit = pushes_left + round(PUSH_LIMIT_S / STEP_S)
+        while steps < limit and not rests:
             if pushes_left:
-                # What is heavier than friction allows does not move, however long it is pushed.
                 pushes_left = self._shove(ids[0], shove, gain, pushes_left)
             pybullet.stepSimulation(self._client)
             steps += 1
@@ -139,11 +139,16 @@ class Bullet:
                     speed, spin = pybullet.getBaseVelocity(mover, self._client)
                     slow = math.hypot(*speed) < REST_SPEED and math.hypot(*spin) < REST_SPIN
             calm = calm + 1 if slow else 0
+            rests = calm >= REST_STEPS
+            if steps % CREEP_STEPS == 0:
+                # What only trembles where it leans on something is at rest too.
+                crept = [trail.crept(CREEP_M, CREEP_RAD) for trail in trails]
+                rests = rests or not (pushes_left or any(crept))
         return Motion(
             poses=tuple(self._pose(ids[k], setting.bodies[k].asset) for k in moving),
             sweeps=tuple(trail.box for trail in trails),
             seconds=steps * STEP_S,
-            at_rest=calm >= REST_STEPS,
+            at_rest=rests,
         )
 
     def _shove(self, identity: int, shove: Shove, gain: float, pushes_left: int) -> int:
@@ -268,7 +273,7 @@ class Bullet:
         path = self._files.get(asset)
         if path is None:
             target = self._folder / f"{len(self._files)}.obj"
-            target.write_text(_obj_text(asset), encoding="ascii")
+            target.write_text(obj_text(asset), encoding="ascii")
             path = self._files[asset] = str(target)
         return path
 

@@ -12,6 +12,7 @@ from internav_data.records import Pose
 from internav_data.world.frames import Frame
 from internav_data.world.setting import Body, Column, Setting, Shove
 from internav_data.world.settle import engine_of_this_process
+from internav_data.world.sweeps import extent_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -37,8 +38,10 @@ AGENT_M: Final = 0.21
 """Radius of the agent's column: nothing ends inside its disc of 0.2 m."""
 AGENT_LEAST_M: Final = 0.2005
 """What already stands nearer than the column is not pressed away by it."""
-GROWTHS_M: Final = (0.15, 0.4, 1.0, 2.0, 4.0)
+GROWTHS_M: Final = (0.05, 0.4, 1.0, 2.0, 4.0)
 """How far round the free sweep bodies are gathered, until nothing else was reached."""
+ON_M: Final = 0.2
+"""How far round what the push may meet bodies are gathered too."""
 STILL_M: Final = 0.0005
 STILL_RAD: Final = 0.001
 """A neighbour that moved less has not moved: the engine's own trembling."""
@@ -110,7 +113,10 @@ def push(
     column = _column(frame, agent, agent_gap_m)
     motion = free
     movers: tuple[tuple[int, Body], ...] = ()
-    if _meets(column, free.sweeps[0]) or near(frame.leave_box(free.sweeps[0], TOUCH_M)):
+    if _shift(asset, pose, frame.leave(free.poses[0])) < SUCCESS_M:
+        # Too heavy alone, so whatever stands beside it makes it no lighter.
+        pass
+    elif _meets(column, free.sweeps[0]) or near(frame.leave_box(free.sweeps[0], TOUCH_M)):
         motion, movers = _push_among(asset, start, frame, near, column, shove, free.sweeps[0])
     return _judged(asset, pose, frame, motion, movers, free)
 
@@ -134,6 +140,10 @@ def _push_among(
     known: dict[int, Body] = {}
     for growth in GROWTHS_M:
         known.update(near(frame.leave_box(sweep, growth)))
+        for body in [body for body in known.values() if body.moves]:
+            # What is met may be driven on.
+            low_x, low_y, high_x, high_y = extent_of(body.asset, body.pose).plan
+            known.update(near((low_x - ON_M, low_y - ON_M, high_x + ON_M, high_y + ON_M)))
         around = [(key, known[key]) for key in sorted(known)]
         movers = tuple(pair for pair in around if pair[1].moves)
         others = [pair for pair in around if not pair[1].moves]

@@ -15,7 +15,7 @@ from internav_data.geometry import asset_corners, centre_of_mass, transform
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from internav_data.records import Asset, Pose
+    from internav_data.records import Asset, Pose, Quaternion, Vec3
     from internav_data.world.setting import Box
 
     Floats = NDArray[np.float64]
@@ -50,12 +50,23 @@ class Trail:
 
     _corners: Floats
     _box: Floats
+    _middle: Vec3 = (0.0, 0.0, 0.0)
+    _turn: Quaternion = (0.0, 0.0, 0.0, 1.0)
+    _before: tuple[Vec3, Quaternion] | None = None
 
-    def follow(
-        self, middle: tuple[float, float, float], turn: tuple[float, float, float, float]
-    ) -> None:
+    def follow(self, middle: Vec3, turn: Quaternion) -> None:
         """Widen the box to where the body is now: its centre of mass and orientation."""
         _widen(self._box, self._corners, middle[0], middle[1], *turn)
+        self._middle, self._turn = middle, turn
+
+    def crept(self, far_m: float, far_rad: float) -> bool:
+        """Whether it has come farther, or turned more, since this was last asked."""
+        before, self._before = self._before, (self._middle, self._turn)
+        if before is None or math.dist(before[0], self._middle) > far_m:
+            return True
+        ax, ay, az, aw = before[1]
+        bx, by, bz, bw = self._turn
+        return 2.0 * math.acos(min(1.0, abs(ax * bx + ay * by + az * bz + aw * bw))) > far_rad
 
     @property
     def box(self) -> Box:
