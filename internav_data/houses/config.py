@@ -58,7 +58,7 @@ class HouseConfig:
     rooms_on_way_large: float = 4.2
     """The same for 6-10 rooms. Doors of loops shorten it again."""
     hall_from: int = 0
-    """Houses of this many rooms and more have a hall; 0 for the preset's own: 6 in `paper`, as
+    """Houses of this many rooms and more have a hall; 0 for the preset's own: 7 in `paper`, as
     suits Table 2, 5 in `realistic`."""
     candidates: int = 24
     """Floor plans drawn for each house; the most homelike one is taken."""
@@ -79,7 +79,7 @@ class HouseConfig:
 
     def halls_from(self) -> int:
         """Return the number of rooms from which houses have a hall."""
-        return self.hall_from or (6 if self.preset == "paper" else 5)
+        return self.hall_from or (7 if self.preset == "paper" else 5)
 
     def scale_of(self, rooms: int) -> float:
         """Return the factor on lengths for a house of so many rooms."""
