@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.records import Asset, House, Pose
-    from internav_data.world.surfaces import Mesh
 
     Floats = NDArray[np.float64]
 
@@ -180,7 +179,7 @@ class Camera:
         ids: NDArray[np.int32],
     ) -> int:
         structure, props, library = view.scenery.structure, view.props, LIBRARY.mesh
-        scratch = self._buffers(structure, props, library)
+        scratch = self._buffers(structure, props)
         rooms = Rooms(
             structure.labels, structure.boxes, structure.box_rooms,
             structure.doors, structure.door_rooms, np.empty((len(structure.mesh.spheres), 4)),
@@ -193,11 +192,10 @@ class Camera:
         )  # fmt: skip
         return drawn
 
-    def _buffers(self, structure: Structure, props: Props, library: Mesh) -> Scratch:
+    def _buffers(self, structure: Structure, props: Props) -> Scratch:
         """Return buffers large enough for a scene; they only ever grow."""
         faces = props.faces + len(structure.mesh.planes)
-        vertices = int(max(4, np.diff(library.first_vertex, prepend=0).max(initial=4)))
-        corners = int(max(4, np.diff(library.first_corner, prepend=0).max(initial=4))) + 2
+        vertices, corners = LIBRARY.most_vertices, LIBRARY.most_corners + 2
         old = self._scratch
         if (
             old is not None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from internav_data.world.camera_models import Model, mesh_of
+from internav_data.world.camera_models import Model, mesh_of, sphere_of
 from internav_data.world.camera_sheets import PLANE_AXES, house_tiles, room_boxes
 from internav_data.world.surfaces import look_row
 
@@ -69,16 +69,23 @@ def _door_corners(door: Door) -> list[list[float]]:
 
 def _model(tiles: Sequence[Tile]) -> Model:
     """Return what is seen from one room as a model."""
-    model = Model([], [], [], [], [])
-    for tile in tiles:
-        model.vertices.append(_corners(tile))
-        model.faces.append([[0, 1, 2, 3]])
-        normal = [0.0, 0.0, 0.0]
-        normal[tile.sheet.axis] = float(tile.sheet.sign)
-        model.planes.append([*normal, tile.sheet.sign * tile.sheet.at])
-        model.axes.append(_axes(tile))
-        model.looks.append(look_row(tile.look))
-    return model
+    planes = np.zeros((len(tiles), 4))
+    for row, tile in zip(planes, tiles, strict=True):
+        row[tile.sheet.axis] = tile.sheet.sign
+        row[3] = tile.sheet.sign * tile.sheet.at
+    count = len(tiles)
+    vertices = np.array([_corners(t) for t in tiles]).reshape(-1, 3)
+    return Model(
+        np.full(count, 4),
+        np.full(count, 1),
+        np.full(count, 4),
+        vertices,
+        np.tile(np.arange(4), count),
+        planes,
+        np.array([_axes(t) for t in tiles]).reshape(-1, 8),
+        np.array([look_row(t.look) for t in tiles], np.float32).reshape(-1, 7),
+        sphere_of(vertices),
+    )
 
 
 def structure_of(house: House) -> Structure:

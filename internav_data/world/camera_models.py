@@ -14,28 +14,51 @@ from internav_data.records import Part
 from internav_data.world.surfaces import Mesh, look_row, part_look
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
     from numpy.typing import NDArray
 
-    from internav_data.records import Asset
+    from internav_data.records import Asset, Shape
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
+    Ring = tuple[int, ...]
 
 _FLAT = 1e-6
-"""Faces whose normals differ by less are one face."""
+"""Faces whose normals and offsets differ by less are one face."""
 _STEEP = 0.8
 """Cosine: of three axes at right angles two at least are this far from any normal."""
 
 
-def _normal(corners: Floats) -> Floats:
-    """Newell's normal of a polygon (n, 3), unit length."""
-    after = np.roll(corners, -1, axis=0)
-    sums = np.cross(corners, after).sum(axis=0)
-    length = math.sqrt(float(sums[0] ** 2 + sums[1] ** 2 + sums[2] ** 2))
-    return np.asarray(sums / max(length, 1e-300))
+class Model(NamedTuple):
+    """One asset's share of a mesh: counts where the mesh has first numbers."""
+
+    vertex_counts: Ints
+    """(parts,)"""
+    face_counts: Ints
+    """(parts,)"""
+    corner_counts: Ints
+    """(faces,)"""
+    vertices: Floats
+    corners: Ints
+    planes: Floats
+    axes: Floats
+    looks: NDArray[np.float32]
+    sphere: tuple[float, float, float, float]
 
 
-def _outline(triangles: list[tuple[int, int, int]]) -> list[int] | None:
+def _normals(vertices: Floats, rings: Sequence[Ring]) -> Floats:
+    """Newell's unit normals (faces, 3)."""
+    longest = max(len(r) for r in rings)
+    # A corner repeated adds nothing.
+    padded = np.array([r + (r[-1],) * (longest - len(r)) for r in rings])
+    points = vertices[padded]
+    points = points - points[:, :1]
+    sums = np.cross(points, np.roll(points, -1, axis=1)).sum(axis=1)
+    return np.asarray(sums / np.sqrt((sums**2).sum(axis=1))[:, None])
+
+
+def _outline(triangles: list[Ring]) -> Ring | None:
     """Corners around some triangles that make one convex face, None where they do not."""
     sides = [(t[k], t[(k + 1) % 3]) for t in triangles for k in range(3)]
     inner = {(b, a) for a, b in sides}
@@ -49,134 +72,135 @@ def _outline(triangles: list[tuple[int, int, int]]) -> list[int] | None:
             return None
         ring.append(at)
         at = edges[at]
-    return ring if len(ring) == len(edges) else None
+    return tuple(ring) if len(ring) == len(edges) else None
 
 
-def flat_faces(vertices: Floats, triangles: Ints) -> list[list[int]]:
+def flat_faces(vertices: Floats, triangles: Ints) -> list[Ring]:
     """Join the triangles (m, 3) of a convex surface that lie in one plane to polygons."""
-    groups: list[tuple[Floats, float, list[tuple[int, int, int]]]] = []
-    for row in triangles.tolist():
-        t = (row[0], row[1], row[2])
-        points = vertices[list(t)]
-        normal = _normal(points)
-        offset = float(np.dot(normal, points[0]))
-        for other, distance, members in groups:
-            if abs(offset - distance) < _FLAT and float(np.abs(normal - other).max()) < _FLAT:
-                members.append(t)
-                break
-        else:
-            groups.append((normal, offset, [t]))
-    faces: list[list[int]] = []
-    for _, _, members in groups:
+    rows = [(a, b, c) for a, b, c in triangles.tolist()]
+    normals = _normals(vertices, rows)
+    offsets = (normals * vertices[triangles[:, 0]]).sum(axis=1)
+    planes = np.column_stack([normals, offsets])
+    left = np.ones(len(rows), dtype=np.bool_)
+    faces: list[Ring] = []
+    for k in range(len(rows)):
+        if not left[k]:
+            continue
+        same = left & (np.abs(planes - planes[k]).max(axis=1) < _FLAT)
+        left &= ~same
+        members: list[Ring] = [rows[int(i)] for i in np.flatnonzero(same)]
         ring = _outline(members)
-        faces += [ring] if ring is not None else [list(t) for t in members]
+        faces += [ring] if ring is not None else members
     return faces
 
 
 @lru_cache(maxsize=8)
-def _fixed_faces(shape: str) -> list[list[int]]:
+def _fixed_faces(shape: Shape) -> list[Ring]:
     """Faces of boxes, cylinders and spheres: those of the unit solid."""
-    whole = (2.0, 2.0, 2.0)
-    unit = Part(shape, (0.0, 0.0, 0.0), whole, (0.0, 0.0, 0.0, 1.0), (), (0, 0, 0), "wood")  # type: ignore[arg-type]
+    origin, whole = (0.0, 0.0, 0.0), (2.0, 2.0, 2.0)
+    unit = Part(shape, origin, whole, (0.0, 0.0, 0.0, 1.0), (), (0, 0, 0), "wood")
     return flat_faces(*part_triangles(unit))
 
 
-def _grain(part: Part) -> Floats:
-    """Return the part's own axes (3, 3) as rows, longest first."""
-    axes = rotation_matrix(part.rotation).T
+def _texture(normals: Floats, part: Part, shift: float) -> Floats:
+    """Axes (faces, 8): u along the longest side of the part that lies in the face, v across."""
     order = sorted(range(3), key=lambda k: (-part.size[k], k))
-    return np.asarray(axes[order])
-
-
-class Model(NamedTuple):
-    """One asset's part of a mesh: lists that are joined later."""
-
-    vertices: list[Floats]
-    faces: list[list[list[int]]]
-    planes: list[list[float]]
-    axes: list[list[float]]
-    looks: list[list[float]]
-
-
-def _texture(normal: Floats, grain: Floats, part: Part, salt: float) -> list[float]:
-    """Axes of u, along the longest side that lies in the face, and of v across it."""
-    along = next((axis for axis in grain if abs(float(np.dot(axis, normal))) < _STEEP), grain[0])
-    along = along - normal * float(np.dot(along, normal))
-    along = along / math.sqrt(float(np.dot(along, along)))
-    across = np.cross(normal, along)
+    grain = rotation_matrix(part.rotation).T[order]
+    cosines = (normals[:, None, :] * grain[None]).sum(axis=2)
+    choice = np.argmax(np.abs(cosines) < _STEEP, axis=1)
+    rows = np.arange(len(normals))
+    along = grain[choice] - normals * cosines[rows, choice][:, None]
+    along = along / np.sqrt((along**2).sum(axis=1))[:, None]
+    across = np.cross(normals, along)
     centre = np.array(part.centre)
-    u, v = -float(np.dot(along, centre)) + salt, -float(np.dot(across, centre)) + salt
-    return [*along.tolist(), u, *across.tolist(), v]
+    u, v = (shift - (axis * centre).sum(axis=1) for axis in (along, across))
+    return np.column_stack([along, u, across, v])
 
 
 def model_of(asset: Asset) -> Model:
     """Build the polygons of all parts of an asset."""
-    model = Model([], [], [], [], [])
+    rings: list[Ring] = []
+    parts: list[tuple[Floats, int]] = []
+    planes, axes, looks = [], [], []
     for number, part in enumerate(asset.parts):
         vertices, triangles = part_triangles(part)
-        faces = (
-            flat_faces(vertices, triangles) if part.shape == "hull" else _fixed_faces(part.shape)
-        )
-        grain, row = _grain(part), look_row(part_look(part.material, part.colour))
-        for face in faces:
-            normal = _normal(vertices[face])
-            model.planes.append([*normal.tolist(), float(np.dot(normal, vertices[face[0]]))])
-            # No two parts show the same piece of grain.
-            model.axes.append(_texture(normal, grain, part, 0.37 * number))
-            model.looks.append(row)
-        model.vertices.append(vertices)
-        model.faces.append(faces)
-    return model
-
-
-def mesh_of(models: list[Model]) -> Mesh:
-    """Join models to one mesh."""
-    parts = [len(m.vertices) for m in models]
-    vertices = [v for m in models for v in m.vertices]
-    faces = [f for m in models for f in m.faces]
-    rings = [ring for part in faces for ring in part]
-    spheres = [_sphere(np.vstack(m.vertices)) for m in models]
-    return Mesh(
-        _starts(parts),
-        np.array(spheres, np.float64).reshape(-1, 4),
-        _starts([len(v) for v in vertices]),
-        _starts([len(f) for f in faces]),
-        np.vstack(vertices).astype(np.float64) if vertices else np.zeros((0, 3)),
-        _starts([len(r) for r in rings]),
-        np.array([k for ring in rings for k in ring], np.int64),
-        np.array([p for m in models for p in m.planes], np.float64).reshape(-1, 4),
-        np.array([a for m in models for a in m.axes], np.float64).reshape(-1, 8),
-        np.array([row for m in models for row in m.looks], np.float32).reshape(-1, 7),
+        hull = part.shape == "hull"
+        faces = flat_faces(vertices, triangles) if hull else _fixed_faces(part.shape)
+        normals = _normals(vertices, faces)
+        starts = vertices[[ring[0] for ring in faces]]
+        planes.append(np.column_stack([normals, (normals * starts).sum(axis=1)]))
+        # No two parts show the same piece of grain.
+        axes.append(_texture(normals, part, 0.37 * number))
+        looks += [look_row(part_look(part.material, part.colour))] * len(faces)
+        rings += faces
+        parts.append((vertices, len(faces)))
+    return Model(
+        np.array([len(v) for v, _ in parts]),
+        np.array([n for _, n in parts]),
+        np.array([len(r) for r in rings]),
+        np.vstack([v for v, _ in parts]),
+        np.array([k for ring in rings for k in ring]),
+        np.vstack(planes),
+        np.vstack(axes),
+        np.array(looks, np.float32),
+        sphere_of(np.vstack([v for v, _ in parts])),
     )
 
 
-def _starts(counts: list[int]) -> Ints:
-    return np.cumsum([0, *counts]).astype(np.int64)
+def _starts(counts: Iterable[Ints]) -> Ints:
+    return np.cumsum(np.concatenate([np.zeros(1, np.int64), *counts]))
 
 
-def _sphere(points: Floats) -> list[float]:
-    """Ball around the middle of the bounding box, (x, y, z, radius)."""
+def sphere_of(points: Floats) -> tuple[float, float, float, float]:
+    """Return a ball around the middle of the bounding box, (x, y, z, radius)."""
     centre = (points.min(axis=0) + points.max(axis=0)) / 2.0
     radius = math.sqrt(float(((points - centre) ** 2).sum(axis=1).max()))
-    return [*centre.tolist(), radius]
+    x, y, z = centre.tolist()
+    return (x, y, z, radius)
+
+
+def mesh_of(models: Sequence[Model]) -> Mesh:
+    """Join models to one mesh."""
+    return Mesh(
+        _starts([np.array([len(m.face_counts) for m in models], np.int64)]),
+        np.array([m.sphere for m in models]).reshape(-1, 4),
+        _starts(m.vertex_counts for m in models),
+        _starts(m.face_counts for m in models),
+        np.concatenate([np.zeros((0, 3)), *(m.vertices for m in models)]),
+        _starts(m.corner_counts for m in models),
+        np.concatenate([np.zeros(0, np.int64), *(m.corners for m in models)]),
+        np.concatenate([np.zeros((0, 4)), *(m.planes for m in models)]),
+        np.concatenate([np.zeros((0, 8)), *(m.axes for m in models)]),
+        np.concatenate([np.zeros((0, 7), np.float32), *(m.looks for m in models)]),
+    )
 
 
 class Library:
-    """All assets drawn so far in this process, in one mesh that grows."""
+    """All assets drawn so far in this process, in one mesh that grows.
+
+    Pictures do not depend on the order in which assets came: only the models' numbers do.
+    """
 
     def __init__(self) -> None:
         self._numbers: dict[Asset, int] = {}
         self._models: list[Model] = []
         self._mesh: Mesh | None = None
+        self.most_vertices = 4
+        """Of any part."""
+        self.most_corners = 4
+        """Of any face."""
 
     def number(self, asset: Asset) -> int:
         """Return which model an asset is; made when first asked for."""
         found = self._numbers.get(asset)
         if found is None:
             found = len(self._models)
-            self._models.append(model_of(asset))
+            model = model_of(asset)
+            self._models.append(model)
             self._numbers[asset] = found
             self._mesh = None
+            self.most_vertices = max(self.most_vertices, int(model.vertex_counts.max()))
+            self.most_corners = max(self.most_corners, int(model.corner_counts.max()))
         return found
 
     def faces(self, number: int) -> int:
@@ -192,4 +216,3 @@ class Library:
 
 
 LIBRARY = Library()
-"""Pictures do not depend on the order in which assets came: only their numbers do."""

@@ -33,10 +33,8 @@ SKIRTING_M = F(0.085)
 @njit(cache=True, nogil=True, error_model="numpy")
 def light_of(nx: float, ny: float, nz: float) -> float:
     """How bright a surface is by where it faces: from above most, no two walls of a room alike."""
-    key = max(0.0, 0.36 * nx + 0.28 * ny + 0.89 * nz)
-    back = max(0.0, -0.62 * nx + -0.38 * ny + 0.25 * nz)
-    below = max(0.0, -nz)
-    return 0.62 + 0.34 * key + 0.16 * back + 0.22 * below
+    above, below = max(0.0, nz), max(0.0, -nz)
+    return 0.83 + 0.19 * above + 0.15 * below + 0.09 * nx * nx + 0.03 * (nx + ny)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
