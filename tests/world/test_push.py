@@ -147,6 +147,18 @@ def test_what_a_neighbour_runs_into_takes_part():
         assert extent_of(row[k].asset, pose).plan[2] <= 5.2 + 0.002
 
 
+def test_what_only_a_neighbour_reaches_takes_part_too():
+    # Neither the first one's way nor what lies round the second one reaches the wall.
+    other = Body(low_box(1.0, 0.4), Pose(3.62, 4.0, 0.001, UPRIGHT), moves=True)
+    wall = wall_body(Wall(4.2, 0.0, 4.32, 8.0, 0.0, 2.6))
+    free = push(low_box(12.0, 0.4), STANDING, 0, alone)
+    assert free.pose.x + 0.3 < 4.1
+    ((_, pose),) = push(low_box(12.0, 0.4), STANDING, 0, among(other)).moved
+    assert pose.x + 0.3 > 4.25
+    ((_, pose),) = push(low_box(12.0, 0.4), STANDING, 0, among(other, wall)).moved
+    assert pose.x + 0.3 < 4.2 + 0.002
+
+
 @pytest.mark.parametrize("distance", [0.2005, 0.21, 0.3])
 def test_nothing_pulled_ends_inside_the_agent(distance):
     thing = low_box(5.0, 0.5)

@@ -119,3 +119,11 @@ def test_what_stands_between_hides():
     assert sees([behind, (screen, Pose(1.4, 0.0, 0.0, UPRIGHT))])
     low = asset("low", [part("box", (0.0, 0.0, 0.05), (0.05, 2.0, 0.1))])
     assert sees([behind, (low, Pose(0.5, 0.0, 0.0, UPRIGHT))])
+
+
+def test_a_part_does_not_hide_its_own_centre():
+    # All corners are out of reach: only the centre, inside the part, tells that it is there.
+    bench = asset("bench", [part("box", (0.0, 0.0, 0.2), (3.0, 0.4, 0.4))])
+    across = Pose(0.9, 0.0, 0.0, yaw_quaternion(90))
+    assert sees([(bench, across)])
+    assert not sees([(bench, Pose(1.3, 0.0, 0.0, yaw_quaternion(90)))])
