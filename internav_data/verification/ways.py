@@ -8,8 +8,8 @@ ellipse of a claimed length is looked at: that is what makes the check cheap.
 
 from __future__ import annotations
 
-import heapq
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -19,13 +19,14 @@ from shapely import Polygon
 from internav_data.verification.ground import KEEP_M
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
     from shapely import Geometry, Point
 
     from internav_data.verification.portals import Portals
 
+    Bools = NDArray[np.bool_]
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
 
@@ -37,7 +38,12 @@ SKIN_M = 1e-5
 """Sight lines may touch: they are tested against polygons grown by this much less."""
 NOTHING = 1e-12
 """Rounding errors of products of lengths stay below, m²."""
+BATCH = 64
+"""Corners looked at together …"""
+STEP_M = 2.0
+"""… when their estimates differ by no more than this."""
 _UNKNOWN, _SEEN, _HIDDEN = 0, 1, 2
+_END = -1
 
 
 class Grown:
@@ -77,10 +83,10 @@ class Grown:
         self.before = np.vstack([np.empty((0, 2)), *before])
         self.after = np.vstack([np.empty((0, 2)), *after])
 
-    def hides(self, origin: Floats, targets: Floats) -> NDArray[np.bool_]:
-        """Whether the sight line from a point (2,) to each target (n, 2) is blocked."""
-        ends = np.stack([np.broadcast_to(origin, targets.shape), targets], axis=1)
-        return np.asarray(shapely.intersects(self.core, shapely.linestrings(ends)))
+    def hides(self, first: Floats, second: Floats) -> Bools:
+        """Whether the sight lines between points (n, 2) and (n, 2) are blocked, shape (n,)."""
+        lines = shapely.linestrings(np.stack([first, second], axis=1))
+        return np.asarray(shapely.intersects(self.core, lines))
 
 
 def _walled(taken: Geometry, outline: Polygon, inside: Point) -> Geometry:
@@ -93,11 +99,6 @@ def _walled(taken: Geometry, outline: Polygon, inside: Point) -> Geometry:
 
 def _cross(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
-
-
-def _tangent(rays: Floats, corners: Floats, before: Floats, after: Floats) -> NDArray[np.bool_]:
-    """Whether lines along `rays` touch their corners without cutting in: neighbours on one side."""
-    return np.asarray(_cross(rays, before - corners) * _cross(rays, after - corners) >= -NOTHING)
 
 
 class Sight:
@@ -121,21 +122,15 @@ class Sight:
         self._alive = self._above_ground()
         self.portals: Portals | None = portals if parent is None else parent.portals
         if parent is None:
-            # What the walls and furniture alone hide is shared by all episodes of a scene.
-            self.rows: dict[int, NDArray[np.int8]] = {}
+            # What walls and furniture alone hide is shared by all episodes of a scene.
+            self.sights = np.full((self._split, self._split), _UNKNOWN, dtype=np.int8)
             self.spots = [] if portals is None else [portals.spots(base.corners)]
         else:
-            self.rows, self.spots = parent.rows, parent.spots[:1]
+            self.sights, self.spots = parent.sights, parent.spots[:1]
         if extra is not None and self.portals is not None:
             self.spots = [*self.spots, self.portals.spots(extra.corners)]
 
-    def _least(self, target: Floats) -> Floats:
-        """Lower bound of the way from every corner to a point, metres, shape (n,)."""
-        if self.portals is None:
-            return np.asarray(np.hypot(*(self.corners - target).T))
-        return np.concatenate([self.portals.least(spots, target) for spots in self.spots])
-
-    def _above_ground(self) -> NDArray[np.bool_]:
+    def _above_ground(self) -> Bools:
         """Corners that the other set does not bury."""
         alive = np.ones(len(self.corners), dtype=np.bool_)
         if self.extra is not None:
@@ -144,78 +139,101 @@ class Sight:
             alive[self._split :] = ~shapely.intersects_xy(base.core, *own.corners.T)
         return alive
 
-    def _visible(self, origin: Floats, number: int, wanted: Ints) -> Ints:
-        """Return which of the wanted corners can be seen from a point (number: its own or -1)."""
-        rays = self.corners[wanted] - origin
-        touch = _tangent(rays, self.corners[wanted], self._before[wanted], self._after[wanted])
-        if number >= 0:
-            touch &= _tangent(rays, self.corners[number], self._before[number], self._after[number])
-        wanted = wanted[touch]
-        if 0 <= number < self._split:
-            wanted = self._cached(origin, number, wanted)
-        elif len(wanted):
-            wanted = wanted[~self.base.hides(origin, self.corners[wanted])]
-        if self.extra is not None and len(wanted):
-            wanted = wanted[~self.extra.hides(origin, self.corners[wanted])]
-        return wanted
-
-    def _cached(self, origin: Floats, number: int, wanted: Ints) -> Ints:
-        """Like `hides` of the base alone, remembering what was asked about its own corners."""
-        row = self.rows.get(number)
-        if row is None:
-            row = self.rows[number] = np.zeros(self._split, dtype=np.int8)
-        own, others = wanted[wanted < self._split], wanted[wanted >= self._split]
-        ask = own[row[own] == _UNKNOWN]
-        if len(ask):
-            hidden = self.base.hides(origin, self.corners[ask])
-            row[ask] = np.where(hidden, _HIDDEN, _SEEN)
-        seen = own[row[own] == _SEEN]
-        if len(others):
-            others = others[~self.base.hides(origin, self.corners[others])]
-        return np.concatenate([seen, others])
-
-    def _sees(self, a: Floats, b: Floats) -> bool:
-        blocked = self.base.hides(a, b[None, :])[0]
-        if not blocked and self.extra is not None:
-            blocked = self.extra.hides(a, b[None, :])[0]
-        return not blocked
+    def _least(self, target: Floats) -> Floats:
+        """Lower bound of the way from every corner to a point, metres, shape (n,)."""
+        if self.portals is None:
+            return np.asarray(np.hypot(*(self.corners - target).T))
+        return np.concatenate([self.portals.least(spots, target) for spots in self.spots])
 
     def length(self, start: tuple[float, float], goal: tuple[float, float], most: float) -> float:
-        """Length of the shortest way, metres, inf where it is longer than `most` (A*)."""
+        """Length of the shortest way, metres, inf where it is longer than `most`."""
         origin, target = np.array(start), np.array(goal)
-        if self._sees(origin, target):
-            return float(math.dist(start, goal))
+        if not self.base.hides(origin[None], target[None])[0] and (
+            self.extra is None or not self.extra.hides(origin[None], target[None])[0]
+        ):
+            return math.dist(start, goal)
         left = self._least(target)
         pool = np.flatnonzero(self._alive & (self._least(origin) + left <= most))
-        # The goal is seen from few corners: ask once, from the goal.
-        last = set(self._visible(target, -1, pool).tolist())
-        best = np.full(len(self.corners), np.inf)
-        heap: list[tuple[float, int]] = [(math.dist(start, goal), -1)]
-        closed: set[int] = set()
-        while heap:
-            estimate, number = heapq.heappop(heap)
-            if number == len(self.corners):
-                return estimate
-            if number in closed:
-                continue
-            closed.add(number)
-            here = origin if number < 0 else self.corners[number]
-            gone = 0.0 if number < 0 else float(best[number])
-            if number in last:
-                whole = gone + math.dist(here, goal)
-                if whole <= most:
-                    heapq.heappush(heap, (whole, len(self.corners)))
-            ahead = gone + np.hypot(*(self.corners[pool] - here).T)
-            useful = (ahead < best[pool] - NOTHING) & (ahead + left[pool] <= most)
-            wanted = pool[useful & (pool != number)]
-            if len(wanted) == 0:
-                continue
-            wanted = self._visible(here, number, wanted)
-            reached = gone + np.hypot(*(self.corners[wanted] - here).T)
-            best[wanted] = np.minimum(best[wanted], reached)
-            for k, distance in zip(wanted.tolist(), reached.tolist(), strict=True):
-                heapq.heappush(heap, (distance + float(left[k]), k))
-        return math.inf
+        search = _Search(
+            ids=np.concatenate([[_END], pool, [_END]]),
+            points=np.vstack([origin, self.corners[pool], target]),
+            # Ends have no neighbours: any line may leave or reach them.
+            before=np.pad(self._before[pool] - self.corners[pool], ((1, 1), (0, 0))),
+            after=np.pad(self._after[pool] - self.corners[pool], ((1, 1), (0, 0))),
+            left=np.concatenate([[math.dist(start, goal)], left[pool], [0.0]]),
+        )
+        return search.run(self._seen, most)
+
+    def _seen(self, search: _Search, first: Ints, second: Ints) -> Bools:
+        """Whether pairs of a search's points see each other, shape (n,)."""
+        a, b = search.ids[first], search.ids[second]
+        state = np.full(len(a), _UNKNOWN, dtype=np.int8)
+        own = (a >= 0) & (a < self._split) & (b >= 0) & (b < self._split)
+        state[own] = self.sights[a[own], b[own]]
+        ask = np.flatnonzero(state == _UNKNOWN)
+        if len(ask):
+            hidden = self.base.hides(search.points[first[ask]], search.points[second[ask]])
+            state[ask] = np.where(hidden, _HIDDEN, _SEEN)
+            kept = ask[own[ask]]
+            self.sights[a[kept], b[kept]] = self.sights[b[kept], a[kept]] = state[kept]
+        seen: Bools = state == _SEEN
+        if self.extra is not None:
+            ask = np.flatnonzero(seen)
+            seen[ask] = ~self.extra.hides(search.points[first[ask]], search.points[second[ask]])
+        return seen
+
+
+@dataclass(slots=True)
+class _Search:
+    """A*, some corners at a time: the start is point 0, the goal the last one."""
+
+    ids: Ints
+    """Numbers of the corners, -1 for start and goal."""
+    points: Floats
+    before: Floats
+    after: Floats
+    """From each corner to its neighbours on the outline, metres."""
+    left: Floats
+    """Lower bound of what is left to the goal."""
+
+    def run(self, seen: Callable[[_Search, Ints, Ints], Bools], most: float) -> float:
+        """Return the length of the shortest way, inf where it is longer than `most`."""
+        goal = len(self.ids) - 1
+        best = np.full(len(self.ids), np.inf)
+        best[0] = 0.0
+        waiting = np.zeros(len(self.ids), dtype=np.bool_)
+        waiting[0] = True
+        while True:
+            waiting[goal] = False
+            estimate = np.where(waiting, best + self.left, np.inf)
+            lowest = float(estimate.min())
+            if lowest >= min(float(best[goal]), most + NOTHING):
+                return float(best[goal])
+            # Several at once: a corner whose way turns out longer than need be waits again.
+            batch = np.argsort(estimate, kind="stable")[:BATCH]
+            batch = batch[estimate[batch] <= lowest + STEP_M]
+            waiting[batch] = False
+            first, second, length = self._candidates(batch, best, min(most, float(best[goal])))
+            visible = seen(self, first, second)
+            second, length = second[visible], length[visible]
+            before = best[second]
+            np.minimum.at(best, second, length)
+            waiting[second[best[second] < before]] = True
+
+    def _candidates(self, batch: Ints, best: Floats, most: float) -> tuple[Ints, Ints, Floats]:
+        """Pairs (of the batch, of all points) worth a look, and how long the way is with them."""
+        rays = self.points[None, :, :] - self.points[batch][:, None, :]
+        ahead = best[batch][:, None] + np.sqrt(rays[..., 0] ** 2 + rays[..., 1] ** 2)
+        useful = (ahead < best - NOTHING) & (ahead + self.left <= most)
+        k, second = np.nonzero(useful)
+        rays = rays[k, second]
+        touch = np.ones(len(k), dtype=np.bool_)
+        for corner in (second, batch[k]):
+            # A way touches a corner without cutting in: its neighbours lie on one side.
+            sides = _cross(rays, self.before[corner]) * _cross(rays, self.after[corner])
+            touch &= sides >= -NOTHING
+        k, second = k[touch], second[touch]
+        return batch[k], second, ahead[k, second]
 
 
 def grown(
