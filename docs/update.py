@@ -14,7 +14,7 @@ from pathlib import Path
 from internav_cli.main import COMMANDS
 
 ROOT = Path(__file__).resolve().parents[1]
-PICTURED = (0, 6, 0)
+PICTURED = (0, 14, 0)
 """Seed, scene and episode of the picture."""
 
 
