@@ -126,6 +126,12 @@ def _push_alone(asset: Asset, start: Pose, shove: Shove, engine: Engine) -> Moti
     return engine.push(Setting((Body(asset, start, moves=True),)), shove)
 
 
+@lru_cache(maxsize=4096)
+def _push_in(setting: Setting, shove: Shove, engine: Engine) -> Motion:
+    """Push in a scene; what failed changed nothing and is likely to be tried again."""
+    return engine.push(setting, shove)
+
+
 def _push_among(
     asset: Asset,
     start: Pose,
@@ -151,7 +157,7 @@ def _push_among(
             Body(body.asset, frame.enter(body.pose), body.moves) for _, body in (*movers, *others)
         )
         setting = Setting((Body(asset, start, moves=True), *bodies), column)
-        motion = engine.push(setting, shove)
+        motion = _push_in(setting, shove, engine)
         reached = dict(_reached(frame, near, motion.sweeps))
         if reached.keys() <= known.keys():
             break

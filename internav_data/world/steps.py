@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from internav_data.geometry import clearance
 from internav_data.navigation import CLEARANCE_M
+from internav_data.records.errors import UsageError
 from internav_data.world.actions import HORIZONS_DEG, PUSH_TURNS, Action, Reason, StepResult
 from internav_data.world.drop import Ground, drop
 from internav_data.world.push import TOUCH_M
@@ -42,8 +43,16 @@ def act(world: World, action: int) -> StepResult:
         world.i += di
         world.j += dj
         return _STEPPED
-    known = Action(action)
+    known = _known(action)
     return _ACTS[known](world, known)
+
+
+def _known(action: int) -> Action:
+    try:
+        return Action(action)
+    except ValueError:
+        names = ", ".join(f"{int(a)} {a.name}" for a in Action)
+        raise UsageError(f"World.step: no action is called {action!r}; expected {names}") from None
 
 
 def _rotate(world: World, action: Action) -> StepResult:

@@ -93,6 +93,18 @@ def test_another_house_is_refused(worlds):
         World.of_episode(worlds[0][1].stage, worlds[-1][0], catalogue().assets)
 
 
+def test_an_unknown_action_is_refused(small):
+    for action in (-1, 13):
+        with pytest.raises(UsageError, match="expected 0 MOVE_AHEAD"):
+            small.step(action)
+
+
+def test_waiting_passes(small):
+    before = small.digest()
+    assert small.step(Action.WAIT).success
+    assert small.digest() == before
+
+
 def test_moving_and_turning(small):
     assert small.step(Action.MOVE_AHEAD).success
     assert (small.i, small.j) == (13, 4)
