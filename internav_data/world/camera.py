@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Final, NamedTuple, Self
 
 import numpy as np
@@ -29,7 +30,7 @@ from internav_data.geometry import rotation_matrix
 from internav_data.records.errors import UsageError
 from internav_data.world.camera_house import Structure, structure_of
 from internav_data.world.camera_models import LIBRARY
-from internav_data.world.raster_frame import Rooms, Scratch, picture
+from internav_data.world.raster_frame import Scratch, picture
 from internav_data.world.raster_shade import RECORD
 
 if TYPE_CHECKING:
@@ -78,7 +79,8 @@ class Scenery:
 class Props:
     """Where everything that stands in a house is now; cheap to change between pictures.
 
-    Instance k is thing k of the house, or obstacle k - len(house.things). Its id is 1 + k.
+    Instance k is thing k of the house, or obstacle k - len(house.things). Its id is 1 + k. The
+    arrays `models` (n,), `poses` (n, 12) and `present` (n,) are what the kernels read.
     """
 
     def __init__(self, instances: Sequence[tuple[Asset, Pose]]) -> None:
@@ -131,7 +133,7 @@ class View:
 
 
 class Camera:
-    """Draws square pictures of field of view 90 degrees.
+    """Draws square pictures of field of view 90 degrees, one thread at a time.
 
     Parameters
     ----------
@@ -180,14 +182,10 @@ class Camera:
     ) -> int:
         structure, props, library = view.scenery.structure, view.props, LIBRARY.mesh
         scratch = self._buffers(structure, props)
-        rooms = Rooms(
-            structure.labels, structure.boxes, structure.box_rooms,
-            structure.doors, structure.door_rooms, np.empty((len(structure.mesh.spheres), 4)),
-        )  # fmt: skip
         eye = np.array((view.x, view.y, view.z))
         axes = camera_axes(view.yaw_deg, view.horizon_deg)
         drawn: int = picture(
-            structure.mesh, rooms, library, props.models, props.poses, props.present,
+            structure.mesh, structure.rooms, library, props.models, props.poses, props.present,
             axes, eye, self._portals, scratch, rgb, depth, ids,
         )  # fmt: skip
         return drawn
@@ -217,10 +215,13 @@ class Camera:
             np.empty((vertices, 5)),
             np.empty((2, corners)),
             np.empty((2, size), np.int32),
+            np.empty(frames, np.int32),
+            np.empty((size, size), np.float32),
         )
         return self._scratch
 
 
+@lru_cache(maxsize=256)
 def camera_axes(yaw_deg: float, horizon_deg: float) -> Floats:
     """Right, down and forward of a camera as rows (3, 3), the house's frame."""
     yaw, pitch = math.radians(yaw_deg), math.radians(horizon_deg)
@@ -229,4 +230,7 @@ def camera_axes(yaw_deg: float, horizon_deg: float) -> Floats:
         # Quarter turns look exactly along an axis.
         c, s = float(round(c)), float(round(s))
     level, down = math.cos(pitch), math.sin(pitch)
-    return np.array([[s, -c, 0.0], [-c * down, -s * down, -level], [c * level, s * level, -down]])
+    axes = np.array([[s, -c, 0.0], [-c * down, -s * down, -level], [c * level, s * level, -down]])
+    # Shared by all who ask again.
+    axes.flags.writeable = False
+    return axes

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from internav_data.world.camera_models import Model, mesh_of, sphere_of
+from internav_data.world.camera_models import Model, bounds_of, mesh_of
 from internav_data.world.camera_sheets import PLANE_AXES, house_tiles, room_boxes
-from internav_data.world.surfaces import look_row
+from internav_data.world.surfaces import Rooms, look_row
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,16 +26,7 @@ class Structure:
     """A house's own surfaces: a model a room, of the rectangles seen from it, a part each."""
 
     mesh: Mesh
-    labels: NDArray[np.int64]
-    """(parts,): instance id of each rectangle. Part and face have the same number."""
-    boxes: NDArray[np.float64]
-    """(boxes, 4): x_min, y_min, x_max, y_max of rooms' boxes, up to the walls' centre lines."""
-    box_rooms: NDArray[np.int64]
-    """(boxes,): index of the room."""
-    doors: NDArray[np.float64]
-    """(doors, 4, 3): corners of each open door's rectangle, on the wall's centre line."""
-    door_rooms: NDArray[np.int64]
-    """(doors, 2): indices of the rooms it joins."""
+    rooms: Rooms
 
 
 def _corners(tile: Tile) -> NDArray[np.float64]:
@@ -84,7 +75,7 @@ def _model(tiles: Sequence[Tile]) -> Model:
         planes,
         np.array([_axes(t) for t in tiles]).reshape(-1, 8),
         np.array([look_row(t.look) for t in tiles], np.float32).reshape(-1, 7),
-        sphere_of(vertices),
+        *bounds_of(vertices),
     )
 
 
@@ -95,11 +86,11 @@ def structure_of(house: House) -> Structure:
     index = {room.room_id: k for k, room in enumerate(house.rooms)}
     boxes = [(box, k) for k, room in enumerate(house.rooms) for box in room_boxes(house, room)]
     doors = [d for d in house.doors if d.open]
-    return Structure(
-        mesh_of([_model(seen) for seen in by_room]),
+    rooms = Rooms(
         np.array([t.label for seen in by_room for t in seen], np.int64),
         np.array([box for box, _ in boxes], np.float64).reshape(-1, 4),
         np.array([k for _, k in boxes], np.int64),
         np.array([_door_corners(d) for d in doors], np.float64).reshape(-1, 4, 3),
         np.array([[index[r] for r in d.rooms] for d in doors], np.int64).reshape(-1, 2),
     )
+    return Structure(mesh_of([_model(seen) for seen in by_room]), rooms)

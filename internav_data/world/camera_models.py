@@ -45,6 +45,7 @@ class Model(NamedTuple):
     axes: Floats
     looks: NDArray[np.float32]
     sphere: tuple[float, float, float, float]
+    bounds: tuple[float, float, float, float, float]
 
 
 def _normals(vertices: Floats, rings: Sequence[Ring]) -> Floats:
@@ -55,7 +56,9 @@ def _normals(vertices: Floats, rings: Sequence[Ring]) -> Floats:
     points = vertices[padded]
     points = points - points[:, :1]
     sums = np.cross(points, np.roll(points, -1, axis=1)).sum(axis=1)
-    return np.asarray(sums / np.sqrt((sums**2).sum(axis=1))[:, None])
+    lengths = np.sqrt((sums**2).sum(axis=1))
+    # A face without area has no normal, and is never drawn.
+    return np.asarray(sums / np.maximum(lengths, 1e-300)[:, None])
 
 
 def _outline(triangles: list[Ring]) -> Ring | None:
@@ -143,7 +146,7 @@ def model_of(asset: Asset) -> Model:
         np.vstack(planes),
         np.vstack(axes),
         np.array(looks, np.float32),
-        sphere_of(np.vstack([v for v, _ in parts])),
+        *bounds_of(np.vstack([v for v, _ in parts])),
     )
 
 
@@ -151,12 +154,16 @@ def _starts(counts: Iterable[Ints]) -> Ints:
     return np.cumsum(np.concatenate([np.zeros(1, np.int64), *counts]))
 
 
-def sphere_of(points: Floats) -> tuple[float, float, float, float]:
-    """Return a ball around the middle of the bounding box, (x, y, z, radius)."""
-    centre = (points.min(axis=0) + points.max(axis=0)) / 2.0
+def bounds_of(
+    points: Floats,
+) -> tuple[tuple[float, float, float, float], tuple[float, float, float, float, float]]:
+    """Return a ball around points (x, y, z, radius) and a box (see `Mesh`)."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    centre = (low + high) / 2.0
     radius = math.sqrt(float(((points - centre) ** 2).sum(axis=1).max()))
+    (x0, y0, _), (x1, y1, z1) = low.tolist(), high.tolist()
     x, y, z = centre.tolist()
-    return (x, y, z, radius)
+    return (x, y, z, radius), (x0, y0, x1, y1, z1)
 
 
 def mesh_of(models: Sequence[Model]) -> Mesh:
@@ -164,6 +171,7 @@ def mesh_of(models: Sequence[Model]) -> Mesh:
     return Mesh(
         _starts([np.array([len(m.face_counts) for m in models], np.int64)]),
         np.array([m.sphere for m in models]).reshape(-1, 4),
+        np.array([m.bounds for m in models]).reshape(-1, 5),
         _starts(m.vertex_counts for m in models),
         _starts(m.face_counts for m in models),
         np.concatenate([np.zeros((0, 3)), *(m.vertices for m in models)]),
@@ -187,7 +195,7 @@ class Library:
         self._mesh: Mesh | None = None
         self.most_vertices = 4
         """Of any part."""
-        self.most_corners = 4
+        self.most_corners = 8
         """Of any face."""
 
     def number(self, asset: Asset) -> int:

@@ -48,6 +48,31 @@ def _edge(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def scan(
+    count: int, px: Floats, py: Floats, height: int, width: int, lefts: Ints32, rights: Ints32
+) -> tuple[int, int]:
+    """Write the pixels [left, right) of each row of a convex polygon; return rows [top, bottom).
+
+    Corners run counter-clockwise as seen (y points down).
+    """
+    top, bottom = height, 0
+    for k in range(count):
+        j = k + 1 if k + 1 < count else 0
+        down = py[k] < py[j]
+        y0, y1 = (py[k], py[j]) if down else (py[j], py[k])
+        first = int(max(math.ceil(y0 - 0.5), 0.0))
+        last = int(min(math.ceil(y1 - 0.5), float(height)))
+        if first >= last:
+            continue
+        top, bottom = min(top, first), max(bottom, last)
+        if down:
+            _edge(px[k], py[k], px[j], py[j], first, last, width, lefts)
+        else:
+            _edge(px[j], py[j], px[k], py[k], first, last, width, rights)
+    return top, bottom
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def fill(
     count: int,
     px: Floats,
@@ -63,23 +88,10 @@ def fill(
 ) -> bool:
     """Draw a convex polygon whose 1 / z is nx x + ny y + nz at picture point (x, y), pixels.
 
-    Corners run counter-clockwise as seen (y points down). True when it covers any pixel.
+    True when it covers any pixel, hidden or not.
     """
     height, width = depth.shape
-    top, bottom = height, 0
-    for k in range(count):
-        j = k + 1 if k + 1 < count else 0
-        down = py[k] < py[j]
-        y0, y1 = (py[k], py[j]) if down else (py[j], py[k])
-        first = int(max(math.ceil(y0 - 0.5), 0.0))
-        last = int(min(math.ceil(y1 - 0.5), float(height)))
-        if first >= last:
-            continue
-        top, bottom = min(top, first), max(bottom, last)
-        if down:
-            _edge(px[k], py[k], px[j], py[j], first, last, width, lefts)
-        else:
-            _edge(px[j], py[j], px[k], py[k], first, last, width, rights)
+    top, bottom = scan(count, px, py, height, width, lefts, rights)
     covered = False
     step, face32 = np.float32(nx), np.int32(face)
     for row in range(top, bottom):

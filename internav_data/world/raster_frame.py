@@ -10,29 +10,18 @@ from numba import njit
 from internav_data.world.raster import draw_parts
 from internav_data.world.raster_cull import ball_in_rooms, room_windows
 from internav_data.world.raster_shade import FAR_M, shade
+from internav_data.world.raster_shadow import MARGIN_M, cast_shadow, casts_shadow
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from internav_data.world.surfaces import Mesh
+    from internav_data.world.surfaces import Mesh, Rooms
 
     Floats = NDArray[np.float64]
     Singles = NDArray[np.float32]
     Ints = NDArray[np.int64]
     Ints32 = NDArray[np.int32]
     Image = NDArray[np.uint8]
-
-
-class Rooms(NamedTuple):
-    """What culling reads: see `camera_house.Structure`."""
-
-    labels: Ints
-    boxes: Floats
-    box_rooms: Ints
-    doors: Floats
-    door_rooms: Ints
-    windows: Floats
-    """Scratch, (rooms, 4)."""
 
 
 class Scratch(NamedTuple):
@@ -56,6 +45,10 @@ class Scratch(NamedTuple):
     """(2, corners + 1 of a face)"""
     spans: Ints32
     """(2, h)"""
+    seen: Ints32
+    """(instances + 1,): how many instances may show, then which."""
+    shadow: Singles
+    """(h, w): share of light taken away."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -74,7 +67,7 @@ def _frame(axes: Floats, eye: Floats, pose: Floats, out: Floats) -> None:
 @njit(cache=True, nogil=True, error_model="numpy")
 def _house(
     mesh: Mesh,
-    rooms: Rooms,
+    windows: Floats,
     axes: Floats,
     eye: Floats,
     focal: float,
@@ -87,8 +80,8 @@ def _house(
     pose[0] = pose[4] = pose[8] = 1.0
     _frame(axes, eye, pose, frame)
     count = 0
-    for room in range(rooms.windows.shape[0]):
-        window = rooms.windows[room]
+    for room in range(windows.shape[0]):
+        window = windows[room]
         if window[0] < window[2] and window[1] < window[3]:
             count = draw_parts(
                 mesh, mesh.first_part[room], mesh.first_part[room + 1], frame, 0, focal, middle,
@@ -105,6 +98,7 @@ def _things(
     poses: Floats,
     present: Image,
     rooms: Rooms,
+    windows: Floats,
     axes: Floats,
     eye: Floats,
     focal: float,
@@ -116,6 +110,7 @@ def _things(
     limit = middle / focal
     whole = np.array([-limit, -limit, limit, limit])
     centre, local = np.empty(3), np.empty(3)
+    scratch.seen[0] = 0
     for k in range(models.shape[0]):
         if present[k] == 0:
             continue
@@ -127,15 +122,42 @@ def _things(
         dx, dy, dz = centre[0] - eye[0], centre[1] - eye[1], centre[2] - eye[2]
         for r in range(3):
             local[r] = axes[r, 0] * dx + axes[r, 1] * dy + axes[r, 2] * dz
-        if not ball_in_rooms(centre, local, radius, rooms.boxes, rooms.box_rooms, rooms.windows):
+        # Its shadow may show where it does not.
+        radius += MARGIN_M
+        if not ball_in_rooms(centre, local, radius, rooms.boxes, rooms.box_rooms, windows):
             continue
         _frame(axes, eye, pose, frame)
+        scratch.seen[0] += 1
+        scratch.seen[scratch.seen[0]] = k
         count = draw_parts(
             mesh, mesh.first_part[model], mesh.first_part[model + 1], frame, k + 1, focal, middle,
             whole, scratch.inverse, scratch.faces, scratch.drawn, count,
             scratch.points, scratch.outline, scratch.spans,
         )  # fmt: skip
     return count
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _shadows(
+    mesh: Mesh,
+    models: Ints,
+    poses: Floats,
+    axes: Floats,
+    eye: Floats,
+    focal: float,
+    middle: float,
+    scratch: Scratch,
+) -> None:
+    """Let all things drawn darken the floor."""
+    scratch.shadow[:, :] = 0.0
+    for n in range(1, scratch.seen[0] + 1):
+        k = scratch.seen[n]
+        pose, bounds = poses[k], mesh.bounds[models[k]]
+        if casts_shadow(pose, bounds):
+            cast_shadow(
+                scratch.frames[k + 1], pose, bounds, axes, eye[2], focal, middle, scratch.inverse,
+                scratch.shadow, scratch.outline, scratch.spans,
+            )  # fmt: skip
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -167,22 +189,24 @@ def picture(
     focal = middle = scratch.inverse.shape[1] / 2.0
     scratch.inverse[:, :] = 1.0 / FAR_M
     scratch.faces[:, :] = -1
+    windows = np.empty((structure.first_part.shape[0] - 1, 4))
     if portals:
         room_windows(
             eye, axes, 1.0, rooms.boxes, rooms.box_rooms, rooms.doors, rooms.door_rooms,
-            rooms.windows,
+            windows,
         )  # fmt: skip
     else:
-        rooms.windows[:, :2] = -1.0
-        rooms.windows[:, 2:] = 1.0
-    count = _house(structure, rooms, axes, eye, focal, middle, scratch)
+        windows[:, :2] = -1.0
+        windows[:, 2:] = 1.0
+    count = _house(structure, windows, axes, eye, focal, middle, scratch)
     count = _things(
-        library, models, poses, present, rooms, axes, eye, focal, middle, scratch, count
+        library, models, poses, present, rooms, windows, axes, eye, focal, middle, scratch, count
     )
+    _shadows(library, models, poses, axes, eye, focal, middle, scratch)
     scratch.made[:count] = 0
     shade(
         structure, rooms.labels, library, scratch.frames, axes, eye[2], focal, middle,
-        scratch.inverse, scratch.faces, scratch.drawn, scratch.made, scratch.records,
-        rgb, depth, ids,
+        scratch.inverse, scratch.shadow, scratch.faces, scratch.drawn, scratch.made,
+        scratch.records, rgb, depth, ids,
     )  # fmt: skip
     return count

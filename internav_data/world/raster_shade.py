@@ -88,6 +88,7 @@ def _run(
     rise: float,
     per_pixel: float,
     inverse: Singles,
+    shadow: Singles,
     rgb: Image,
     depth: Singles,
 ) -> None:
@@ -110,6 +111,8 @@ def _run(
             # Less light reaches what is near the floor.
             level = high + z * rise
             light *= F(0.86) + F(0.14) * min(F(1.0), max(level, F(0.0)) * F(2.2))
+        else:
+            light *= F(1.0) - shadow[row, x]
         if skirting and level < SKIRTING_M:
             red, green, blue = F(232.0), F(229.0), F(222.0)
             light *= F(0.78) if level > SKIRTING_M - F(0.006) else F(1.0)
@@ -138,6 +141,7 @@ def shade(
     focal: float,
     middle: float,
     inverse: Singles,
+    shadow: Singles,
     faces: Ints32,
     drawn: Ints32,
     made: Image,
@@ -177,5 +181,17 @@ def shade(
                 label = np.int32(labels[face] if frame == 0 else frame)
                 for x in range(begin, end):
                     ids[row, x] = label
-                _run(record, row, begin, end, F(eye_height), rise, per_pixel, inverse, rgb, depth)
+                _run(
+                    record,
+                    row,
+                    begin,
+                    end,
+                    F(eye_height),
+                    rise,
+                    per_pixel,
+                    inverse,
+                    shadow,
+                    rgb,
+                    depth,
+                )
             begin = end

@@ -55,6 +55,8 @@ class Mesh(NamedTuple):
     """(models + 1,)"""
     spheres: Floats
     """(models, 4): centre and radius of a ball that holds the model, its own frame, metres."""
+    bounds: Floats
+    """(models, 5): x_min, y_min, x_max, y_max, z_max, its own frame, metres."""
     first_vertex: Ints
     """(parts + 1,)"""
     first_face: Ints
@@ -71,6 +73,21 @@ class Mesh(NamedTuple):
     """(faces, 8): u = axes[0:3] . p + axes[3], v = axes[4:7] . p + axes[7], metres."""
     looks: NDArray[np.float32]
     """(faces, 7): red, green, blue, pattern, a, b, skirting."""
+
+
+class Rooms(NamedTuple):
+    """What a house adds to its mesh: what its rectangles are, and how rooms are joined."""
+
+    labels: Ints
+    """(parts,): instance id of each rectangle. Part and face have the same number."""
+    boxes: Floats
+    """(boxes, 4): x_min, y_min, x_max, y_max of rooms' boxes, up to the walls' centre lines."""
+    box_rooms: Ints
+    """(boxes,): index of the room."""
+    doors: Floats
+    """(doors, 4, 3): corners of each open door's rectangle, on the wall's centre line."""
+    door_rooms: Ints
+    """(doors, 2): indices of the rooms it joins."""
 
 
 _PART_LOOKS: Mapping[str, tuple[int, float, float]] = {

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import trimesh
+from numba import njit
 
 from internav_data.catalog import asset_mesh
 from internav_data.geometry import rotation_matrix
@@ -73,28 +74,39 @@ def rays(view, size):
     return forward + x.ravel()[:, None] * right + y.ravel()[:, None] * below
 
 
+@njit
+def _nearest(eye, directions, triangles, best, hits):
+    """Moeller and Trumbore, every ray against every triangle, from either side."""
+    for r in range(len(directions)):
+        dx, dy, dz = directions[r, 0], directions[r, 1], directions[r, 2]
+        for k in range(len(triangles)):
+            t = triangles[k]
+            e1x, e1y, e1z = t[1, 0] - t[0, 0], t[1, 1] - t[0, 1], t[1, 2] - t[0, 2]
+            e2x, e2y, e2z = t[2, 0] - t[0, 0], t[2, 1] - t[0, 1], t[2, 2] - t[0, 2]
+            px, py, pz = dy * e2z - dz * e2y, dz * e2x - dx * e2z, dx * e2y - dy * e2x
+            det = e1x * px + e1y * py + e1z * pz
+            if abs(det) < 1e-14:
+                continue
+            sx, sy, sz = eye[0] - t[0, 0], eye[1] - t[0, 1], eye[2] - t[0, 2]
+            u = (sx * px + sy * py + sz * pz) / det
+            if u < 0 or u > 1:
+                continue
+            qx, qy, qz = sy * e1z - sz * e1y, sz * e1x - sx * e1z, sx * e1y - sy * e1x
+            v = (dx * qx + dy * qy + dz * qz) / det
+            if v < 0 or u + v > 1:
+                continue
+            along = (e2x * qx + e2y * qy + e2z * qz) / det
+            if 1e-6 < along < best[r]:
+                best[r] = along
+                hits[r] = k
+
+
 def cast(triangles, labels, view, size):
-    """Nearest triangle a ray, by brute force over all triangles: depth and ids (size, size)."""
+    """Depth and ids (size, size) of a view."""
     eye = np.array([view.x, view.y, EYE_HEIGHT_M])
     directions = rays(view, size)
-    a = triangles[:, 0]
-    e1, e2 = triangles[:, 1] - a, triangles[:, 2] - a
-    to_eye = eye - a
-    across = np.cross(to_eye, e1)
     best = np.full(len(directions), np.inf)
-    ids = np.zeros(len(directions), np.int64)
-    for k, d in enumerate(directions):
-        # Moeller and Trumbore.
-        p = np.cross(d, e2)
-        det = np.einsum("ij,ij->i", e1, p)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            inverse = 1.0 / det
-            u = np.einsum("ij,ij->i", to_eye, p) * inverse
-            v = across @ d * inverse
-            t = np.einsum("ij,ij->i", across, e2) * inverse
-        hit = (np.abs(det) > 1e-14) & (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 1e-6)
-        if hit.any():
-            where = np.flatnonzero(hit)
-            nearest = where[np.argmin(t[where])]
-            best[k], ids[k] = t[nearest], labels[nearest]
+    hits = np.full(len(directions), -1)
+    _nearest(eye, directions, triangles, best, hits)
+    ids = np.where(hits >= 0, labels[hits], 0)
     return best.reshape(size, size), ids.reshape(size, size)
