@@ -141,9 +141,10 @@ class Bullet:
             calm = calm + 1 if slow else 0
             rests = calm >= REST_STEPS
             if steps % CREEP_STEPS == 0:
-                # What only trembles where it leans on something is at rest too.
+                # What only trembles is at rest too; what has not yielded to a constant push
+                # by now never will.
                 crept = [trail.crept(CREEP_M, CREEP_RAD) for trail in trails]
-                rests = rests or not (pushes_left or any(crept))
+                rests = rests or not any(crept)
         return Motion(
             poses=tuple(self._pose(ids[k], setting.bodies[k].asset) for k in moving),
             sweeps=tuple(trail.box for trail in trails),
