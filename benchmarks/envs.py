@@ -1,0 +1,106 @@
+"""How many steps a second environments make, on one core; JSON out.
+
+    python benchmarks/envs.py DATASET [--image-size 64] [--num-envs 16] [--seconds 6] [--out FILE]
+
+`navigation`: MoveAhead, rotations and looks as an agent walks (in the shares 12:3:3:1:1);
+`uniform`: all twelve, so that an episode lasts a dozen steps; `uniform_no_done`: eleven. Houses
+are prepared before the clock runs, and new goals' distance fields are not. Targets: 3,000
+navigation steps/s with 64x64 RGB-D, 1,500 under uniform actions.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from internav_data.envs import InterNavEnv, InterNavVectorEnv
+
+TARGETS = {"navigation_steps_per_s": 3000, "uniform_steps_per_s": 1500}
+SHARES = {
+    "navigation": [12, 3, 3, 1, 1, 0, 0, 0, 0, 0, 0, 0],
+    "uniform": [1] * 12,
+    "uniform_no_done": [1] * 11 + [0],
+}
+
+
+def weights(name: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+    shares = np.array(SHARES[name], np.float64)
+    return shares / shares.sum()
+
+
+def warm(env: InterNavVectorEnv) -> float:
+    """Prepare every house once, and compile; returns milliseconds a house."""
+    source = env.players[0].source
+    begin = time.process_time()
+    for number in source.bounds[:-1].tolist():
+        episode = source.episode(number)
+        place = source.place(episode)
+        place.field_to((episode.goal.i, episode.goal.j)).at(episode.start.i, episode.start.j)
+    return 1e3 * (time.process_time() - begin) / (len(source.bounds) - 1)
+
+
+def rate(env: InterNavVectorEnv, name: str, seconds: float) -> dict[str, float]:
+    """Count steps a second of processor time, episodes begun included."""
+    rng = np.random.default_rng(0)
+    plan = rng.choice(12, size=(4096, env.num_envs), p=weights(name))
+    env.reset(seed=0)
+    for row in plan[:8]:
+        env.step(row)
+    begin, wall, steps, ends = time.process_time(), time.perf_counter(), 0, 0
+    while time.perf_counter() - wall < seconds:
+        *_, terminated, truncated, _ = env.step(plan[steps // env.num_envs % len(plan)])
+        steps += env.num_envs
+        ends += int((terminated | truncated).sum())
+    spent = time.process_time() - begin
+    return {
+        "steps_per_s": round(steps / spent),
+        "wall_steps_per_s": round(steps / (time.perf_counter() - wall)),
+        "episodes": ends,
+    }
+
+
+def resets(dataset: Path, size: int, seconds: float) -> float:
+    """Milliseconds of a reset among known houses."""
+    env = InterNavEnv(dataset, size, houses_kept=10_000)
+    env.reset(seed=0)
+    begin, count = time.process_time(), 0
+    while time.process_time() - begin < seconds:
+        env.reset()
+        count += 1
+    return round(1e3 * (time.process_time() - begin) / count, 3)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("dataset", type=Path)
+    parser.add_argument("--image-size", type=int, default=64)
+    parser.add_argument("--num-envs", type=int, default=16)
+    parser.add_argument("--seconds", type=float, default=6.0)
+    parser.add_argument("--out", type=Path)
+    args = parser.parse_args()
+    env = InterNavVectorEnv(
+        args.num_envs, args.dataset, args.image_size, copy=False, houses_kept=10_000
+    )
+    warm(env)  # compiles
+    result: dict[str, Any] = {
+        "targets": TARGETS,
+        "image_size": args.image_size,
+        "num_envs": args.num_envs,
+    }
+    for name in SHARES:
+        result[name] = rate(env, name, args.seconds)
+    result["reset_ms"] = resets(args.dataset, args.image_size, min(2.0, args.seconds))
+    text = json.dumps(result, indent=2)
+    if args.out:
+        args.out.write_text(text + "\n", encoding="utf-8")
+    sys.stdout.write(text + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,126 @@
+"""Where Push and Pick are learnt: beside an obstacle, opposite to the goal.
+
+A pure function of an episode: no random numbers, so that a start is named by its number.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
+
+import numpy as np
+
+from internav_data.navigation import SPACING_M
+from internav_data.world import Stage, World
+from internav_data.world.sight import REACH_M
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from internav_data.records import Asset, Episode, Pose, Vec2
+
+Kind = Literal["push", "pick"]
+CLEARED_STEPS: Final = 1
+"""An obstacle that was no closed door is cleared when the way falls by this: 0.25 m."""
+
+
+class AuxiliaryStart(NamedTuple):
+    """A pose from which an obstacle is the very one that Push or Pick would act on."""
+
+    i: int
+    j: int
+    quarter: int
+    """Quarter turns counter-clockwise from +x."""
+    obstacle: int
+    """Index among the episode's obstacles."""
+
+
+def auxiliary_starts(
+    stage: Stage, episode: Episode, assets: Mapping[str, Asset], kind: Kind
+) -> tuple[AuxiliaryStart, ...]:
+    """Return all starts of an episode: obstacle after obstacle, the nearest to its node first.
+
+    The agent sees the obstacle within reach, it is the closest of its kind, and agent and goal lie
+    on opposite sides of it along x and along y; where no pose does that, on opposite sides of the
+    line across the way to the goal (the released code gives up there). Nearest means to the next
+    node of the first node path after the obstacle, ties by i, j and quarter.
+
+    Parameters
+    ----------
+    stage
+        The episode's house.
+    episode
+        The episode.
+    assets
+        Of its obstacles.
+    kind
+        "push" or "pick".
+    """
+    world = World.of_episode(stage, episode, assets)
+    starts: list[AuxiliaryStart] = []
+    for number, obstacle in enumerate(episode.obstacles):
+        wanted = obstacle.pickable if kind == "pick" else obstacle.pushable
+        if wanted:
+            poses = list(_poses(world, episode, number, kind))
+            strict = [start for opposite, start in poses if opposite]
+            starts += strict or [start for _, start in poses]
+    return tuple(starts)
+
+
+def world_at(
+    stage: Stage, episode: Episode, assets: Mapping[str, Asset], start: AuxiliaryStart
+) -> World:
+    """Return the world of an episode with its agent at an auxiliary start."""
+    world = World.of_episode(stage, episode, assets)
+    world.i, world.j, world.quarter = start.i, start.j, start.quarter
+    return world
+
+
+def is_cleared(before: int | None, after: int | None) -> bool:
+    """Whether an obstacle is out of the way, by lattice distances from one and the same node."""
+    if after is None:
+        return False
+    return before is None or before - after >= CLEARED_STEPS
+
+
+def _poses(
+    world: World, episode: Episode, number: int, kind: Kind
+) -> Iterator[tuple[bool, AuxiliaryStart]]:
+    """Yield poses, best first, and whether agent and goal are opposite along both axes."""
+    index = world.obstacles[number]
+    pose = world.items[index].pose
+    if pose is None:
+        return
+    there = world.copy()
+    for i, j in _nodes_near(world, index, pose, _next_node(episode, number)):
+        there.i, there.j = i, j
+        x, y = there.position
+        across = (x - pose.x) * (episode.goal.x - pose.x)
+        along = (y - pose.y) * (episode.goal.y - pose.y)
+        if across + along >= 0.0:
+            continue
+        for quarter in range(4):
+            there.quarter = quarter
+            if there.target(pick=kind == "pick") == index:
+                yield across < 0.0 and along < 0.0, AuxiliaryStart(i, j, quarter, number)
+
+
+def _next_node(episode: Episode, number: int) -> Vec2:
+    goal = (episode.goal.x, episode.goal.y)
+    if not episode.node_paths:
+        return goal
+    points = episode.node_paths[0].points
+    return points[min(episode.obstacles[number].segment + 1, len(points) - 1)]
+
+
+def _nodes_near(world: World, index: int, pose: Pose, node: Vec2) -> list[tuple[int, int]]:
+    """Free nodes within reach of a thing, the nearest to a point first."""
+    size = world.items[index].asset.size
+    reach = REACH_M + math.hypot(*size)
+    free = np.argwhere(world.lattice.free)
+    away = np.hypot(SPACING_M * free[:, 0] - pose.x, SPACING_M * free[:, 1] - pose.y)
+    near = free[away <= reach]
+    far = np.hypot(SPACING_M * near[:, 0] - node[0], SPACING_M * near[:, 1] - node[1])
+    # Ties by i, then j, as argwhere has them; rounding keeps mirrored nodes equal.
+    order = np.argsort(np.round(far, 9), kind="stable")
+    return [(int(i), int(j)) for i, j in near[order]]

@@ -1,0 +1,78 @@
+"""Which episode comes next: a pure function of (seed, position), house by house."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from internav_data.records import Purpose, generator
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from internav_data.dataset import Dataset
+    from internav_data.records import Episode
+
+_RUNS, _WITHIN = 1, 2
+"""Where the seeds table has attempts: what of the order is drawn."""
+
+
+def scene_bounds(dataset: Dataset[Episode]) -> NDArray[np.int64]:
+    """Return the episode numbers at which a new house begins, and the count: (scenes + 1,)."""
+    column = dataset.to_table(["scene_id"]).column("scene_id")
+    codes = column.combine_chunks().dictionary_encode().indices.to_numpy()
+    starts = np.flatnonzero(np.diff(codes)) + 1
+    return np.concatenate([[0], starts, [len(codes)]]).astype(np.int64)
+
+
+class EpisodeOrder:
+    """Every episode once an epoch, `stay` of the same house in a row, epoch after epoch.
+
+    A house costs more to prepare than an episode: staying a while saves that.
+
+    Parameters
+    ----------
+    bounds : (scenes + 1,) int64
+        See `scene_bounds`.
+    seed
+        What the order depends on.
+    stay
+        Episodes of one house in a row, at least 1.
+    shuffle
+        False for the order on disk.
+    """
+
+    def __init__(
+        self, bounds: NDArray[np.int64], seed: int, *, stay: int = 4, shuffle: bool = True
+    ) -> None:
+        self._bounds, self._seed = bounds, seed
+        self._stay, self._shuffle = stay, shuffle
+        self._count = int(bounds[-1])
+        counts = np.diff(bounds)
+        runs = -(-counts // stay)
+        self._scenes = np.repeat(np.arange(len(counts), dtype=np.int32), runs)
+        first = np.repeat(np.cumsum(runs) - runs, runs)
+        self._starts = (np.arange(len(self._scenes)) - first).astype(np.int32) * stay
+        self._lengths = np.minimum(stay, counts[self._scenes] - self._starts)
+        self._epoch = -1
+        self._runs = self._ends = np.empty(0, np.int64)
+
+    def number(self, position: int) -> int:
+        """Return the number in the dataset of the episode at a position, 0 and up."""
+        epoch, place = divmod(position, self._count)
+        if not self._shuffle:
+            return place
+        if epoch != self._epoch:
+            rng = generator(self._seed, Purpose.LOADER, attempt=_RUNS, draw=epoch)
+            self._runs = rng.permutation(len(self._scenes))
+            self._ends = np.cumsum(self._lengths[self._runs])
+            self._epoch = epoch
+        at = int(np.searchsorted(self._ends, place, side="right"))
+        run = int(self._runs[at])
+        offset = place - int(self._ends[at]) + int(self._lengths[run])
+        scene = int(self._scenes[run])
+        low, high = int(self._bounds[scene]), int(self._bounds[scene + 1])
+        rng = generator(self._seed, Purpose.LOADER, scene, _WITHIN, 0, epoch)
+        within = rng.permutation(high - low)
+        return low + int(within[int(self._starts[run]) + offset])

@@ -1,0 +1,232 @@
+"""Many agents in several processes; observations lie in memory that all of them see."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import multiprocessing
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from gymnasium.vector import VectorEnv
+
+from internav_data.envs.player import EnvState, check_options
+from internav_data.envs.spaces import layout
+from internav_data.envs.vector import OPTIONS, InterNavVectorEnv, choices, seeds_of, set_spaces
+from internav_data.records.errors import InternavError, UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from multiprocessing.connection import Connection
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from internav_data.dataset import Dataset
+    from internav_data.envs.vector import Observations, Stepped
+    from internav_data.records import Episode
+
+
+def _arrays(memory: dict[str, Any], count: int, size: int) -> Observations:
+    """See shared memory as the buffers of a batch."""
+    return {
+        name: np.frombuffer(memory[name], dtype).reshape(shape)
+        for name, (shape, dtype) in layout(count, size).items()
+    }
+
+
+def _serve(
+    pipe: Connection,
+    memory: dict[str, Any],
+    count: int,
+    rows: tuple[int, int],
+    arguments: dict[str, Any],
+) -> None:
+    """Do what the pipe says until it says no more: one of the processes."""
+    try:
+        whole = _arrays(memory, count, arguments["image_size"])
+        own = {name: array[rows[0] : rows[1]] for name, array in whole.items()}
+        env = InterNavVectorEnv(rows[1] - rows[0], copy=False, buffers=own, **arguments)
+        pipe.send((True, None))
+        while True:
+            name, given = pipe.recv()
+            if name == "close":
+                return
+            try:
+                answer = getattr(env, name)(*given[0], **given[1])
+            except InternavError as error:
+                pipe.send((False, error))
+                continue
+            # Observations are in the shared memory already.
+            pipe.send((True, answer if name == "state" else answer[1:]))
+    except (EOFError, KeyboardInterrupt):
+        return
+    except Exception as error:  # noqa: BLE001 - whatever it is, the other side has to hear of it
+        pipe.send((False, error))
+
+
+def merged(parts: Sequence[dict[str, Any]], counts: Sequence[int]) -> dict[str, Any]:
+    """Lay infos of parts of a batch side by side."""
+    whole: dict[str, Any] = {}
+    ends = np.cumsum(counts)
+    for key in dict.fromkeys(key for part in parts for key in part):
+        given = [part.get(key) for part in parts]
+        first = next(value for value in given if value is not None)
+        if isinstance(first, dict):
+            whole[key] = merged([value or {} for value in given], counts)
+            continue
+        fill = None if first.dtype == object else 0
+        column = np.full(int(ends[-1]), fill, dtype=first.dtype)
+        for value, count, end in zip(given, counts, ends.tolist(), strict=True):
+            if value is not None:
+                column[end - count : end] = value
+        whole[key] = column
+    return whole
+
+
+class InterNavProcesses(VectorEnv[Any, Any, Any]):
+    """N worlds stepped in several processes, each an `InterNavVectorEnv` of its share.
+
+    The same as one `InterNavVectorEnv` of all, to the last bit.
+
+    Parameters
+    ----------
+    num_envs, dataset, image_size, autoreset, copy, **arguments
+        As `InterNavVectorEnv` has them; a loaded dataset is opened again in each process.
+    workers
+        Processes; at most one for each environment.
+    context
+        How they start: "spawn", "forkserver" or "fork".
+
+    """
+
+    def __init__(
+        self,
+        num_envs: int,
+        dataset: str | Path | Dataset[Episode],
+        workers: int = 2,
+        image_size: int = 64,
+        *,
+        autoreset: bool = True,
+        copy: bool = True,
+        context: str = "spawn",
+        **arguments: Any,  # noqa: ANN401 - Arguments, checked where they are used
+    ) -> None:
+        if not 1 <= workers <= num_envs:
+            raise UsageError(f"workers: expected 1 … {num_envs} (num_envs), got {workers}")
+        set_spaces(self, num_envs, image_size, autoreset=autoreset)
+        self._copy = copy
+        start = multiprocessing.get_context(context)
+        memory = {
+            name: start.RawArray("B", math.prod(shape) * np.dtype(dtype).itemsize)
+            for name, (shape, dtype) in layout(num_envs, image_size).items()
+        }
+        self._buffers = _arrays(memory, num_envs, image_size)
+        given = dict(arguments, dataset=dataset, image_size=image_size, autoreset=autoreset)
+        bounds = [num_envs * k // workers for k in range(workers + 1)]
+        self._rows = list(itertools.pairwise(bounds))
+        self._counts = [high - low for low, high in self._rows]
+        self._pipes, self._processes = [], []
+        for rows in self._rows:
+            here, there = start.Pipe()
+            process = start.Process(  # type: ignore[attr-defined] # every context has it
+                target=_serve, args=(there, memory, num_envs, rows, given), daemon=True
+            )
+            process.start()
+            there.close()
+            self._pipes.append(here)
+            self._processes.append(process)
+        self._answers()
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Observations, dict[str, Any]]:
+        """As `InterNavVectorEnv.reset`."""
+        chosen = check_options(options, OPTIONS)
+        seeds = seeds_of(seed, self.num_envs)
+        mask, ids, actions = choices(chosen, self.num_envs)
+        asked = []
+        for k, (low, high) in enumerate(self._rows):
+            if mask[low:high].any():
+                own: dict[str, Any] = {"reset_mask": mask[low:high], "episode_id": ids[low:high]}
+                if "actions" in chosen:
+                    own["actions"] = actions[low:high]
+                self._ask(k, "reset", seed=seeds[low:high], options=own)
+                asked.append(k)
+        answers = dict(zip(asked, self._answers(asked), strict=True))
+        infos = [answers[k][0] if k in answers else {} for k in range(len(self._rows))]
+        return self._observations(), merged(infos, self._counts)
+
+    def step(self, actions: NDArray[np.int64] | Sequence[int]) -> Stepped:
+        """As `InterNavVectorEnv.step`."""
+        asked = np.asarray(actions)
+        if asked.shape != (self.num_envs,):
+            raise UsageError(f"step: expected {self.num_envs} actions, got shape {asked.shape}")
+        for k, (low, high) in enumerate(self._rows):
+            self._ask(k, "step", asked[low:high])
+        rewards, terminated, truncated, infos = zip(*self._answers(), strict=True)
+        return (
+            self._observations(),
+            np.concatenate(rewards),
+            np.concatenate(terminated),
+            np.concatenate(truncated),
+            merged(infos, self._counts),
+        )
+
+    def state(self) -> tuple[EnvState, ...]:
+        """Return what each environment is."""
+        for k in range(len(self._pipes)):
+            self._ask(k, "state")
+        return tuple(state for states in self._answers() for state in states)
+
+    def restore(self, states: Sequence[EnvState]) -> tuple[Observations, dict[str, Any]]:
+        """Become what `state` returned."""
+        if len(states) != self.num_envs:
+            raise UsageError(f"restore: expected {self.num_envs} states, got {len(states)}")
+        for k, (low, high) in enumerate(self._rows):
+            self._ask(k, "restore", list(states[low:high]))
+        infos = [answer[0] for answer in self._answers()]
+        return self._observations(), merged(infos, self._counts)
+
+    def close_extras(self, **_: Any) -> None:  # noqa: ANN401 - Gymnasium's signature
+        """End the processes."""
+        for k in range(len(self._pipes)):
+            self._ask(k, "close")
+        for process in self._processes:
+            process.join(5.0)
+            if process.is_alive():
+                process.kill()
+
+    def _ask(self, k: int, name: str, *given: Any, **named: Any) -> None:  # noqa: ANN401 - whatever
+        try:
+            self._pipes[k].send((name, (given, named)))
+        except OSError:
+            return  # it died: `_answers` says so
+
+    def _answers(self, of: Sequence[int] | None = None) -> list[Any]:
+        """Hear all of them before the first error is raised: none is left with a full pipe."""
+        answers: list[Any] = []
+        errors: list[Exception] = []
+        for k in range(len(self._pipes)) if of is None else of:
+            try:
+                good, answer = self._pipes[k].recv()
+            except (EOFError, OSError):
+                good, answer = (
+                    False,
+                    InternavError(
+                        f"InterNav: process {k} of {len(self._pipes)} died (out of memory?); "
+                        "make the environment again, with fewer workers or num_envs"
+                    ),
+                )
+            (answers if good else errors).append(answer)
+        if errors:
+            raise errors[0]
+        return answers
+
+    def _observations(self) -> Observations:
+        if not self._copy:
+            return self._buffers
+        return {name: buffer.copy() for name, buffer in self._buffers.items()}

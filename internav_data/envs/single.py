@@ -1,0 +1,120 @@
+"""`gymnasium.make("InterNav-v0", dataset=…)`: one agent in one house."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Unpack
+
+import gymnasium
+import numpy as np
+
+from internav_data.envs.play import WAIT
+from internav_data.envs.player import Arguments, EnvState, Player, check_options, step_info
+from internav_data.envs.spaces import Board, observation_space
+from internav_data.records.errors import UsageError
+from internav_data.world import ACTION_COUNT
+from internav_data.world.camera import Camera
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from internav_data.dataset import Dataset
+    from internav_data.records import Episode
+
+RENDER_SIZE = 300
+"""Pixels a side of what `render` returns: the paper's."""
+
+
+class InterNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
+    """An agent that walks to a goal, and pushes or carries away what is in its way.
+
+    `docs/environment.md` describes it: actions, observations, rewards, start, end, arguments.
+
+    Parameters
+    ----------
+    dataset : str, Path or Dataset
+        A folder that `internav-gen generate` wrote, or a loaded dataset.
+    image_size
+        Pixels a side of `rgb` and `depth`.
+    render_mode
+        None or "rgb_array".
+    **arguments
+        See `Arguments`.
+
+    Raises
+    ------
+    CorruptDataError
+        No dataset, or a damaged one.
+    UsageError
+        An argument that cannot be meant.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 4}  # noqa: RUF012 - as Gymnasium has it
+
+    def __init__(
+        self,
+        dataset: str | Path | Dataset[Episode],
+        image_size: int = 64,
+        render_mode: str | None = None,
+        **arguments: Unpack[Arguments],
+    ) -> None:
+        if render_mode not in {None, "rgb_array"}:
+            raise UsageError(f"render_mode: expected None or 'rgb_array', got {render_mode!r}")
+        self.render_mode = render_mode
+        self.observation_space = observation_space(image_size)
+        self.action_space = gymnasium.spaces.Discrete(ACTION_COUNT)
+        (self._player,) = Player.several(1, dataset, arguments)
+        self._board = Board.of(Camera(image_size), 1)
+        self._large: Camera | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Begin the next episode of the seed's order, or `options["episode_id"]`.
+
+        `options["actions"]` are played at once: with the episode they are a state.
+        """
+        chosen = check_options(options, ("episode_id", "actions"))
+        super().reset(seed=seed)
+        if seed is not None or not self._player.ordered:
+            self._player.seed(self.np_random_seed)
+        self._player.begin(chosen.get("episode_id"), chosen.get("actions", ()))
+        return self._look(), self._whose()
+
+    def step(
+        self, action: int | np.int64
+    ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        """Act: 0 … 11, or -1 to wait."""
+        play = self._player.play
+        step = play.step(int(action))
+        return self._look(), step.reward, step.terminated, step.truncated, step_info(play, step)
+
+    def wait(self) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        """Pass a step: for options that hand control back."""
+        return self.step(WAIT)
+
+    def state(self) -> EnvState:
+        """Return all that this environment is, in a few words."""
+        return self._player.state()
+
+    def restore(self, state: EnvState) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Become what `state` returned, here or elsewhere."""
+        self._player.restore(state)
+        return self._look(), self._whose()
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return what the agent sees, large."""
+        if self.render_mode is None:
+            return None
+        if self._large is None:
+            self._large = Camera(RENDER_SIZE)
+        picture: NDArray[np.uint8] = self._large.render([self._player.play.view()]).rgb[0]
+        return picture
+
+    def _look(self) -> dict[str, Any]:
+        self._board.write(0, self._player.play)
+        return self._board.one()
+
+    def _whose(self) -> dict[str, Any]:
+        return {"episode_id": self._player.play.episode.episode_id}

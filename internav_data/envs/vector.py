@@ -1,0 +1,227 @@
+"""Many agents in one process, drawn by one camera; and the choice of more processes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Unpack
+
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from internav_data.envs.player import Arguments, EnvState, Player, check_options, step_info
+from internav_data.envs.spaces import Board, observation_space
+from internav_data.records.errors import UsageError
+from internav_data.world import ACTION_COUNT
+from internav_data.world.camera import Camera
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from internav_data.dataset import Dataset
+    from internav_data.records import Episode
+
+    Observations = dict[str, NDArray[Any]]
+    Bools = NDArray[np.bool_]
+    Stepped = tuple[Observations, NDArray[np.float64], Bools, Bools, dict[str, Any]]
+
+OPTIONS = ("episode_id", "actions", "reset_mask")
+
+
+def make_vector(
+    num_envs: int,
+    dataset: str | Path | Dataset[Episode],
+    workers: int = 0,
+    **arguments: Any,  # noqa: ANN401 - those of the environments below
+) -> VectorEnv[Any, Any, Any]:
+    """Step environments in this process, or (workers > 0) in so many others."""
+    if workers:
+        from internav_data.envs.processes import InterNavProcesses  # noqa: PLC0415 - when asked for
+
+        return InterNavProcesses(num_envs, dataset, workers, **arguments)
+    return InterNavVectorEnv(num_envs, dataset, **arguments)
+
+
+def set_spaces(env: VectorEnv[Any, Any, Any], count: int, size: int, *, autoreset: bool) -> None:
+    """Give a vector environment its spaces and say how it resets."""
+    from gymnasium import spaces  # noqa: PLC0415 - a short name in a short place
+
+    env.num_envs = count
+    env.single_observation_space = observation_space(size)
+    env.single_action_space = spaces.Discrete(ACTION_COUNT)
+    env.observation_space = batch_space(env.single_observation_space, count)
+    env.action_space = batch_space(env.single_action_space, count)
+    mode = AutoresetMode.NEXT_STEP if autoreset else AutoresetMode.DISABLED
+    env.metadata = {"autoreset_mode": mode, "render_modes": []}
+
+
+def seeds_of(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
+    """Return each environment's seed: seed, seed + 1, … for a number."""
+    if seed is None:
+        return [None] * count
+    if isinstance(seed, int | np.integer):
+        return [int(seed) + k for k in range(count)]
+    if len(seed) != count:
+        raise UsageError(f"seed: expected {count} seeds, got {len(seed)}")
+    return list(seed)
+
+
+class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
+    """N worlds stepped in one process.
+
+    Environment k is `InterNavEnv` reset with seed + k, to the last bit. After an episode's last
+    step the next `step` begins another episode: its action counts for nothing, its reward is 0.
+
+    Parameters
+    ----------
+    num_envs
+        How many.
+    dataset, image_size, **arguments
+        As `InterNavEnv` has them.
+    autoreset
+        False: whoever is done is to be reset by `reset(options={"reset_mask": …})`.
+    copy
+        False returns the very buffers that the next step writes into.
+    buffers
+        Where observations are written; shared memory will do.
+    """
+
+    def __init__(
+        self,
+        num_envs: int,
+        dataset: str | Path | Dataset[Episode],
+        image_size: int = 64,
+        *,
+        autoreset: bool = True,
+        copy: bool = True,
+        buffers: Observations | None = None,
+        **arguments: Unpack[Arguments],
+    ) -> None:
+        self.players = Player.several(num_envs, dataset, arguments)
+        set_spaces(self, num_envs, image_size, autoreset=autoreset)
+        camera = Camera(image_size)
+        self._board = Board.of(camera, num_envs) if buffers is None else Board(camera, buffers)
+        self._autoreset, self._copy = autoreset, copy
+        self._over = np.zeros(num_envs, np.bool_)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Observations, dict[str, Any]]:
+        """Begin everywhere, or where `options["reset_mask"]` (N,) says.
+
+        `options["episode_id"]` is one for all, or N of them (None: the next of the order);
+        `options["actions"]` N sequences to be played at once.
+        """
+        chosen = check_options(options, OPTIONS)
+        seeds = seeds_of(seed, self.num_envs)
+        super().reset(seed=seeds[0])
+        mask, ids, actions = choices(chosen, self.num_envs)
+        infos: dict[str, Any] = {}
+        for k in np.flatnonzero(mask).tolist():
+            player, own = self.players[k], seeds[k]
+            if own is None and not player.ordered:
+                own = int(self.np_random.integers(2**32))
+            if own is not None:
+                player.seed(own)
+            infos = self._add_info(infos, self._begin(k, ids[k], actions[k]), k)
+        return self._observations(), infos
+
+    def step(self, actions: NDArray[np.int64] | Sequence[int]) -> Stepped:
+        """Act everywhere: 0 … 11, or -1 to wait, (N,)."""
+        asked = np.asarray(actions).tolist()
+        count = self.num_envs
+        if np.shape(actions) != (count,):
+            raise UsageError(f"step: expected {count} actions, got shape {np.shape(actions)}")
+        rewards = np.zeros(count)
+        terminated, truncated = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+        said: list[tuple[int, dict[str, Any]]] = []
+        for k, action in enumerate(asked):
+            if self._over[k]:
+                said.append((k, self._again(k)))
+                continue
+            play = self.players[k].play
+            step = play.step(int(action))
+            rewards[k], terminated[k], truncated[k] = step
+            self._board.write(k, play)
+            said.append((k, step_info(play, step)))
+        self._over = terminated | truncated
+        infos = self._joined(said)
+        return self._observations(), rewards, terminated, truncated, infos
+
+    def state(self) -> tuple[EnvState, ...]:
+        """Return what each environment is."""
+        return tuple(player.state() for player in self.players)
+
+    def restore(self, states: Sequence[EnvState]) -> tuple[Observations, dict[str, Any]]:
+        """Become what `state` returned."""
+        if len(states) != self.num_envs:
+            raise UsageError(f"restore: expected {self.num_envs} states, got {len(states)}")
+        infos: dict[str, Any] = {}
+        for k, (player, state) in enumerate(zip(self.players, states, strict=True)):
+            play = player.restore(state)
+            self._over[k] = play.over
+            self._board.write(k, play)
+            infos = self._add_info(infos, {"episode_id": state.episode_id}, k)
+        return self._observations(), infos
+
+    def _again(self, k: int) -> dict[str, Any]:
+        if not self._autoreset:
+            raise UsageError(
+                f"step: environment {k} is done; reset it by options={{'reset_mask': …}}"
+            )
+        return self._begin(k)
+
+    def _begin(
+        self, k: int, episode_id: str | None = None, actions: Sequence[int] = ()
+    ) -> dict[str, Any]:
+        play = self.players[k].begin(episode_id, actions)
+        self._over[k] = play.over
+        self._board.write(k, play)
+        return {"episode_id": play.episode.episode_id}
+
+    def _joined(self, said: list[tuple[int, dict[str, Any]]]) -> dict[str, Any]:
+        """Lay infos out as Gymnasium does; what every step says without its loops."""
+        infos: dict[str, Any] = {}
+        stepped = [k for k, info in said if "target" in info]
+        if stepped:
+            mask = np.zeros(self.num_envs, np.bool_)
+            mask[stepped] = True
+            kinds = (("action_success", np.bool_), ("reason", object), ("target", np.int64))
+            for name, kind in kinds:
+                empty = None if kind is object else 0
+                column = np.array([info.get(name, empty) for _, info in said], dtype=kind)
+                infos[name], infos[f"_{name}"] = column, mask.copy()
+        for k, info in said:
+            rest: dict[str, Any] = {
+                key: info[key] for key in ("episode_id", "metrics") if key in info
+            }
+            if rest:
+                infos = self._add_info(infos, rest, k)
+        return infos
+
+    def _observations(self) -> Observations:
+        return self._board.copied() if self._copy else self._board.buffers
+
+
+def choices(
+    chosen: dict[str, Any], count: int
+) -> tuple[Bools, list[str | None], list[Sequence[int]]]:
+    """Return who is to be reset, to which episodes, and what is played there at once."""
+    mask = np.asarray(chosen.get("reset_mask", np.ones(count, np.bool_)))
+    if mask.shape != (count,) or mask.dtype != np.bool_ or not mask.any():
+        raise UsageError(
+            f"options['reset_mask']: expected {count} booleans, one of them true at least; "
+            f"got {mask.dtype} of shape {mask.shape}"
+        )
+    ids = chosen.get("episode_id")
+    ids = [ids] * count if ids is None or isinstance(ids, str) else list(ids)
+    actions = list(chosen.get("actions", [()] * count))
+    for name, given in (("episode_id", ids), ("actions", actions)):
+        if len(given) != count:
+            raise UsageError(f"options[{name!r}]: expected {count} of them, got {len(given)}")
+    return mask, ids, actions

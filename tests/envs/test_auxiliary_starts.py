@@ -1,0 +1,38 @@
+"""Where Push and Pick are learnt, judged by the definition."""
+
+import pytest
+
+from internav_data.dataset import load_dataset
+from internav_data.envs.auxiliary import auxiliary_starts, is_cleared, world_at
+from internav_data.world import Action, Stage
+
+
+@pytest.mark.parametrize("kind", ["push", "pick"])
+def test_agents_stand_opposite_to_the_goal_and_can_act(small, kind):
+    dataset = load_dataset(small)
+    seen = 0
+    for episode in dataset:
+        stage = Stage.of(dataset.scene(episode.scene_id))
+        starts = auxiliary_starts(stage, episode, dataset.assets, kind)
+        assert starts == auxiliary_starts(stage, episode, dataset.assets, kind)
+        assert len(set(starts)) == len(starts)
+        for start in starts[:: max(1, len(starts) // 8)]:
+            world = world_at(stage, episode, dataset.assets, start)
+            obstacle = episode.obstacles[start.obstacle]
+            x, y = world.position
+            dot = (x - obstacle.x) * (episode.goal.x - obstacle.x)
+            dot += (y - obstacle.y) * (episode.goal.y - obstacle.y)
+            assert dot < 0.0
+            assert world.lattice.free[start.i, start.j]
+            action = Action.PICKUP if kind == "pick" else Action.PUSH_AHEAD
+            assert world.step(action).target == world.obstacles[start.obstacle]
+            seen += 1
+    assert seen
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "cleared"),
+    [(None, 9, True), (9, 8, True), (9, 9, False), (8, 9, False), (9, None, False)],
+)
+def test_what_cleared_means(before, after, cleared):
+    assert is_cleared(before, after) == cleared

@@ -1,0 +1,319 @@
+"""The environment: spaces, order, states, and the ways of stepping many, all the same."""
+
+import math
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import internav_data.envs
+from internav_data.dataset import load_dataset
+from internav_data.envs import EnvState, InterNavVectorEnv
+from internav_data.envs.order import EpisodeOrder
+from internav_data.navigation import WayFinder
+from internav_data.records.errors import CorruptDataError, UsageError
+from internav_data.world import Action, Stage, World
+
+WEIGHTS = np.array([8, 1.5, 1.5, 0.3, 0.3, 1, 1, 1, 1, 1.5, 1.5, 0.4])
+
+
+def actions(seed, *shape):
+    rng = np.random.default_rng(seed)
+    return rng.choice(12, size=shape, p=WEIGHTS / WEIGHTS.sum())
+
+
+def make(dataset, **arguments):
+    arguments.setdefault("image_size", 16)
+    return gymnasium.make("internav_data.envs:InterNav-v0", dataset=dataset, **arguments)
+
+
+def many(dataset, count, mode="vector_entry_point", **arguments):
+    arguments.setdefault("image_size", 16)
+    return gymnasium.make_vec(
+        "InterNav-v0", num_envs=count, vectorization_mode=mode, dataset=dataset, **arguments
+    )
+
+
+def same(one, other):
+    """Whether two observations, infos or anything else are equal to the last bit."""
+    if isinstance(one, dict):
+        assert one.keys() == other.keys()
+        for key in one:
+            same(one[key], other[key])
+    else:
+        np.testing.assert_array_equal(one, other)
+        assert np.asarray(one).dtype == np.asarray(other).dtype
+
+
+def trajectory(env, seed, count=120):
+    out = [env.reset(seed=seed)]
+    for action in actions(seed, count).tolist():
+        out.append(env.step(action))
+        if out[-1][2] or out[-1][3]:
+            out.append(env.reset())
+    return out
+
+
+def test_gymnasium_finds_nothing_wrong(small):
+    env = make(small, render_mode="rgb_array")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped)
+    env.reset(seed=0)
+    assert env.render().shape == (300, 300, 3)
+
+
+def test_observations_lie_in_their_space(small):
+    env = make(small)
+    for k, step in enumerate(trajectory(env, 5)):
+        assert env.observation_space.contains(step[0]), k
+    seen, _ = env.reset(options={"episode_id": load_dataset(small)[0].episode_id})
+    episode = load_dataset(small)[0]
+    start, goal = episode.start, episode.goal
+    assert seen["goal"][0] == np.float32(math.hypot(goal.x - start.x, goal.y - start.y))
+    absolute = math.atan2(goal.y - start.y, goal.x - start.x)
+    turn = (absolute - math.radians(start.yaw_deg) - float(seen["goal"][1])) / (2 * math.pi)
+    assert turn == pytest.approx(round(turn), abs=1e-6)
+    assert (seen["held"], seen["horizon"]) == (0, 2)
+
+
+def test_the_same_seed_the_same_trajectory(small):
+    first = trajectory(make(small), 3)
+    for one, other in zip(first, trajectory(make(small), 3), strict=True):
+        for a, b in zip(one, other, strict=True):
+            same(a, b)
+
+
+def test_an_epoch_visits_everything_once(small):
+    env = make(small, episodes_per_house=2)
+    count = len(load_dataset(small))
+    ids = [env.reset(seed=9 if k == 0 else None)[1]["episode_id"] for k in range(2 * count)]
+    assert len(set(ids[:count])) == len(set(ids[count:])) == count
+    assert ids[:count] != ids[count:], "another epoch, another order"
+    plain = make(small, shuffle=False)
+    assert [plain.reset()[1]["episode_id"] for _ in range(count)] == [
+        episode.episode_id for episode in load_dataset(small)
+    ]
+
+
+@pytest.mark.parametrize("stay", [1, 3, 50])
+def test_an_order_is_a_permutation_that_stays(stay):
+    bounds = np.array([0, 5, 6, 20, 31])
+    order = EpisodeOrder(bounds, 7, stay=stay)
+    again = EpisodeOrder(bounds, 7, stay=stay)
+    for epoch in range(3):
+        numbers = [order.number(31 * epoch + k) for k in range(31)]
+        assert sorted(numbers) == list(range(31))
+        assert numbers == [again.number(31 * epoch + k) for k in range(31)]
+        houses = np.searchsorted(bounds, numbers, side="right")
+        runs = 1 + np.count_nonzero(np.diff(houses))
+        assert runs <= sum(-(-c // stay) for c in (5, 1, 14, 11))
+    assert again.number(2) == order.number(2), "in any order of asking"
+
+
+def test_a_state_is_an_episode_and_its_actions(small):
+    env = make(small)
+    env.reset(seed=1)
+    for action in actions(4, 60).tolist():
+        env.step(action % 11)  # all but Done
+    env.unwrapped.wait()
+    state = env.unwrapped.state()
+    assert state.actions[-1] == -1
+    assert len(state.actions) == 61
+    other = make(small)
+    other.reset(seed=2)
+    seen, info = other.unwrapped.restore(state)
+    assert info == {"episode_id": state.episode_id}
+    by_options, _ = make(small).reset(
+        options={"episode_id": state.episode_id, "actions": state.actions}
+    )
+    same(seen, by_options)
+    assert other.unwrapped.state() == state
+    for action in actions(6, 40).tolist():
+        one, two = env.step(action), other.step(action)
+        for a, b in zip(one, two, strict=True):
+            same(a, b)
+        if one[2] or one[3]:
+            same(env.reset()[0], other.reset()[0])
+
+
+def test_metrics_agree_with_another_count(small):
+    dataset = load_dataset(small)
+    episode = dataset[1]
+    env = make(small)
+    env.reset(options={"episode_id": episode.episode_id})
+    house = dataset.scene(episode.scene_id)
+    world = World.of_episode(Stage.of(house), episode, dataset.assets)
+    ways, goal = WayFinder.of(house), (episode.goal.x, episode.goal.y)
+    path, drops, total = 0.0, 0.0, 0.0
+    chosen = [a for a in actions(11, 150).tolist() if a != Action.DONE]
+    for action in chosen:
+        spot, steps = world.position, world.steps()
+        result = world.step(action)
+        expected = -0.01
+        if world.position != spot:
+            path += math.dist(spot, world.position)
+            expected += ways.distance(spot, goal) - ways.distance(world.position, goal)
+        elif action in range(5, 11) and result.success:
+            now = world.steps()
+            if steps is not None and now is not None:
+                drops += 0.25 * (steps - now)
+                expected += 0.25 * (steps - now)
+            else:
+                expected += (steps is None and now is not None) - (
+                    steps is not None and now is None
+                )
+        _, reward, *_ = env.step(action)
+        assert reward == pytest.approx(expected, abs=2e-4), Action(action).name
+        total += reward
+    *_, info = env.step(int(Action.DONE))
+    said = info["metrics"]
+    assert said["path_m"] == pytest.approx(path)
+    assert said["interaction_reward_m"] == pytest.approx(drops)
+    assert said["distance_to_goal_m"] == pytest.approx(
+        ways.distance(world.position, goal), abs=1e-4
+    )
+    assert said["steps"] == len(chosen) + 1
+    assert said["return"] == pytest.approx(total - 0.01 + 10.0 * said["success"])
+
+
+def test_five_hundred_steps(small):
+    env = make(small)
+    env.reset(seed=0)
+    ends = [env.step(1)[2:4] for _ in range(500)]
+    assert ends == [(False, False)] * 499 + [(False, True)]
+    with pytest.raises(UsageError, match="reset"):
+        env.step(1)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"episode_id": "scene-000099/0000"}, "no episode 'scene-000099/0000'"),
+        ({"episode": "scene-000000/0000"}, "no option 'episode'"),
+        ({"actions": [0]}, "say of which episode"),
+        ([1], "expected a dictionary"),
+    ],
+)
+def test_options_that_cannot_be_meant(small, options, message):
+    with pytest.raises(UsageError, match=message):
+        make(small).unwrapped.reset(options=options)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"split": "tran"}, "split"),
+        ({"max_steps": 0}, "max_steps"),
+        ({"image_size": 0}, "image_size"),
+        ({"colour": 1}, "no argument 'colour'"),
+        ({"filters": [("room_count", ">", 99)]}, "no episodes"),
+        ({"push_model": "shove"}, "push_model"),
+        ({"episodes_per_house": 0}, "episodes_per_house"),
+    ],
+)
+def test_arguments_that_cannot_be_meant(small, arguments, message):
+    with pytest.raises(UsageError, match=message):
+        make(small, **arguments)
+
+
+def test_no_dataset(tmp_path):
+    with pytest.raises(CorruptDataError):
+        make(tmp_path / "nothing")
+
+
+def steps_of(env, seed, count, options=None):
+    yield env.reset(seed=seed, options=options)
+    for row in actions(seed, count, env.num_envs):
+        yield env.step(row)
+
+
+def test_many_are_the_same_as_each_alone(small):
+    alone = gymnasium.vector.SyncVectorEnv([lambda: make(small)] * 3)
+    together = many(small, 3)
+    assert together.single_observation_space == alone.single_observation_space
+    assert together.observation_space == alone.observation_space
+    assert together.action_space == alone.action_space
+    assert together.metadata["autoreset_mode"] == alone.metadata["autoreset_mode"]
+    ended = 0
+    for one, other in zip(steps_of(alone, 8, 150), steps_of(together, 8, 150), strict=True):
+        for a, b in zip(one, other, strict=True):
+            same(a, b)
+        ended += "metrics" in other[-1]
+    assert ended > 3, "episodes ended and began again"
+
+
+def test_processes_are_the_same_as_one(small):
+    options = {"episode_id": [None, load_dataset(small)[2].episode_id, None]}
+    one, two = many(small, 3), many(small, 3, workers=2)
+    try:
+        for a, b in zip(
+            steps_of(one, 4, 60, dict(options)), steps_of(two, 4, 60, dict(options)), strict=True
+        ):
+            for x, y in zip(a, b, strict=True):
+                same(x, y)
+        assert one.state() == two.state()
+        same(one.restore(one.state())[0], two.restore(one.state())[0])
+        with pytest.raises(UsageError, match="no episode"):
+            two.reset(options={"episode_id": "nowhere"})
+        same(one.reset(seed=1)[0], two.reset(seed=1)[0])
+    finally:
+        two.close()
+
+
+def test_gymnasiums_own_processes(small):
+    env = many(small, 2, "async", vector_kwargs={"context": "spawn"})
+    try:
+        same(env.reset(seed=8)[0], many(small, 2).reset(seed=8)[0])
+    finally:
+        env.close()
+
+
+def test_a_vector_without_autoreset_waits(small):
+    env = many(small, 2, autoreset=False)
+    env.reset(seed=0)
+    *_, terminated, _, infos = env.step([11, -1])
+    assert terminated.tolist() == [True, False]
+    assert infos["_metrics"].tolist() == [True, False]
+    with pytest.raises(UsageError, match="reset_mask"):
+        env.step([0, 0])
+    before = env.state()
+    env.reset(options={"reset_mask": np.array([True, False])})
+    assert env.state()[1] == before[1]
+    assert env.state()[0].actions == ()
+
+
+def test_vector_states(small):
+    env = many(small, 2)
+    for _ in steps_of(env, 2, 25):
+        pass
+    states = env.state()
+    assert all(isinstance(state, EnvState) for state in states)
+    other = InterNavVectorEnv(2, small, 16)
+    other.restore(states)
+    for row in actions(5, 30, 2):
+        for a, b in zip(env.step(row), other.step(row), strict=True):
+            same(a, b)
+
+
+def test_registered_once():
+    internav_data.envs.register()
+    assert "InterNav-v0" in gymnasium.registry
+
+
+@pytest.mark.slow
+def test_memory_stays_flat(small):
+    import psutil
+
+    env = make(small, houses_kept=2, episodes_per_house=1)
+    rng = np.random.default_rng(0)
+    sizes = []
+    for k in range(10_000):
+        env.reset(seed=0 if k == 0 else None)
+        for action in rng.integers(0, 11, size=5).tolist():
+            env.step(action)
+        if k % 1000 == 999:
+            sizes.append(psutil.Process().memory_info().rss / 2**20)
+    assert sizes[-1] - sizes[2] < 20.0, sizes
