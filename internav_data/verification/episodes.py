@@ -9,9 +9,9 @@ import numpy as np
 import shapely
 from shapely import Point, Polygon
 
-from internav_data.verification.ground import SPACING_M
+from internav_data.verification.ground import KEEP_M, SPACING_M
 from internav_data.verification.obstacles import check_obstacles
-from internav_data.verification.ways import FINE, Sight, ellipse, grown, joined
+from internav_data.verification.ways import FINE, FINEST, Sight, ellipse, grown, joined
 
 if TYPE_CHECKING:
     from shapely import Geometry
@@ -29,7 +29,7 @@ LOOK = 1.05
 """Ways longer than this share of what is stated need not be known closer."""
 ROUNDED_M = 1e-4
 """Stored lengths are rounded to 0.1 mm."""
-BAND_M = 5e-4
+BAND_M = 5e-5
 """Where a radius this much larger or smaller changes the answer, either answer stands."""
 NEAR_M = 0.5
 """What lies farther than this outside an ellipse of ways keeps no disc off them."""
@@ -201,15 +201,12 @@ class _Judge:
         near = ellipse(self.from_xy, self.to_xy, most + NEAR_M)
         blockers = [b for b in (*self.site.blockers, *taken) if shapely.intersects(near, b)]
 
-        def fine(slack_m: float, most: float) -> float:
-            sight = Sight(grown(blockers, FINE, slack_m), portals=self.site.portals)
-            return self._length(sight, most)
+        def agrees(chords: int, slack_m: float) -> bool:
+            sight = Sight(grown(blockers, chords, slack_m), portals=self.site.portals)
+            return abs(self._length(sight, most) - stated) <= _slack(stated)
 
-        if abs(fine(0.0, stated + _slack(stated)) - stated) <= _slack(stated):
-            return True
         # A gap as wide as the disc is open for the smaller disc and shut for the larger one.
-        low, high = fine(-BAND_M, most), fine(BAND_M, most)
-        return high - low > _slack(stated) and low - _slack(stated) <= stated <= high
+        return agrees(FINE, 0.0) or agrees(FINEST, -BAND_M) or agrees(FINEST, BAND_M)
 
     def _report(self, name: str, taken: list[Geometry], stated: float) -> None:
         found = self._length(self._sight(taken), math.inf)
@@ -227,15 +224,14 @@ class _Judge:
     def _connected(self, taken: list[Geometry]) -> bool:
         """Whether the disc gets from start to goal; ties within the band say what is stated."""
         array = np.array(taken, dtype=object)
-        radius = 0.2 - 1e-6
-        grown_by = shapely.union_all(shapely.buffer(array, radius, quad_segs=FINE))
-        way = joined(self.from_xy, self.to_xy, self.site.free, grown_by)
+        near = shapely.union_all(shapely.buffer(array, KEEP_M, quad_segs=FINE))
+        way = joined(self.from_xy, self.to_xy, self.site.free, near)
         stated = self.episode.way_m is not None
         if way == stated:
             return way
-        for slack in (-BAND_M, BAND_M):
-            blockers = np.array([*self.site.blockers, *taken], dtype=object)
-            all_taken = shapely.union_all(shapely.buffer(blockers, radius + slack, quad_segs=FINE))
-            if joined(self.from_xy, self.to_xy, self.site.outline, all_taken) == stated:
+        blockers = np.array([*self.site.blockers, *taken], dtype=object)
+        for slack in (0.0, -BAND_M, BAND_M):
+            solid = shapely.union_all(shapely.buffer(blockers, KEEP_M + slack, quad_segs=FINEST))
+            if joined(self.from_xy, self.to_xy, self.site.outline, solid) == stated:
                 return stated
         return way

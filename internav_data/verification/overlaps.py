@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, QhullError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
     from shapely import Geometry
@@ -64,7 +64,10 @@ def hulls_overlap(first: Floats, second: Floats, depth_m: float = DEPTH_M) -> bo
 
 
 def overlapping_slabs(
-    slabs: Sequence[Slab], owners: Sequence[int], depth_m: float = DEPTH_M
+    slabs: Sequence[Slab],
+    owners: Sequence[int],
+    may_interlock: Callable[[int, int], bool],
+    depth_m: float = DEPTH_M,
 ) -> list[tuple[int, int]]:
     """Pairs of owners (ascending) whose slabs overlap in space deeper than `depth_m`."""
     if not slabs:
@@ -74,7 +77,7 @@ def overlapping_slabs(
     found: set[tuple[int, int]] = set()
     for a, b in zip(left.tolist(), right.tolist(), strict=True):
         pair = (owners[a], owners[b])
-        if pair[0] >= pair[1] or pair in found:
+        if pair[0] >= pair[1] or pair in found or may_interlock(*pair):
             continue
         one, two = slabs[a], slabs[b]
         if min(one.high, two.high) - max(one.low, two.low) <= depth_m:
