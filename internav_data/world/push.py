@@ -38,8 +38,12 @@ AGENT_M: Final = 0.21
 """Radius of the agent's column: nothing ends inside its disc of 0.2 m."""
 AGENT_LEAST_M: Final = 0.2005
 """What already stands nearer than the column is not pressed away by it."""
-GROWTHS_M: Final = (0.05, 0.4, 1.0, 2.0, 4.0)
-"""How far round the free sweep bodies are gathered, until nothing else was reached."""
+AROUND_M: Final = 0.05
+"""How far round the free sweep bodies are gathered at first."""
+ROUNDS: Final = 8
+"""What was reached though it was left out joins the next round; the last one takes all within
+`FAR_M`."""
+FAR_M: Final = 4.0
 ON_M: Final = 0.2
 """How far round what the push may meet bodies are gathered too."""
 STILL_M: Final = 0.0005
@@ -143,13 +147,12 @@ def _push_among(
 ) -> tuple[Motion, tuple[tuple[int, Body], ...]]:
     """Push among what can be touched: gathered anew until nothing left out was reached."""
     engine = engine_of_this_process()
-    known: dict[int, Body] = {}
-    for growth in GROWTHS_M:
-        known.update(near(frame.leave_box(sweep, growth)))
-        for body in [body for body in known.values() if body.moves]:
-            # What is met may be driven on.
-            low_x, low_y, high_x, high_y = extent_of(body.asset, body.pose).plan
-            known.update(near((low_x - ON_M, low_y - ON_M, high_x + ON_M, high_y + ON_M)))
+    known = dict(near(frame.leave_box(sweep, AROUND_M)))
+    for body in [body for body in known.values() if body.moves]:
+        # What is met may be driven on.
+        low_x, low_y, high_x, high_y = extent_of(body.asset, body.pose).plan
+        known.update(near((low_x - ON_M, low_y - ON_M, high_x + ON_M, high_y + ON_M)))
+    for left in reversed(range(ROUNDS)):
         around = [(key, known[key]) for key in sorted(known)]
         movers = tuple(pair for pair in around if pair[1].moves)
         others = [pair for pair in around if not pair[1].moves]
@@ -162,6 +165,8 @@ def _push_among(
         if reached.keys() <= known.keys():
             break
         known.update(reached)
+        if left == 1:
+            known.update(near(frame.leave_box(sweep, FAR_M)))
     return motion, movers
 
 
