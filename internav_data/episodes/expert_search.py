@@ -1,0 +1,262 @@
+"""Search for an expert: which thing to move from where, and whether to go round instead.
+
+Best first over worlds. What is known exactly is what was spent so far; what lies ahead is guessed
+by a field in which entering a thing costs a price. Visiting a world proposes interactions with the
+things that its guessed way enters (each from the cheapest poses that see the thing), and a visit in
+which one of them may not be moved. An interaction is asked of the true world only once it is the
+most promising entry of all.
+"""
+
+from __future__ import annotations
+
+import math
+from heapq import heappop, heappush
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from internav_data.episodes.expert_entries import (
+    State,
+    Try,
+    Visit,
+    bits_in_order,
+    looks_between,
+    moves,
+    roughly,
+)
+from internav_data.episodes.expert_fields import FAR, sightings
+from internav_data.episodes.expert_ground import EVERYTHING, PICK_PRICE, Ground
+from internav_data.world.actions import HORIZONS_DEG, PUSH_TURNS, Action
+from internav_data.world.shells import placed_shell
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from internav_data.world import World
+
+    Costs = NDArray[np.int32]
+    Ints = NDArray[np.int64]
+
+TRIES: Final = 48
+"""Interactions asked of the world; those that are too heavy cost nothing and do not count."""
+TRIES_MORE: Final = 6
+"""Interactions still tried once a plan is known."""
+VISITS: Final = 400
+SIGHTS: Final = 40
+"""Poses that are asked whether they see a thing."""
+PUSH_NODES: Final = 2
+"""Nodes that a thing is pushed from: from one of them the agent may be in the way."""
+DOUBT: Final = 2
+"""What pushing a thing another way than just before adds to the guess: pushes go on as a rule."""
+
+_VIEWS: Final = np.array(
+    [(math.cos(math.radians(d)), math.sin(math.radians(d))) for d in HORIZONS_DEG]
+)
+_RANKS: Final = {
+    Action.PICKUP: 1,
+    Action.PUSH_LEFT: 2,
+    Action.PUSH_RIGHT: 2,
+    Action.PUSH_AHEAD: 3,
+    Action.PUSH_BACK: 4,
+    Action.DROP: 5,
+}
+"""Which of two equally promising entries comes first; a visit's rank is 0."""
+_PUSHES: Final = (Action.PUSH_LEFT, Action.PUSH_RIGHT, Action.PUSH_AHEAD, Action.PUSH_BACK)
+
+
+def plan(world: World, limit: int) -> tuple[int, ...] | None:
+    """Find actions, at most `limit`, that end with Done at the goal; None without any.
+
+    The world is not changed. Bounded by counts; a pure function of the world.
+    """
+    return _Search(world, limit).run()
+
+
+class _Search:
+    def __init__(self, world: World, limit: int) -> None:
+        self.ground = Ground.of(world)
+        self.best: tuple[int, ...] | None = None
+        self.bound = limit + 1
+        """A plan has to be shorter than this."""
+        self.tries_left = TRIES
+        self.queue: list[tuple[int, int, int, Visit | Try]] = []
+        self.entries = 0
+        self.known: dict[tuple[object, ...], int] = {}
+        self._enter(world.copy(), ())
+
+    def run(self) -> tuple[int, ...] | None:
+        for _ in range(VISITS):
+            if not self.queue or self.tries_left <= 0:
+                break
+            promise, _, _, entry = heappop(self.queue)
+            if promise >= self.bound:
+                break
+            if isinstance(entry, Visit):
+                self._visit(entry, promise)
+            else:
+                self._attempt(entry)
+        return self.best
+
+    def _push(self, promise: int, rank: int, entry: Visit | Try) -> None:
+        if promise < self.bound:
+            heappush(self.queue, (promise, rank, self.entries, entry))
+            self.entries += 1
+
+    def _enter(
+        self,
+        world: World,
+        actions: tuple[int, ...],
+        last: tuple[int, int] = (-1, -1),
+        doubt: int = 0,
+    ) -> None:
+        """Take up a world, unless it was reached as cheaply before."""
+        poses = tuple(roughly(world.items[k].pose) for k in self.ground.things)
+        key = (world.i, world.j, world.quarter, world.horizon_deg, world.held, poses)
+        if self.known.get(key, FAR) <= len(actions):
+            return
+        self.known[key] = len(actions)
+        masks, prices = self.ground.masks(world), self.ground.prices(world)
+        state = State(world, actions, masks, prices, last, doubt)
+        self._consider(state, 0)
+
+    def _consider(self, state: State, banned: int) -> None:
+        """Put a visit into the queue, where the goal may be reached at all."""
+        if banned in state.visited:
+            return
+        state.visited.add(banned)
+        costs = self.ground.costs(state.masks, banned, state.prices)
+        ahead = int(costs[self.ground.pose(state.world)])
+        if ahead < FAR:
+            self._push(state.spent + ahead + 1 + state.doubt, 0, Visit(state, banned, costs))
+
+    def _visit(self, visit: Visit, promise: int) -> None:
+        state, ground = visit.state, self.ground
+        pose = ground.pose(state.world)
+        poses, entered = ground.way(state.masks, visit.banned, state.prices, visit.costs, pose)
+        bits = bits_in_order(entered.tolist())
+        if not bits:
+            self._found(state, poses.tolist())
+            return
+        if visit.banned == 0:
+            self._go_round(state, pose)
+            if promise >= self.bound:
+                return
+        for bit in bits:
+            self._consider(state, visit.banned | 1 << bit)
+        reach, back = ground.reach(state.masks, pose)
+        full = state.world.held >= 0
+        wanted = False
+        for bit in bits:
+            if not state.proposed >> bit & 1:
+                state.proposed |= 1 << bit
+                asset = state.world.items[ground.things[bit]].asset
+                wanted |= asset.pickable
+                if asset.pushable or not full:
+                    self._propose(visit, bit, reach, back)
+        if full and wanted:
+            first = int(np.flatnonzero(entered)[0])
+            self._propose_drops(visit, poses[: first + 1].tolist(), reach, back)
+
+    def _go_round(self, state: State, pose: int) -> None:
+        """Know the way without any interaction, where there is one: it bounds all others."""
+        ground = self.ground
+        costs = ground.costs(state.masks, EVERYTHING, state.prices)
+        if costs[pose] < FAR:
+            poses, _ = ground.way(state.masks, EVERYTHING, state.prices, costs, pose)
+            self._found(state, poses.tolist())
+
+    def _found(self, state: State, poses: Sequence[int]) -> None:
+        actions = (*state.actions, *moves(poses), int(Action.DONE))
+        if len(actions) < self.bound:
+            if self.best is None:
+                self.tries_left = min(self.tries_left, TRIES_MORE)
+            self.best, self.bound = actions, len(actions)
+
+    def _propose(self, visit: Visit, bit: int, reach: Costs, back: Costs) -> None:
+        """Propose to push a thing, or to pick it up, from the cheapest poses that see it."""
+        state, ground = visit.state, self.ground
+        thing = ground.things[bit]
+        item = state.world.items[thing]
+        if item.pose is None:
+            return
+        prices = state.prices.copy()
+        prices[bit] = 0
+        after = ground.costs(state.masks, visit.banned, prices)
+        points = placed_shell(item.asset, item.pose).points
+        now = HORIZONS_DEG.index(state.world.horizon_deg)
+        looks = np.abs(np.arange(len(HORIZONS_DEG)) - now)
+        found = sightings(points, reach, ground.ny, _VIEWS, looks, after)
+        pick = item.asset.pickable
+        probe = state.world.copy()
+        places: list[tuple[int, int, int]] = []
+        for place in zip(*(f[:SIGHTS].tolist() for f in found), strict=True):
+            if all(place[0] // 4 != known[0] // 4 for known in places):
+                self._place(probe, *place[:2])
+                if probe.target(pick=pick) == thing:
+                    places.append(place)
+                    if len(places) == (1 if pick else PUSH_NODES):
+                        break
+        for action in (Action.PICKUP,) if pick and places else _PUSHES if places else ():
+            self._offer(state, thing, action, places, back)
+
+    def _offer(
+        self,
+        state: State,
+        thing: int,
+        action: Action,
+        places: Sequence[tuple[int, int, int]],
+        back: Costs,
+    ) -> None:
+        """Put an interaction into the queue, from the first place; the others are its spares."""
+        entry = None
+        for pose, horizon, cost in reversed(places):
+            doubt, last = state.doubt, (-1, -1)
+            if action in PUSH_TURNS:
+                last = (thing, (pose + PUSH_TURNS[action]) % 4)
+                turn = (last[1] - state.last[1]) % 4 if state.last[0] == thing else 0
+                if turn == 2:  # noqa: PLR2004 - to and fro
+                    continue
+                doubt += DOUBT if turn else 0
+            promise = state.spent + cost + 1 + doubt
+            entry = Try(state, pose, horizon, action, back, entry, promise, last, doubt)
+        if entry is not None:
+            self._push(entry.promise, _RANKS[action], entry)
+
+    def _propose_drops(self, visit: Visit, way: Sequence[int], reach: Costs, back: Costs) -> None:
+        """Propose to empty the hand on the way to the next thing to pick up, in any direction."""
+        state, ground = visit.state, self.ground
+        prices = state.prices.copy()
+        for bit, thing in enumerate(ground.things):
+            if state.world.items[thing].asset.pickable:
+                prices[bit] = PICK_PRICE
+        after = ground.costs(state.masks, visit.banned, prices)
+        horizon = HORIZONS_DEG.index(state.world.horizon_deg)
+        nodes = dict.fromkeys(way[place] // 4 for place in (0, len(way) // 2, len(way) - 1))
+        for node in nodes:
+            for pose in range(4 * node, 4 * node + 4):
+                cost = int(reach[pose]) + int(after[pose]) + 2 + state.doubt
+                entry = Try(state, pose, horizon, Action.DROP, back)
+                self._push(state.spent + cost, _RANKS[Action.DROP], entry)
+
+    def _attempt(self, entry: Try) -> None:
+        """Ask the world; where it works, go on from there."""
+        state, ground = entry.state, self.ground
+        world = state.world.copy()
+        self._place(world, entry.pose, entry.horizon)
+        result = world.step(entry.action)
+        if result.reason != "too heavy":
+            self.tries_left -= 1
+        if result.success:
+            walk = moves(ground.walk(state.masks, entry.back, entry.pose))
+            looks = looks_between(state.world.horizon_deg, entry.horizon)
+            actions = (*state.actions, *walk, *looks, int(entry.action))
+            self._enter(world, actions, entry.last, entry.doubt)
+        elif entry.spare is not None and result.reason != "too heavy":
+            self._push(entry.spare.promise, _RANKS[entry.action], entry.spare)
+
+    def _place(self, world: World, pose: int, horizon: int) -> None:
+        node, world.quarter = divmod(pose, 4)
+        world.i, world.j = divmod(node, self.ground.ny)
+        world.horizon_deg = HORIZONS_DEG[horizon]
