@@ -105,7 +105,7 @@ def _run(
         z = F(1.0) / nearness
         depth[row, x] = z
         red, green, blue = record[10], record[11], record[12]
-        light = base * (F(0.86) + F(0.25) * min(nearness, F(0.8)))
+        light = base * (F(0.84) + F(0.20) * min(nearness, F(0.8)))
         level = F(1.0)
         if upright:
             # Less light reaches what is near the floor.

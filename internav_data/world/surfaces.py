@@ -108,8 +108,14 @@ _HOUSE_PATTERNS: Mapping[str, tuple[int, float, float]] = {
 }
 
 
+_PAINTED = 185
+"""Wood whose channels are all at least this bright is painted: no grain."""
+
+
 def part_look(material: str, colour: RGB) -> Look:
     """Return how a part of an asset is coloured."""
+    if material == "wood" and min(colour) >= _PAINTED:
+        return Look(colour, PLAIN)
     return Look(colour, *_PART_LOOKS.get(material, (PLAIN, 0.0, 0.0)))
 
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from internav_data import generate_house
@@ -37,7 +37,18 @@ def around(turns, radius, middle, snap):
         (middle[0] + radius * math.cos(-t), middle[1] + radius * math.sin(-t))
         for t in sorted(turns)
     ]
-    return [(round(x) + 0.5, round(y) + 0.5) for x, y in points] if snap else points
+    if not snap:
+        return points
+    snapped = [(round(x) + 0.5, round(y) + 0.5) for x, y in points]
+    # Not every polygon stays convex there.
+    corners = zip(snapped, snapped[1:] + snapped[:1], snapped[2:] + snapped[:2], strict=True)
+    assume(len(set(snapped)) == len(snapped))
+    assume(all(turn(a, b, c) < 0 for a, b, c in corners))
+    return snapped
+
+
+def turn(a, b, c):
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 turns = st.lists(
@@ -62,10 +73,9 @@ def test_a_pixel_is_covered_when_its_centre_is_inside(angles, radius, x, y):
     covered = mask(polygon)
     for row in range(SIZE):
         for column in range(SIZE):
-            sides = [
-                (b[0] - a[0]) * (row + 0.5 - a[1]) - (b[1] - a[1]) * (column + 0.5 - a[0])
-                for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True)
-            ]
+            centre = (column + 0.5, row + 0.5)
+            edges = zip(polygon, polygon[1:] + polygon[:1], strict=True)
+            sides = [turn(a, b, centre) for a, b in edges]
             if max(sides) < -1e-6:
                 assert covered[row, column] == 1
             elif max(sides) > 1e-6:
