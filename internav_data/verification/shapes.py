@@ -8,14 +8,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import combinations, product
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 from scipy.spatial import ConvexHull, QhullError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
     from shapely import Geometry
@@ -54,9 +54,14 @@ class Slab:
 def turned(points: Floats, quaternion: Quaternion) -> Floats:
     """Turn points (n, 3) by a quaternion: v + 2 w (q x v) + 2 q x (q x v), q normalised."""
     x, y, z, w = np.asarray(quaternion, dtype=np.float64) / math.hypot(*quaternion)
-    axis = np.array([x, y, z])
-    once = np.cross(axis, points)
-    return np.asarray(points + 2.0 * w * once + 2.0 * np.cross(axis, once), dtype=np.float64)
+
+    def crossed(v: Floats) -> Floats:
+        """Vector part of the quaternion x v (np.cross, without its overhead on few points)."""
+        a, b, c = v.T
+        return np.column_stack([y * c - z * b, z * a - x * c, x * b - y * a])
+
+    once = crossed(points)
+    return np.asarray(points + 2.0 * w * once + 2.0 * crossed(once), dtype=np.float64)
 
 
 def _circle(radius_x: float, radius_y: float, z: float) -> list[tuple[float, float, float]]:
@@ -99,25 +104,28 @@ def solid_of(part: Part) -> Solid:
     return Solid(corners, _hull_edges(corners))
 
 
-def _hull(points: Floats) -> Geometry:
-    return cast("Geometry", shapely.convex_hull(shapely.multipoints(points)))
+def _hulls(groups: Sequence[Floats]) -> list[Geometry]:
+    """Convex hulls in the plane of groups of points (n, 2), in one call."""
+    if not groups:
+        return []
+    owners = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
+    clouds = shapely.multipoints(np.vstack(groups), indices=owners)
+    return list(np.atleast_1d(np.asarray(shapely.convex_hull(clouds))))
 
 
-def plan_of(corners: Floats, edges: Ints, low: float, high: float) -> Geometry | None:
-    """Plan of a polyhedron between two heights (convex hull), None where it has none."""
+def slice_of(corners: Floats, edges: Ints, low: float, high: float) -> Floats:
+    """Points (n, 2) whose hull is the plan of a polyhedron between two heights; none: no plan."""
     z = corners[:, 2]
+    if z.min() >= low and z.max() <= high:
+        return corners[:, :2]
     pieces = [corners[(z >= low) & (z <= high), :2]]
-    if z.min() < low or z.max() > high:
-        first, second = corners[edges[:, 0]], corners[edges[:, 1]]
-        for level in (low, high):
-            cut = (first[:, 2] - level) * (second[:, 2] - level) < 0.0
-            a, b = first[cut], second[cut]
-            share = ((level - a[:, 2]) / (b[:, 2] - a[:, 2]))[:, None]
-            pieces.append(a[:, :2] + share * (b[:, :2] - a[:, :2]))
-    points = np.vstack(pieces)
-    if len(points) == 0:
-        return None
-    return _hull(points)
+    first, second = corners[edges[:, 0]], corners[edges[:, 1]]
+    for level in (low, high):
+        cut = (first[:, 2] - level) * (second[:, 2] - level) < 0.0
+        a, b = first[cut], second[cut]
+        share = ((level - a[:, 2]) / (b[:, 2] - a[:, 2]))[:, None]
+        pieces.append(a[:, :2] + share * (b[:, :2] - a[:, :2]))
+    return np.vstack(pieces)
 
 
 def _uncovered(plans: list[Geometry]) -> list[Geometry]:
@@ -154,21 +162,17 @@ class Shapes:
         """Return what an asset puts in the agent's way: one convex plan for each part."""
         if not self.assets[asset_id].blocks:
             return []
-        plans = [
-            plan_of(corners, edges, STEP_OVER_M, AGENT_HEIGHT_M)
+        slices = [
+            slice_of(corners, edges, STEP_OVER_M, AGENT_HEIGHT_M)
             for corners, edges in self._placed(asset_id, pose)
         ]
-        return _uncovered([plan for plan in plans if plan is not None])
+        return _uncovered(_hulls([points for points in slices if len(points)]))
 
     def slabs(self, asset_id: str, pose: Pose) -> list[Slab]:
         """Return every part's plan at its full height, and the heights it spans."""
-        placed = self._placed(asset_id, pose)
+        placed = [corners for corners, _ in self._placed(asset_id, pose)]
+        plans = _hulls([corners[:, :2] for corners in placed])
         return [
-            Slab(
-                corners,
-                _hull(corners[:, :2]),
-                float(corners[:, 2].min()),
-                float(corners[:, 2].max()),
-            )
-            for corners, _ in placed
+            Slab(corners, plan, float(corners[:, 2].min()), float(corners[:, 2].max()))
+            for corners, plan in zip(placed, plans, strict=True)
         ]

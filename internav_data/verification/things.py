@@ -13,6 +13,7 @@ from internav_data.verification.overlaps import DEPTH_M, overlapping_slabs, plan
 from internav_data.verification.shapes import Slab
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
     from shapely import Geometry
 
     from internav_data.records import Door, House, Thing
@@ -50,6 +51,8 @@ def check_things(
     for slab in wall_slabs(house):
         slabs.append(slab)
         owners.append(WALL_ID)
+    within = {room: shapely.buffer(shape, DEPTH_M) for room, shape in rooms.items()}
+    shapely.prepare(list(within.values()))
     groups = {thing.thing_id: thing.group for thing in house.things}
     own = {t.thing_id: shapes.slabs(t.asset_id, t.pose) for t in house.things}
     for thing in house.things:
@@ -58,16 +61,10 @@ def check_things(
         report.expect(thing.type == asset.type, "thing.type", f"{name}: {asset.type}", thing.type)
         slabs += own[thing.thing_id]
         owners += [thing.thing_id] * len(own[thing.thing_id])
-        room = rooms.get(thing.room)
-        plan = shapely.union_all([slab.plan for slab in own[thing.thing_id]])
+        room = within.get(thing.room)
         if room is not None:
-            beyond = shapely.area(shapely.difference(plan, shapely.buffer(room, DEPTH_M)))
-            report.expect(
-                beyond < DEPTH_M**2,
-                "thing.room",
-                f"{name} in room {thing.room}",
-                f"{beyond:.6f} m²",
-            )
+            inside = shapely.covers(room, _plans(own[thing.thing_id])).all()
+            report.expect(inside, "thing.room", f"{name} in room {thing.room}", "beyond it")
         _check_support(house, thing, own, report)
 
     def may_interlock(a: int, b: int) -> bool:
@@ -80,6 +77,10 @@ def check_things(
     report.counts["predicates"] += len(house.things)
 
 
+def _plans(slabs: list[Slab]) -> NDArray[np.object_]:
+    return np.array([slab.plan for slab in slabs], dtype=object)
+
+
 def _check_support(
     house: House, thing: Thing, own: dict[int, list[Slab]], report: Collector
 ) -> None:
@@ -87,10 +88,9 @@ def _check_support(
     name = f"thing {thing.thing_id}"
     slabs = own[thing.thing_id]
     low, high = min(slab.low for slab in slabs), max(slab.high for slab in slabs)
-    plan = shapely.union_all([slab.plan for slab in slabs])
     if thing.support >= 0:
         held = any(
-            abs(slab.high - low) < DEPTH_M and shapely.intersects(slab.plan, plan)
+            abs(slab.high - low) < DEPTH_M and shapely.intersects(slab.plan, _plans(slabs)).any()
             for slab in own.get(thing.support, [])
         )
         report.expect(
@@ -107,7 +107,8 @@ def _check_support(
         if w.z_min < high and w.z_max > low
     ]
     hangs = low > 0.0 and (
-        high > ceiling - HANGS_M or shapely.dwithin(plan, shapely.union_all(walls), HANGS_M)
+        high > ceiling - HANGS_M
+        or shapely.dwithin(_plans(slabs)[:, None], np.array(walls)[None, :], HANGS_M).any()
     )
     where = f"{name} on the floor, a wall or the ceiling"
     report.expect(hangs, "thing.support", where, f"{low:.3f} m above the floor")
