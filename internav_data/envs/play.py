@@ -15,7 +15,7 @@ from internav_data.world.camera import View
 from internav_data.world.frames import HEADINGS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from internav_data.envs.places import Place
     from internav_data.navigation import Lattice
@@ -76,23 +76,34 @@ class Play:
         What happens.
     actions
         So far; -1 is `WAIT`.
+    start
+        Node i, j and quarter turn it began at, where that is not the episode's own.
     stale
         The picture has changed since somebody last set this to False.
     """
 
     __slots__ = (
-        "_clear", "_lattice", "_rules", "_start", "actions", "clear_m", "episode", "last", "over",
-        "place", "props", "stale", "success", "tally", "world",
+        "_clear", "_length_m", "_rules", "actions", "clear_m", "episode", "last", "over",
+        "place", "props", "stale", "start", "success", "tally", "world",
     )  # fmt: skip
 
     def __init__(
-        self, episode: Episode, place: Place, assets: Mapping[str, Asset], rules: Rules
+        self,
+        episode: Episode,
+        place: Place,
+        assets: Mapping[str, Asset],
+        rules: Rules,
+        start: Sequence[int] | None = None,
     ) -> None:
         self.episode, self.place, self._rules = episode, place, rules
         self.world = World.of_episode(place.stage, episode, assets, rules.push_model)
+        if start is not None:
+            self._stand(start)
         self.props = place.scenery.props((assets[o.asset_id], o.pose) for o in episode.obstacles)
         self._clear = place.field_to((episode.goal.i, episode.goal.j))
-        self.clear_m = self._start = self._clear.at(self.world.i, self.world.j)
+        self.clear_m = self._clear.at(self.world.i, self.world.j)
+        self._length_m = episode.clear_m if start is None else self.clear_m
+        self.start = None if start is None else (start[0], start[1], start[2] % 4)
         self.actions: list[int] = []
         self.tally = Tally()
         self.success = self.over = False
@@ -132,6 +143,20 @@ class Play:
         self.over = terminated or truncated
         self.tally.reward += reward
         return Step(reward, terminated, truncated)
+
+    def _stand(self, start: Sequence[int]) -> None:
+        """Put the agent elsewhere: on a free node."""
+        free = self.world.lattice.free
+        if len(start) != 3 or not (  # noqa: PLR2004 - i, j and quarter
+            0 <= start[0] < free.shape[0]
+            and 0 <= start[1] < free.shape[1]
+            and free[start[0], start[1]]
+        ):
+            raise UsageError(
+                f"options['start']: expected (i, j, quarter) of a free node, got {tuple(start)}; "
+                f"the lattice has {free.shape[0]} x {free.shape[1]} nodes"
+            )
+        self.world.i, self.world.j, self.world.quarter = start[0], start[1], start[2] % 4
 
     def _moved(self) -> float:
         self.tally.moves += 1
@@ -179,7 +204,7 @@ class Play:
         return metrics(
             self.tally,
             success=self.success,
-            clear_m=self.episode.clear_m,
+            clear_m=self._length_m,
             steps=len(self.actions),
             distance_m=self.clear_m,
         )

@@ -12,7 +12,7 @@ from internav_data.envs.source import Source, open_source
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
     from pathlib import Path
 
     from internav_data.dataset import Dataset
@@ -46,6 +46,8 @@ class EnvState:
     """Of the order of episodes."""
     position: int
     """In that order, of the episode that comes next."""
+    start: tuple[int, int, int] | None = None
+    """Node i, j and quarter turn, where it did not begin at the episode's own start."""
 
 
 class Player:
@@ -112,7 +114,12 @@ class Player:
         self._seed, self._position = int(seed), 0
         self._order = self.source.order(self._seed, stay=self._stay, shuffle=self._shuffle)
 
-    def begin(self, episode_id: str | None = None, actions: Iterable[int] = ()) -> Play:
+    def begin(
+        self,
+        episode_id: str | None = None,
+        actions: Iterable[int] = (),
+        start: Sequence[int] | None = None,
+    ) -> Play:
         """Begin the next episode, or a named one (which leaves the order where it is)."""
         if episode_id is not None:
             number = self.source.number_of(episode_id)
@@ -123,7 +130,7 @@ class Player:
             self._position += 1
         episode = self.source.episode(number)
         place, assets = self.source.place(episode), self.source.dataset.assets
-        self.current = Play(episode, place, assets, self._rules)
+        self.current = Play(episode, place, assets, self._rules, start)
         for action in actions:
             self.current.step(int(action))
         return self.current
@@ -131,13 +138,15 @@ class Player:
     def state(self) -> EnvState:
         """Return all that this is."""
         play = self.play
-        return EnvState(play.episode.episode_id, tuple(play.actions), self._seed, self._position)
+        return EnvState(
+            play.episode.episode_id, tuple(play.actions), self._seed, self._position, play.start
+        )
 
     def restore(self, state: EnvState) -> Play:
         """Become what a state says."""
         self.seed(state.seed)
         self._position = state.position
-        return self.begin(state.episode_id, state.actions)
+        return self.begin(state.episode_id, state.actions, state.start)
 
 
 def step_info(play: Play, step: Step) -> dict[str, Any]:
@@ -164,6 +173,7 @@ def check_options(options: Mapping[str, Any] | None, known: tuple[str, ...]) -> 
     unknown = sorted(set(options) - set(known))
     if unknown:
         raise UsageError(f"options: no option {unknown[0]!r}; there are {list(known)}")
-    if "actions" in options and options.get("episode_id") is None:
-        raise UsageError("options['actions']: say of which episode, by options['episode_id']")
+    for name in ("actions", "start"):
+        if name in options and options.get("episode_id") is None:
+            raise UsageError(f"options[{name!r}]: say of which episode, by options['episode_id']")
     return dict(options)

@@ -147,13 +147,15 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
         """As `InterNavVectorEnv.reset`."""
         chosen = check_options(options, OPTIONS)
         seeds = seeds_of(seed, self.num_envs)
-        mask, ids, actions = choices(chosen, self.num_envs)
+        mask, ids, actions, starts = choices(chosen, self.num_envs)
         asked = []
         for k, (low, high) in enumerate(self._rows):
             if mask[low:high].any():
                 own: dict[str, Any] = {"reset_mask": mask[low:high], "episode_id": ids[low:high]}
                 if "actions" in chosen:
                     own["actions"] = actions[low:high]
+                if "start" in chosen:
+                    own["start"] = starts[low:high]
                 self._ask(k, "reset", seed=seeds[low:high], options=own)
                 asked.append(k)
         answers = dict(zip(asked, self._answers(asked), strict=True))

@@ -74,12 +74,13 @@ class InterNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
         """Begin the next episode of the seed's order, or `options["episode_id"]`.
 
         `options["actions"]` are played at once: with the episode they are a state.
+        `options["start"]` = (i, j, quarter) puts the agent elsewhere first.
         """
-        chosen = check_options(options, ("episode_id", "actions"))
+        chosen = check_options(options, ("episode_id", "actions", "start"))
         super().reset(seed=seed)
         if seed is not None or not self._player.ordered:
             self._player.seed(self.np_random_seed)
-        self._player.begin(chosen.get("episode_id"), chosen.get("actions", ()))
+        self._player.begin(chosen.get("episode_id"), chosen.get("actions", ()), chosen.get("start"))
         return self._look(), self._whose()
 
     def step(

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     Bools = NDArray[np.bool_]
     Stepped = tuple[Observations, NDArray[np.float64], Bools, Bools, dict[str, Any]]
 
-OPTIONS = ("episode_id", "actions", "reset_mask")
+OPTIONS = ("episode_id", "actions", "start", "reset_mask")
 
 
 def make_vector(
@@ -115,12 +115,13 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         """Begin everywhere, or where `options["reset_mask"]` (N,) says.
 
         `options["episode_id"]` is one for all, or N of them (None: the next of the order);
-        `options["actions"]` N sequences to be played at once.
+        `options["actions"]` N sequences to be played at once, `options["start"]` N poses
+        (i, j, quarter) to begin at (None: the episode's own).
         """
         chosen = check_options(options, OPTIONS)
         seeds = seeds_of(seed, self.num_envs)
         super().reset(seed=seeds[0])
-        mask, ids, actions = choices(chosen, self.num_envs)
+        mask, ids, actions, starts = choices(chosen, self.num_envs)
         infos: dict[str, Any] = {}
         for k in np.flatnonzero(mask).tolist():
             player, own = self.players[k], seeds[k]
@@ -128,7 +129,7 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
                 own = int(self.np_random.integers(2**32))
             if own is not None:
                 player.seed(own)
-            infos = self._add_info(infos, self._begin(k, ids[k], actions[k]), k)
+            infos = self._add_info(infos, self._begin(k, ids[k], actions[k], starts[k]), k)
         return self._observations(), infos
 
     def step(self, actions: NDArray[np.int64] | Sequence[int]) -> Stepped:
@@ -177,9 +178,13 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         return self._begin(k)
 
     def _begin(
-        self, k: int, episode_id: str | None = None, actions: Sequence[int] = ()
+        self,
+        k: int,
+        episode_id: str | None = None,
+        actions: Sequence[int] = (),
+        start: Sequence[int] | None = None,
     ) -> dict[str, Any]:
-        play = self.players[k].begin(episode_id, actions)
+        play = self.players[k].begin(episode_id, actions, start)
         self._over[k] = play.over
         self._board.write(k, play)
         return {"episode_id": play.episode.episode_id}
@@ -210,8 +215,8 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
 
 def choices(
     chosen: dict[str, Any], count: int
-) -> tuple[Bools, list[str | None], list[Sequence[int]]]:
-    """Return who is to be reset, to which episodes, and what is played there at once."""
+) -> tuple[Bools, list[str | None], list[Sequence[int]], list[Sequence[int] | None]]:
+    """Return who is to be reset, to which episode, what is played at once, and from where."""
     mask = np.asarray(chosen.get("reset_mask", np.ones(count, np.bool_)))
     if mask.shape != (count,) or mask.dtype != np.bool_ or not mask.any():
         raise UsageError(
@@ -221,7 +226,8 @@ def choices(
     ids = chosen.get("episode_id")
     ids = [ids] * count if ids is None or isinstance(ids, str) else list(ids)
     actions = list(chosen.get("actions", [()] * count))
-    for name, given in (("episode_id", ids), ("actions", actions)):
+    starts = list(chosen.get("start", [None] * count))
+    for name, given in (("episode_id", ids), ("actions", actions), ("start", starts)):
         if len(given) != count:
             raise UsageError(f"options[{name!r}]: expected {count} of them, got {len(given)}")
-    return mask, ids, actions
+    return mask, ids, actions, starts

@@ -3,7 +3,9 @@
 import pytest
 
 from internav_data.dataset import load_dataset
+from internav_data.envs import InterNavEnv, InterNavVectorEnv
 from internav_data.envs.auxiliary import auxiliary_starts, is_cleared, world_at
+from internav_data.records.errors import UsageError
 from internav_data.world import Action, Stage
 
 
@@ -36,3 +38,26 @@ def test_agents_stand_opposite_to_the_goal_and_can_act(small, kind):
 )
 def test_what_cleared_means(before, after, cleared):
     assert is_cleared(before, after) == cleared
+
+
+def test_an_environment_begins_at_a_start(small):
+    dataset = load_dataset(small)
+    episode = next(e for e in dataset if any(o.pickable for o in e.obstacles))
+    stage = Stage.of(dataset.scene(episode.scene_id))
+    start = auxiliary_starts(stage, episode, dataset.assets, "pick")[0]
+    env = InterNavEnv(small, 16)
+    options = {"episode_id": episode.episode_id, "start": start[:3]}
+    env.reset(seed=0, options=options)
+    seen, *_, info = env.step(Action.PICKUP)
+    assert info["action_success"]
+    state = env.state()
+    assert state.start == start[:3]
+    other = InterNavEnv(small, 16)
+    again, _ = other.restore(state)
+    assert (again["rgb"] == seen["rgb"]).all()
+    assert other.state() == state
+    many = InterNavVectorEnv(2, small, 16)
+    many.reset(seed=0, options={"episode_id": episode.episode_id, "start": [start[:3], None]})
+    assert [s.start for s in many.state()] == [start[:3], None]
+    with pytest.raises(UsageError, match="free node"):
+        env.reset(options={"episode_id": episode.episode_id, "start": (0, 0, 0)})
