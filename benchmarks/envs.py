@@ -4,7 +4,7 @@
 
 `navigation`: MoveAhead, rotations and looks as an agent walks (in the shares 12:3:3:1:1);
 `uniform`: all twelve, so that an episode lasts a dozen steps; `uniform_no_done`: eleven. Models
-and houses are prepared before the clock runs, and new goals' distance fields are not. Targets: 3,000
+and houses are prepared before the clock runs, new goals' distance fields are not. Targets: 3,000
 navigation steps/s with 64x64 RGB-D, 1,500 under uniform actions.
 """
 
