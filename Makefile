@@ -101,6 +101,11 @@ bench: $(STAMP) ## run the benchmarks: JSON into bench-results/
 	$(BIN)/python benchmarks/loader.py > bench-results/loader.json
 	$(BIN)/python benchmarks/houses.py --out bench-results/houses.json
 	$(BIN)/python benchmarks/table2.py > bench-results/table2.json
+	for room in navigation verification world camera expert; do \
+	  $(BIN)/python benchmarks/$$room.py > bench-results/$$room.json; \
+	done
+	$(BIN)/internav-gen generate --out bench-results/dataset --scenes 24 --episodes-per-scene 5
+	$(BIN)/python benchmarks/envs.py bench-results/dataset > bench-results/envs.json
 	@echo "Results: bench-results/*.json"
 
 .PHONY: check

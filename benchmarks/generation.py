@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import resource
 import sys
 import tempfile
 import threading
@@ -66,12 +67,20 @@ class Memory:
         }
 
 
+def workers_cpu_s() -> float:
+    """Processor time of all ended child processes: what other work on the machine cannot stretch."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def timed(scenes: int, workers: int, overrides: list[str]) -> dict[str, object]:
     """Make a dataset and say how long it took and how large it is."""
     with tempfile.TemporaryDirectory(prefix="internav-bench-") as folder:
         out = Path(folder) / "dataset"
+        before = workers_cpu_s()
         with Memory() as memory:
             report = generate(out, load_config(None, overrides), scenes, workers)
+        cpu_s = workers_cpu_s() - before
         sizes = [p.stat().st_size for p in (out / "data" / "episodes").glob("*.parquet")]
         everything = sum(p.stat().st_size for p in out.rglob("*") if p.is_file())
     return {
@@ -81,6 +90,9 @@ def timed(scenes: int, workers: int, overrides: list[str]) -> dict[str, object]:
         "quarantined": len(report.quarantined),
         "seconds": report.seconds,
         "episodes_per_s": report.episodes / report.seconds,
+        "cpu_s": cpu_s,
+        "episodes_per_cpu_s": report.episodes / cpu_s,
+        "cores_kept_busy": cpu_s / report.seconds,
         "bytes_per_episode": sum(sizes) / report.episodes,
         "bytes_per_episode_with_scenes_and_assets": everything / report.episodes,
         "memory": memory.summary(),
