@@ -68,7 +68,7 @@ class Memory:
 
 
 def workers_cpu_s() -> float:
-    """Processor time of all ended child processes: what other work on the machine cannot stretch."""
+    """Processor time of all ended child processes: other work on the machine cannot stretch it."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
