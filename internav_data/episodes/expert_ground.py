@@ -25,6 +25,7 @@ THINGS_AT_MOST: Final = 62
 """Bits of a mask; things beyond, the farthest from the start and the goal, count as fixed."""
 PICK_PRICE: Final = 1
 PUSH_PRICE: Final = 2
+FURNITURE_PRICE: Final = 2
 DROP_PRICE: Final = 2
 """What moving a thing out of the way costs at a guess. A low one searches more and finds more."""
 EVERYTHING: Final = (1 << THINGS_AT_MOST) - 1
@@ -104,9 +105,12 @@ class Ground:
         """(62,) int64: what moving each thing costs at a guess; picking needs an empty hand."""
         prices = np.zeros(THINGS_AT_MOST, dtype=np.int64)
         full = DROP_PRICE if world.held >= 0 else 0
+        furniture = len(world.stage.items)
         for bit, k in enumerate(self.things):
             pickable = world.items[k].asset.pickable
             prices[bit] = PICK_PRICE + full if pickable else PUSH_PRICE
+            # It stands in groups and against walls, where pushes are slow to solve and seldom help.
+            prices[bit] += FURNITURE_PRICE if k < furniture else 0
         return prices
 
     def pose(self, world: World) -> int:

@@ -39,10 +39,12 @@ if TYPE_CHECKING:
     Costs = NDArray[np.int32]
     Ints = NDArray[np.int64]
 
-TRIES: Final = 48
+TRIES: Final = 30
 """Interactions asked of the world; those that are too heavy cost nothing and do not count."""
-TRIES_MORE: Final = 6
+TRIES_MORE: Final = 4
 """Interactions still tried once a plan is known."""
+ENOUGH: Final = 0.95
+"""A plan is good enough once no other promises to be shorter than this share of it."""
 VISITS: Final = 400
 SIGHTS: Final = 40
 """Poses that are asked whether they see a thing."""
@@ -91,7 +93,7 @@ class _Search:
             if not self.queue or self.tries_left <= 0:
                 break
             promise, _, _, entry = heappop(self.queue)
-            if promise >= self.bound:
+            if promise >= self.bound or (self.best and promise > self.bound * ENOUGH):
                 break
             if isinstance(entry, Visit):
                 self._visit(entry, promise)
