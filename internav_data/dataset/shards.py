@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -13,7 +15,7 @@ from internav_data.dataset.files import link_or_copy
 from internav_data.dataset.manifest import DataFile, Manifest, locate
 from internav_data.dataset.parquet import FileInfo, read_table, write_table
 from internav_data.dataset.tables import ASSETS, EPISODES, SCENES, TableSpec
-from internav_data.dataset.work import SceneState, read_scene_work, work_dir
+from internav_data.dataset.work import SceneState, read_scene_rows, work_dir
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -55,14 +57,17 @@ class SceneSource:
 
     def rows(self, spec: TableSpec[Any], scenes: Sequence[str]) -> pa.Table:
         """Return the rows of scenes in order."""
-        tables = [spec.schema.empty_table()]
-        for scene_id in scenes:
-            if scene_id in self._states:
-                work = read_scene_work(work_dir(self._out), self._states[scene_id].scene)
-                tables.append(work.house if spec is SCENES else work.episodes)
-            else:
-                tables.append(self._old_rows(spec, scene_id))
+        # Reading is the one serial part of a run; pyarrow and hashlib let threads share it.
+        with ThreadPoolExecutor() as threads:
+            new = [scene_id for scene_id in scenes if scene_id in self._states]
+            read = dict(zip(new, threads.map(partial(self._new_rows, spec), new), strict=True))
+        rows = (read[k] if k in read else self._old_rows(spec, k) for k in scenes)
+        tables = [spec.schema.empty_table(), *rows]
         return pa.concat_tables(tables).combine_chunks()
+
+    def _new_rows(self, spec: TableSpec[Any], scene_id: str) -> pa.Table:
+        scene = self._states[scene_id].scene
+        return read_scene_rows(work_dir(self._out), scene, house=spec is SCENES)
 
     def _old_rows(self, spec: TableSpec[Any], scene_id: str) -> pa.Table:
         file = self._home.get((spec.name, scene_id))

@@ -130,6 +130,25 @@ def read_scene_work(work: Path, scene: int) -> SceneWork:
         Missing or damaged.
 
     """
+    state, house, episodes = _parts(work, scene)
+    return SceneWork(state, _table(house), _table(episodes))
+
+
+def read_scene_rows(work: Path, scene: int, *, house: bool) -> pa.Table:
+    """Return one of a scene's two tables, its house's or its episodes', without the other.
+
+    Raises
+    ------
+    CorruptDataError
+        Missing or damaged.
+
+    """
+    _, houses, episodes = _parts(work, scene)
+    return _table(houses if house else episodes)
+
+
+def _parts(work: Path, scene: int) -> tuple[SceneState, pa.Buffer, pa.Buffer]:
+    """Check a scene's file and cut it into its state and its two streams."""
     path = scene_file(work, scene)
     try:
         data = path.read_bytes()
@@ -137,13 +156,16 @@ def read_scene_work(work: Path, scene: int) -> SceneWork:
         raise CorruptDataError(f"{path}: scene {scene} is not finished: generate again") from None
     state = _state(path, data)
     start = _HEAD + 4 + int.from_bytes(data[_HEAD : _HEAD + 4], "little")
-    tables = []
+    streams = []
     for _ in range(2):
         length = int.from_bytes(data[start : start + 8], "little")
-        buffer = pa.py_buffer(data[start + 8 : start + 8 + length])
-        tables.append(pa.ipc.open_stream(buffer).read_all())
+        streams.append(pa.py_buffer(data[start + 8 : start + 8 + length]))
         start += 8 + length
-    return SceneWork(state, tables[0], tables[1])
+    return state, streams[0], streams[1]
+
+
+def _table(stream: pa.Buffer) -> pa.Table:
+    return pa.ipc.open_stream(stream).read_all()
 
 
 def _write(work: Path, scene: SceneWork) -> Path:
