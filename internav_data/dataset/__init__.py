@@ -33,7 +33,7 @@ from internav_data.dataset.tables import (
 from internav_data.dataset.work import (
     SceneState,
     finished_scenes,
-    read_scene_work,
+    read_scene_rows,
     work_dir,
     write_quarantine,
     write_scene_work,
@@ -65,7 +65,7 @@ __all__ = [
     "logical_digest",
     "open_work",
     "read_manifest",
-    "read_scene_work",
+    "read_scene_rows",
     "read_table",
     "schema_folder",
     "schema_text",

@@ -121,19 +121,6 @@ def finished_scenes(work: Path, scenes: Iterable[int] | None = None) -> dict[int
     return dict(sorted(states.items()))
 
 
-def read_scene_work(work: Path, scene: int) -> SceneWork:
-    """Return a scene's stored rows.
-
-    Raises
-    ------
-    CorruptDataError
-        Missing or damaged.
-
-    """
-    state, house, episodes = _parts(work, scene)
-    return SceneWork(state, _table(house), _table(episodes))
-
-
 def read_scene_rows(work: Path, scene: int, *, house: bool) -> pa.Table:
     """Return one of a scene's two tables, its house's or its episodes', without the other.
 

@@ -22,7 +22,7 @@ from internav_data.dataset import (
     load_dataset,
     open_work,
     read_manifest,
-    read_scene_work,
+    read_scene_rows,
     shards,
     write_quarantine,
     write_scene_work,
@@ -213,7 +213,7 @@ def test_damaged_work_counts_as_not_done(tmp_path):
         path.write_bytes(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :])
         assert set(finished_scenes(work)) == {0, 1, 3}
         with pytest.raises(CorruptDataError):
-            read_scene_work(work, 2)
+            read_scene_rows(work, 2, house=False)
     path.write_bytes(data[:-5])
     assert set(finished_scenes(work, range(3))) == {0, 1}
 
