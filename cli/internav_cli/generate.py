@@ -40,6 +40,17 @@ under way. Any number of workers gives the same bytes.""",
     default=None,
     help="Each split draws its obstacles from its own share of the assets.",
 )
+@click.option(
+    "--keep-unsolvable",
+    is_flag=True,
+    default=None,
+    help="Keep episodes without an expert, marked by a null, rather than draw them again.",
+)
+@click.option(
+    "--push-model",
+    type=click.Choice(["force", "kick"]),
+    help="200 N up to 2 m/s, or 2 m/s at once for every mass.  [default: force]",
+)
 @click.option("--dry-run", is_flag=True, help="Tell time and size; write nothing.")
 @click.option("--print-config", is_flag=True, help="Print all settings as TOML and stop.")
 @click.option("--scene", type=int, help="Make this scene only and print it as JSON.")
@@ -52,6 +63,8 @@ def command(
     episodes_per_scene: int | None,
     workers: int | None,
     unseen_assets: bool | None,
+    keep_unsolvable: bool | None,
+    push_model: str | None,
     dry_run: bool,
     print_config: bool,
     scene: int | None,
@@ -64,6 +77,8 @@ def command(
         **settings,
         episodes_per_scene=episodes_per_scene,
         episodes__unseen_assets=unseen_assets,
+        episodes__keep_unsolvable=keep_unsolvable,
+        episodes__push_model=push_model,
     )
     if print_config:
         from internav_data.generation.toml import config_toml

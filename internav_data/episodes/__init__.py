@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 from internav_data.episodes.config import EpisodeConfig
 
 if TYPE_CHECKING:
-    from internav_data.episodes.build import build_episodes, mode_of
+    from internav_data.episodes.build import Batch, build_batch, build_episodes, mode_of
     from internav_data.episodes.site import Site
 
-__all__ = ["EpisodeConfig", "Site", "build_episodes", "mode_of"]
+__all__ = ["Batch", "EpisodeConfig", "Site", "build_batch", "build_episodes", "mode_of"]
 
-_HOMES = {"Site": "site", "build_episodes": "build", "mode_of": "build"}
+_HOMES = {"Site": "site"} | dict.fromkeys(
+    ("Batch", "build_batch", "build_episodes", "mode_of"), "build"
+)
 
 
 def __getattr__(name: str) -> object:

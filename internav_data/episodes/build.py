@@ -1,15 +1,22 @@
-"""House to episodes: start and goal, obstacles, and every predicate judged on stored values."""
+"""House to episodes: start, goal and obstacles, what each interaction would do, and an expert.
+
+Every predicate is judged on stored values.
+"""
 
 from __future__ import annotations
 
+from collections import Counter
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from internav_data.episodes.config import EpisodeConfig
+from internav_data.episodes.expert import solve
+from internav_data.episodes.outcomes import outcomes_of
 from internav_data.episodes.site import Site
 from internav_data.episodes.spawn import Way, spawn
-from internav_data.geometry import Polygons, round_m
+from internav_data.geometry import round_m
 from internav_data.navigation import SPACING_M, node_paths
 from internav_data.records import (
     Episode,
@@ -22,19 +29,28 @@ from internav_data.records import (
     generator,
 )
 from internav_data.records.errors import QuarantineError
-from internav_data.world import engine_of_this_process
+from internav_data.world import World, engine_of_this_process
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.random import Generator
 
     from internav_data.episodes.spawn import Spawned
-    from internav_data.records import Asset, House
+    from internav_data.records import Asset, Expert, House, Outcome, Redraw
 
 PAIRS = 64
 """Pairs of nodes drawn for one start and goal; most are far enough apart."""
 QUARTER_TURNS = (0, 90, 180, 270)
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """Episodes of a house, and how often something was drawn again for them."""
+
+    episodes: tuple[Episode, ...]
+    redraws: Mapping[str, int]
+    """By reason (a `Redraw`); reasons that did not occur are left out."""
 
 
 def build_episodes(
@@ -69,11 +85,28 @@ def build_episodes(
         An episode cannot be made within the stated bounds.
 
     """
+    return build_batch(house, count, pool, config, first=first, attempt=attempt).episodes
+
+
+def build_batch(
+    house: House,
+    count: int,
+    pool: Sequence[Asset],
+    config: EpisodeConfig | None = None,
+    *,
+    first: int = 0,
+    attempt: int = 0,
+) -> Batch:
+    """Make episodes as `build_episodes` does, and say how often something was drawn again."""
     config = config or EpisodeConfig()
     site = Site.of(house)
-    return tuple(
-        _build_episode(site, index, pool, config, attempt) for index in range(first, first + count)
-    )
+    redraws: Counter[Redraw] = Counter()
+    episodes = []
+    for index in range(first, first + count):
+        episode, again = _build_episode(site, index, pool, config, attempt)
+        episodes.append(episode)
+        redraws += again
+    return Batch(tuple(episodes), dict(sorted(redraws.items())))
 
 
 def mode_of(scene: int, index: int) -> Mode:
@@ -83,22 +116,50 @@ def mode_of(scene: int, index: int) -> Mode:
 
 def _build_episode(
     site: Site, index: int, pool: Sequence[Asset], config: EpisodeConfig, attempt: int
-) -> Episode:
+) -> tuple[Episode, Counter[Redraw]]:
     house = site.house
+    again: Counter[Redraw] = Counter()
     for draw in range(config.redraws):
-        place = generator(house.seed, Purpose.EPISODE, house.scene, attempt, index, draw)
-        way = _draw_way(site, mode_of(house.scene, index), config, place)
-        if way is None:
-            continue
-        rng = generator(house.seed, Purpose.SPAWN, house.scene, attempt, index, draw)
-        if spawn(way, pool, rng):
-            yaw_deg = QUARTER_TURNS[int(place.integers(4))]
-            return _recorded(way, index, yaw_deg)
+        drawn = _draw(site, index, pool, config, (house.scene, attempt, index, draw))
+        if isinstance(drawn, Episode):
+            return drawn, again
+        again[drawn] += 1
+    reasons = ", ".join(f"{reason}: {count}" for reason, count in sorted(again.items()))
     raise QuarantineError(
         f"{house.scene_id}, episode {index}: no start and goal could be "
-        f"{mode_of(house.scene, index)} in {config.redraws} draws; "
+        f"{mode_of(house.scene, index)} in {config.redraws} draws ({reasons}); "
         "raise episodes.max_obstacles or episodes.redraws, or furnish less"
     )
+
+
+def _draw(
+    site: Site,
+    index: int,
+    pool: Sequence[Asset],
+    config: EpisodeConfig,
+    key: tuple[int, int, int, int],
+) -> Episode | Redraw:
+    """Draw a start, a goal and obstacles: an episode, or why to draw again."""
+    seed = site.house.seed
+    place = generator(seed, Purpose.EPISODE, *key)
+    way = _draw_way(site, mode_of(site.house.scene, index), config, place)
+    if way is None:
+        return "no two nodes far enough apart"
+    if not spawn(way, pool, generator(seed, Purpose.SPAWN, *key)):
+        return "condition not reached"
+    yaw_deg = QUARTER_TURNS[int(place.integers(4))]
+    world = World(
+        site.stage,
+        [(o.asset, o.settled.pose) for o in way.obstacles],
+        (*way.start, yaw_deg // 90),
+        way.goal,
+        config.push_model,
+    )
+    # The expert comes first: what it cannot solve needs no outcomes.
+    expert = solve(world)
+    if expert is None and not config.keep_unsolvable:
+        return "no expert"
+    return _recorded(way, index, world, expert)
 
 
 def _draw_way(site: Site, mode: Mode, config: EpisodeConfig, rng: Generator) -> Way | None:
@@ -158,12 +219,10 @@ def _point(node: tuple[int, int]) -> tuple[float, float]:
     return SPACING_M * node[0], SPACING_M * node[1]
 
 
-def _recorded(way: Way, index: int, yaw_deg: int) -> Episode:
+def _recorded(way: Way, index: int, world: World, expert: Expert | None) -> Episode:
     """Write down a finished way; its predicates are judged on the rounded poses."""
-    house = way.site.house
-    here, there = _point(way.start), _point(way.goal)
-    obstacles = Polygons.joined(o.footprint for o in way.obstacles)
-    way_m = way.site.ways.distance(here, there, obstacles)
+    house, way_m = way.site.house, world.way_m()
+    outcomes = outcomes_of(world)
     return Episode(
         episode_id=f"{house.scene_id}/{index:04d}",
         scene_id=house.scene_id,
@@ -177,21 +236,21 @@ def _recorded(way: Way, index: int, yaw_deg: int) -> Episode:
         obstacle_count=len(way.obstacles),
         clear_m=way.clear_m,
         clear_steps=way.clear_steps,
-        way_m=None if way_m is None else round_m(way_m),
+        way_m=way_m,
         steps=way.steps,
-        start=Start(*way.start, *here, yaw_deg, way.start_room),
-        goal=Goal(*way.goal, *there, way.goal_room),
+        start=Start(*way.start, *_point(way.start), 90 * world.quarter, way.start_room),
+        goal=Goal(*way.goal, *_point(way.goal), way.goal_room),
         room_paths=way.room_paths,
         room_paths_cut=way.room_paths_cut,
         node_paths=way.node_paths,
         node_paths_cut=way.node_paths_cut,
-        obstacles=tuple(_obstacle(o) for o in way.obstacles),
-        expert=None,
+        obstacles=tuple(map(_obstacle, way.obstacles, outcomes)),
+        expert=expert,
         physics=_physics(way),
     )
 
 
-def _obstacle(spawned: Spawned) -> Obstacle:
+def _obstacle(spawned: Spawned, outcomes: tuple[Outcome, ...]) -> Obstacle:
     asset, pose = spawned.asset, spawned.settled.pose
     return Obstacle(
         asset_id=asset.asset_id,
@@ -207,7 +266,7 @@ def _obstacle(spawned: Spawned) -> Obstacle:
         segment=spawned.segment,
         settle_s=spawned.settled.seconds,
         settle_penetration_m=spawned.settled.penetration_m,
-        outcomes=None,
+        outcomes=outcomes,
     )
 
 

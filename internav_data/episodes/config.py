@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from internav_data.records.errors import UsageError
+
+PUSH_MODELS = ("force", "kick")
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +26,10 @@ class EpisodeConfig:
     """Spots tried for the obstacles of one start and goal."""
     redraws: int = 50
     """Starts and goals tried for one episode."""
+    keep_unsolvable: bool = False
+    """Keep episodes for which the expert finds no plan, their `expert` null; else draw again."""
+    push_model: Literal["force", "kick"] = "force"
+    """Of outcomes, expert and environments: 200 N up to 2 m/s, or 2 m/s at once for every mass."""
     unseen_assets: bool = False
     """Each split draws its obstacles from its own share of the assets (2/3, 1/6, 1/6)."""
 
@@ -41,6 +48,10 @@ class EpisodeConfig:
             ),
             (self.spots < 1, f"spots: expected at least 1, got {self.spots}"),
             (self.redraws < 1, f"redraws: expected at least 1, got {self.redraws}"),
+            (
+                self.push_model not in PUSH_MODELS,
+                f"push_model: expected one of {', '.join(PUSH_MODELS)}, got {self.push_model!r}",
+            ),
         ]
         for wrong, message in problems:
             if wrong:

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from internav_data.geometry import Polygons, house_footprints
-from internav_data.navigation import SPACING_M, Lattice, WayFinder, room_paths, rooms_of
+from internav_data.navigation import SPACING_M, room_paths, rooms_of
+from internav_data.world import Stage
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from internav_data.navigation import Lattice, WayFinder
     from internav_data.records import House, Vec2
 
 
@@ -21,11 +23,14 @@ class Site:
     """A furnished house with its lattice, its ways and the nodes where agents can be put."""
 
     house: House
+    stage: Stage
+    """What the worlds of its episodes share."""
     footprints: Polygons
     """All that stands in the house, walls first."""
     lattice: Lattice
-    """Of the house without obstacles. Never changed: copy it."""
+    """The stage's: of the house without obstacles. Never changed: copy it."""
     ways: WayFinder
+    """The stage's, all furniture in its place."""
     nodes: NDArray[np.int64]
     """Free nodes of the largest component, shape (n, 2), in order of i, then j."""
     rooms: NDArray[np.int64]
@@ -38,15 +43,17 @@ class Site:
     @staticmethod
     def of(house: House) -> Site:
         """Work out what the episodes of a house share."""
-        lattice = Lattice.of(house)
+        stage = Stage.of(house)
+        lattice = stage.lattice
         components = lattice.components()
         sizes = np.bincount(components[components >= 0].ravel(), minlength=1)
         nodes = np.argwhere(components == int(np.argmax(sizes)))
         return Site(
             house=house,
+            stage=stage,
             footprints=house_footprints(house),
             lattice=lattice,
-            ways=WayFinder.of(house),
+            ways=stage.ways(),
             nodes=nodes.astype(np.int64),
             rooms=rooms_of(house, SPACING_M * nodes.astype(np.float64)),
         )

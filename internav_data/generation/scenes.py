@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from internav_data.records.errors import QuarantineError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from internav_data.catalog import Catalogue
     from internav_data.generation.config import GenerationConfig
@@ -27,6 +27,8 @@ class Scene:
     house: House
     episodes: tuple[Episode, ...]
     attempts: int
+    redraws: Mapping[str, int]
+    """How often something was drawn again for its episodes, by reason."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +53,7 @@ def build_scene(
         No attempt succeeded; it says why the last one failed.
 
     """
-    from internav_data.episodes import build_episodes  # noqa: PLC0415 - numba, pybullet when used
+    from internav_data.episodes import build_batch  # noqa: PLC0415 - numba, pybullet when used
     from internav_data.houses import build_house  # noqa: PLC0415 - as above
 
     reason = ""
@@ -60,11 +62,11 @@ def build_scene(
             house = build_house(config.seed, scene, config.house, catalogue, attempt)
             count = config.episodes_of(house.split) if episodes is None else episodes
             pool = obstacle_pool(catalogue, config, house.split)
-            made = build_episodes(house, count, pool, config.episodes, attempt=attempt)
+            made = build_batch(house, count, pool, config.episodes, attempt=attempt)
         except QuarantineError as error:
             reason = str(error)
         else:
-            return Scene(house, made, attempt + 1)
+            return Scene(house, made.episodes, attempt + 1, made.redraws)
     raise QuarantineError(reason)
 
 
@@ -86,7 +88,14 @@ def scene_maker(payload: ScenePayload) -> Callable[[int], int]:
 
     def make(scene: int) -> int:
         built = build_scene(scene, config, assets)
-        write_scene_work(work, scene, built.house, built.episodes, attempts=built.attempts)
+        write_scene_work(
+            work,
+            scene,
+            built.house,
+            built.episodes,
+            redraws=built.redraws,
+            attempts=built.attempts,
+        )
         return len(built.episodes)
 
     return make

@@ -10,6 +10,7 @@ from internav_data.records.episodes import (
     Obstacle,
     Outcome,
     Physics,
+    Redraw,
     Start,
 )
 from internav_data.records.errors import InternavError
@@ -51,6 +52,7 @@ __all__ = [
     "Preset",
     "Purpose",
     "Quaternion",
+    "Redraw",
     "Room",
     "Shape",
     "Split",

@@ -9,6 +9,9 @@ from internav_data.records.houses import Split
 from internav_data.records.poses import Pose, Quaternion, Vec2
 
 Mode = Literal["blocked", "lengthened"]
+Redraw = Literal["no two nodes far enough apart", "condition not reached", "no expert"]
+"""Why a start and goal were drawn again: none were found, spots or obstacles ran out before the
+mode's condition held, or the expert found no plan."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,13 +10,23 @@ import pytest
 import shapely
 
 from internav_data.catalog import catalogue
-from internav_data.episodes import EpisodeConfig, build_episodes, mode_of
+from internav_data.episodes import EpisodeConfig, build_batch, build_episodes, mode_of
+from internav_data.episodes.expert import replay
+from internav_data.episodes.outcomes import outcomes_of
 from internav_data.episodes.spawn import NEAR_M
 from internav_data.geometry import asset_corners, footprint, house_footprints, transform
 from internav_data.houses import HouseConfig, build_house
 from internav_data.records import Pose
 from internav_data.records.errors import QuarantineError, UsageError
-from internav_data.world import Body, Setting, engine_of_this_process, wall_body
+from internav_data.world import (
+    Action,
+    Body,
+    Setting,
+    Stage,
+    World,
+    engine_of_this_process,
+    wall_body,
+)
 from internav_data.world.setting import UPRIGHT
 
 SCENES = (0, 1, 6)
@@ -189,6 +199,86 @@ def test_obstacles_stay_at_rest_in_a_whole_scene_of_bullet(houses, episodes):
             )
             corners, _ = asset_corners(assets[obstacle.asset_id])
             assert transform(corners, rest.pose)[:, 2].min() > -0.002
+
+
+def test_outcomes_and_expert_are_those_of_a_fresh_world(houses, episodes):
+    for scene, batch in episodes.items():
+        stage = Stage.of(houses[scene])
+        for episode in batch:
+
+            def world(stage=stage, episode=episode):
+                return World.of_episode(stage, episode, catalogue().assets)
+
+            assert tuple(o.outcomes for o in episode.obstacles) == outcomes_of(world())
+            assert replay(world(), episode.expert.actions) == episode.expert
+            # What the columns say of the start is what the world says.
+            assert (world().steps(), world().way_m()) == (episode.steps, episode.way_m)
+
+
+def test_the_expert_acts_where_the_grid_is_blocked(episodes):
+    for episode in itertools.chain(*episodes.values()):
+        assert episode.expert.actions[-1] == Action.DONE
+        if episode.mode == "blocked":
+            assert episode.expert.pushes + episode.expert.picks >= 1
+
+
+@pytest.fixture(scope="module")
+def refused(pool):
+    """A house with an episode whose first draws no expert could solve, and that episode's index."""
+    house = build_house(0, 3, HouseConfig(), catalogue())
+    for index in range(1, 40, 2):  # of an odd scene these are the blocked ones
+        batch = build_batch(house, 1, pool, first=index)
+        if batch.redraws.get("no expert"):
+            return house, index, batch
+    pytest.fail("the expert solves everything in this house: choose another")
+
+
+def test_an_episode_without_expert_is_drawn_again_and_counted(refused, pool):
+    house, index, batch = refused
+    (episode,) = batch.episodes
+    assert episode.expert is not None
+    draws = sum(batch.redraws.values())
+    # With one draw less than it took, there is none.
+    with pytest.raises(QuarantineError, match=rf"in {draws} draws .*no expert: \d"):
+        build_batch(house, 1, pool, EpisodeConfig(redraws=draws), first=index)
+    again = build_batch(house, 1, pool, EpisodeConfig(redraws=draws + 1), first=index)
+    assert again == batch
+
+
+def test_kept_without_expert_it_is_marked_and_has_outcomes(refused, pool):
+    house, index, batch = refused
+    kept = build_batch(house, 1, pool, EpisodeConfig(keep_unsolvable=True), first=index)
+    (episode,) = kept.episodes
+    assert episode.expert is None
+    assert "no expert" not in kept.redraws
+    assert episode != batch.episodes[0]
+    world = World.of_episode(Stage.of(house), episode, catalogue().assets)
+    assert tuple(o.outcomes for o in episode.obstacles) == outcomes_of(world)
+
+
+def test_redraws_of_a_batch_are_those_of_its_episodes(houses, pool):
+    whole = build_batch(houses[6], 4, pool)
+    parts = [build_batch(houses[6], 1, pool, first=index) for index in range(4)]
+    counts = {}
+    for part in parts:
+        for reason, count in part.redraws.items():
+            counts[reason] = counts.get(reason, 0) + count
+    assert dict(whole.redraws) == counts
+    assert whole.episodes == tuple(part.episodes[0] for part in parts)
+
+
+def test_the_push_model_is_the_configs(houses, pool):
+    kick = EpisodeConfig(push_model="kick", keep_unsolvable=True)
+    stage = Stage.of(houses[1])
+    made = build_episodes(houses[1], 3, pool, kick)
+    for episode in made:
+        world = World.of_episode(stage, episode, catalogue().assets, "kick")
+        assert tuple(o.outcomes for o in episode.obstacles) == outcomes_of(world)
+        assert episode.expert is None or replay(world, episode.expert.actions) == episode.expert
+    forced = build_episodes(houses[1], 3, pool, EpisodeConfig(keep_unsolvable=True))
+    assert [e.obstacles for e in made] != [e.obstacles for e in forced]
+    with pytest.raises(UsageError, match=r"episodes.push_model: expected .* got 'shove'"):
+        EpisodeConfig(push_model="shove").check()
 
 
 def test_an_impossible_episode_is_quarantined_and_named(houses, pool):

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from types import SimpleNamespace
 
 import pytest
 import scene_stubs
@@ -65,7 +66,7 @@ def test_a_dataset_that_holds_something_else_is_told(dataset, monkeypatch):
 
 
 @pytest.mark.parametrize("fails", range(ATTEMPTS + 1))
-@pytest.mark.parametrize("room", ["houses.build_house", "episodes.build_episodes"])
+@pytest.mark.parametrize("room", ["houses.build_house", "episodes.build_batch"])
 def test_sub_seeds_are_tried_before_a_scene_is_given_up(monkeypatch, room, fails):
     tried = []
 
@@ -79,12 +80,13 @@ def test_sub_seeds_are_tried_before_a_scene_is_given_up(monkeypatch, room, fails
         refused("build_house", attempt)
         return scene_stubs.house(seed, scene)
 
-    def build_episodes(house, count, _pool, _config, *, attempt):
-        refused("build_episodes", attempt)
-        return tuple(scene_stubs.episode(house, index) for index in range(count))
+    def build_batch(house, count, _pool, _config, *, attempt):
+        refused("build_batch", attempt)
+        made = tuple(scene_stubs.episode(house, index) for index in range(count))
+        return SimpleNamespace(episodes=made, redraws={})
 
     monkeypatch.setattr("internav_data.houses.build_house", build_house, raising=False)
-    monkeypatch.setattr("internav_data.episodes.build_episodes", build_episodes, raising=False)
+    monkeypatch.setattr("internav_data.episodes.build_batch", build_batch, raising=False)
     if fails < ATTEMPTS:
         assert build_scene(2, CONFIG, scene_stubs.CATALOGUE).attempts == fails + 1
     else:
