@@ -165,9 +165,12 @@ class Canvas:
         """Rows and columns of the oversampled picture that a rectangle covers."""
         corners = self._fixed([low, high])[:, 0].astype(np.float64) / 2**_SHIFT
         height, width = self.image.shape[:2]
+        top, bottom = math.floor(corners[1, 1]), math.ceil(corners[0, 1]) + 1
+        left, right = math.floor(corners[0, 0]), math.ceil(corners[1, 0]) + 1
+        # Nothing, rather than the picture's other end, for what lies outside.
         return (
-            slice(max(0, math.floor(corners[1, 1])), min(height, math.ceil(corners[0, 1]) + 1)),
-            slice(max(0, math.floor(corners[0, 0])), min(width, math.ceil(corners[1, 0]) + 1)),
+            slice(min(max(0, top), height), min(max(0, bottom), height)),
+            slice(min(max(0, left), width), min(max(0, right), width)),
         )
 
     def metres(self, window: tuple[slice, slice]) -> tuple[Floats, Floats]:

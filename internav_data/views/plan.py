@@ -80,10 +80,17 @@ def house_canvas(house: House, pixels: int) -> Canvas:
     return Canvas(low, high, pixels, PAPER)
 
 
-def paint_house(canvas: Canvas, house: House, on_way: Collection[int] | None = None) -> None:
-    """Paint floors, shadows, things, walls, windows and doors, in this order.
+def paint_house(
+    canvas: Canvas,
+    house: House,
+    on_way: Collection[int] | None = None,
+    *,
+    scale_at: Vec2 | None = None,
+) -> None:
+    """Paint floors, shadows, things, walls, windows and doors, in this order; then a scale.
 
-    Where rooms `on_way` are given these are tinted, and the other rooms' floors pale.
+    Where rooms `on_way` are given these are tinted, and the other rooms' floors pale. The scale's
+    lower left corner is below the house's, or at `scale_at`.
     """
     for room in house.rooms:
         paint_floor(canvas, house, room)
@@ -110,7 +117,8 @@ def paint_house(canvas: Canvas, house: House, on_way: Collection[int] | None = N
         _paint_door(canvas, house, door)
     for window in house.windows:
         _paint_window(canvas, window)
-    _paint_scale(canvas, house)
+    below = (min(p[0] for p in house.outline), min(p[1] for p in house.outline) - 0.45)
+    _paint_scale(canvas, scale_at or below)
 
 
 def _rectangle(wall: Wall) -> list[Vec2]:
@@ -184,13 +192,13 @@ def _paint_window(canvas: Canvas, window: Window) -> None:
     canvas.line(_band(frame, window.width_m, _WALL_M), _WALL, 0.8, closed=True)
 
 
-def _paint_scale(canvas: Canvas, house: House) -> None:
-    """Draw a bar of two metres below the house."""
-    x, y = min(p[0] for p in house.outline), min(p[1] for p in house.outline) - 0.45
+def _paint_scale(canvas: Canvas, at: Vec2) -> None:
+    """Draw a bar of two metres."""
+    x, y = at
     for k, colour in ((0, INK), (1, PAPER)):
         canvas.fill([(x + k, y), (x + k + 1, y), (x + k + 1, y + 0.09), (x + k, y + 0.09)], colour)
     canvas.line([(x, y), (x + 2, y), (x + 2, y + 0.09), (x, y + 0.09)], INK, 1.0, closed=True)
-    canvas.text((x + 2.12, y + 0.045), "2 m", 8.0, INK, anchor="left")
+    canvas.text((x + 2.12, y + 0.045), "2 m", 8.0, INK, anchor="left", halo=PAPER)
 
 
 def paint_labels(canvas: Canvas, house: House, taken: Sequence[Floats]) -> None:

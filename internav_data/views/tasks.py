@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -23,9 +23,12 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Image = NDArray[np.uint8]
 
+Kind = Literal["push", "pick", "fixed"]
 PUSHABLE: RGB = (255, 211, 38)
 PICKABLE: RGB = (255, 238, 130)
 FIXED: RGB = (228, 150, 20)
+COLOURS: dict[Kind, RGB] = {"push": PUSHABLE, "pick": PICKABLE, "fixed": FIXED}
+NAMES: dict[Kind, str] = {"push": "pushable", "pick": "pickable", "fixed": "fixed"}
 _RIM: RGB = (48, 36, 8)
 START: RGB = (40, 148, 84)
 GOAL: RGB = (36, 104, 214)
@@ -85,14 +88,14 @@ def draw_episode(
     if way is not None and len(way) > 1:
         canvas.line(way, _WAY, 1.6)
     for obstacle, parts in zip(episode.obstacles, shapes, strict=True):
-        _paint_obstacle(canvas, obstacle, parts)
-    _paint_start(canvas, episode)
-    _paint_goal(canvas, episode)
+        paint_obstacle(canvas, obstacle_kind(obstacle), parts)
+    paint_start(canvas, episode)
+    paint_goal(canvas, episode)
     taken = [p.plan for parts in shapes for p in parts]
     taken += [canvas.arc(at, 0.45, 0.0, 360.0) for at in _ends(episode)]
     paint_labels(canvas, house, taken)
     for number, (obstacle, parts) in enumerate(zip(episode.obstacles, shapes, strict=True), 1):
-        _paint_number(canvas, number, obstacle, parts)
+        paint_number(canvas, number, COLOURS[obstacle_kind(obstacle)], parts)
     return with_caption(canvas.finished(), episode_lines(episode), _legend(episode))
 
 
@@ -108,7 +111,8 @@ def episode_lines(episode: Episode) -> list[str]:
         f"with obstacles {_with_obstacles(episode)}",
     ]
     things = [
-        f"{k} {o.type} {o.mass_kg:.1f} kg ({_kind(o)})" for k, o in enumerate(episode.obstacles, 1)
+        f"{k} {o.type} {o.mass_kg:.1f} kg ({obstacle_kind(o)})"
+        for k, o in enumerate(episode.obstacles, 1)
     ]
     return ["   ".join(first), "   ".join(things)] if things else ["   ".join(first)]
 
@@ -125,22 +129,17 @@ def _ends(episode: Episode) -> tuple[Vec2, Vec2]:
     return (episode.start.x, episode.start.y), (episode.goal.x, episode.goal.y)
 
 
-def _kind(obstacle: Obstacle) -> str:
+def obstacle_kind(obstacle: Obstacle) -> Kind:
+    """Return what can be done with an obstacle."""
     if obstacle.pickable:
         return "pick"
     return "push" if obstacle.pushable else "fixed"
 
 
-def _colour(obstacle: Obstacle) -> RGB:
-    return {"pick": PICKABLE, "push": PUSHABLE, "fixed": FIXED}[_kind(obstacle)]
-
-
 def _legend(episode: Episode) -> list[tuple[RGB, str]]:
-    kinds = {_kind(o) for o in episode.obstacles}
+    kinds = {obstacle_kind(o) for o in episode.obstacles}
     entries = [(START, "start"), (GOAL, "goal"), (TINT, "shortest room path"), (_PATH, "node path")]
-    names = {"push": "pushable", "pick": "pickable", "fixed": "fixed"}
-    colours = {"push": PUSHABLE, "pick": PICKABLE, "fixed": FIXED}
-    return entries + [(colours[k], f"{names[k]} obstacle") for k in names if k in kinds]
+    return entries + [(COLOURS[k], f"{NAMES[k]} obstacle") for k in NAMES if k in kinds]
 
 
 def _outlines(obstacle: Obstacle, assets: Mapping[str, Asset]) -> list[Outline]:
@@ -153,8 +152,9 @@ def _outlines(obstacle: Obstacle, assets: Mapping[str, Asset]) -> list[Outline]:
     return outlines(asset, obstacle.pose)
 
 
-def _paint_obstacle(canvas: Canvas, obstacle: Obstacle, parts: list[Outline]) -> None:
-    colour = _colour(obstacle)
+def paint_obstacle(canvas: Canvas, kind: Kind, parts: list[Outline]) -> None:
+    """Paint an obstacle in the colour of its kind, with a dark rim; a small one with a ring."""
+    colour = COLOURS[kind]
     low, high = _extent(parts)
     if float((high - low).max()) < _SMALL_M:
         middle = (float(low[0] + high[0]) / 2.0, float(low[1] + high[1]) / 2.0)
@@ -166,7 +166,7 @@ def _paint_obstacle(canvas: Canvas, obstacle: Obstacle, parts: list[Outline]) ->
     for part in parts:  # a dark rim around the whole thing
         canvas.line(part.plan, _RIM, 3.4, closed=True)
     paint(canvas, parts, line_px=0.8, colour=colour)
-    if _kind(obstacle) == "fixed":
+    if kind == "fixed":
         _hatch(canvas, parts)
 
 
@@ -186,7 +186,7 @@ def _extent(parts: list[Outline]) -> tuple[Floats, Floats]:
     return corners.min(axis=0), corners.max(axis=0)
 
 
-def _paint_number(canvas: Canvas, number: int, obstacle: Obstacle, parts: list[Outline]) -> None:
+def paint_number(canvas: Canvas, number: int, colour: RGB, parts: list[Outline]) -> None:
     """Put a badge on the obstacle, or beside it where it would hide it."""
     low, high = _extent(parts)
     at = (low + high) / 2.0
@@ -195,11 +195,12 @@ def _paint_number(canvas: Canvas, number: int, obstacle: Obstacle, parts: list[O
         at = np.array([high[0] + 1.2 * radius, high[1] + 1.2 * radius])
     centre = (float(at[0]), float(at[1]))
     canvas.disc(centre, radius, INK)
-    canvas.disc(centre, radius, _colour(obstacle), 1.0)
+    canvas.disc(centre, radius, colour, 1.0)
     canvas.text(centre, str(number), 6.5, PAPER)
 
 
-def _paint_start(canvas: Canvas, episode: Episode) -> None:
+def paint_start(canvas: Canvas, episode: Episode) -> None:
+    """Paint the agent's disc where an episode begins, an arrow where it looks."""
     at = (episode.start.x, episode.start.y)
     turn = math.radians(episode.start.yaw_deg)
     ahead = np.array([math.cos(turn), math.sin(turn)])
@@ -213,7 +214,8 @@ def _paint_start(canvas: Canvas, episode: Episode) -> None:
     canvas.line(np.array(arrow), shaded(START, 0.5), 1.0, closed=True)
 
 
-def _paint_goal(canvas: Canvas, episode: Episode) -> None:
+def paint_goal(canvas: Canvas, episode: Episode) -> None:
+    """Paint a target of the agent's size."""
     at = (episode.goal.x, episode.goal.y)
     canvas.disc(at, _RADIUS_M, GOAL)
     canvas.disc(at, _RADIUS_M * 0.62, PAPER, 1.4)

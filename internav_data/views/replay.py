@@ -1,0 +1,185 @@
+"""Replays: the agent's camera beside the map, what it does in words, as frames of a film."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from internav_data.records.errors import UsageError
+from internav_data.views.replay_eye import EyePainter
+from internav_data.views.replay_map import MapPainter
+from internav_data.views.replay_shots import shots
+from internav_data.views.replay_story import Moment, played
+from internav_data.views.replay_strips import Footer, Header, title_card
+from internav_data.world import Stage
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from internav_data.records import RGB, Asset, Episode, House
+    from internav_data.views.replay_shots import Shot
+    from internav_data.views.replay_story import Story
+    from internav_data.world import PushModel
+
+    Image = NDArray[np.uint8]
+    Panel = Callable[[Moment], Image]
+
+SIZE: Final = 480
+"""Pixels a side of the camera's picture."""
+FPS: Final = 12.0
+SIZES: Final = (160, 1080)
+"""Smallest and largest camera picture a replay is made of."""
+_PAPER: Final[RGB] = (250, 249, 246)
+_EDGE: Final = 0.02
+"""Gaps, as a share of the camera's picture."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Replay:
+    """An episode played, ready to be drawn."""
+
+    story: Story
+    title: str
+
+    @property
+    def success(self) -> bool:
+        """Whether it ends with Done at the goal."""
+        return self.story.success
+
+    @property
+    def steps(self) -> int:
+        """How many actions were played."""
+        return self.story.moments[-1].step
+
+    def frames(
+        self, *, size: int = SIZE, fps: float = FPS, panel: Panel | None = None
+    ) -> Iterator[Image]:
+        """Draw it; see `replay_frames`."""
+        if not SIZES[0] <= size <= SIZES[1]:
+            raise UsageError(
+                f"a replay's camera has {SIZES[0]} to {SIZES[1]} pixels a side, got {size}"
+            )
+        if not 1.0 <= fps <= 60.0:
+            raise UsageError(f"a replay has 1 to 60 frames a second, got {fps}")
+        return self._frames(size, fps, panel)
+
+    def _frames(self, size: int, fps: float, panel: Panel | None) -> Iterator[Image]:
+        story = self.story
+        painter = _Painter(story, size, panel)
+        card = title_card(story, self.title, size)
+        for k, shot in enumerate(shots(story, fps)):
+            frame = painter.draw(shot, card if k == 0 else None)
+            for _ in range(shot.frames):
+                yield frame
+
+
+def replay(
+    house: House | Stage,
+    episode: Episode,
+    assets: Mapping[str, Asset],
+    actions: Sequence[int] | None = None,
+    *,
+    title: str | None = None,
+    model: PushModel = "force",
+) -> Replay:
+    """Play an episode; draw it later, as often as wanted. Parameters as in `replay_frames`."""
+    stage = house if isinstance(house, Stage) else Stage.of(house)
+    who = title or ("expert" if actions is None else "given actions")
+    return Replay(played(stage, episode, assets, actions, model), who)
+
+
+def replay_frames(
+    house: House | Stage,
+    episode: Episode,
+    assets: Mapping[str, Asset],
+    actions: Sequence[int] | None = None,
+    *,
+    size: int = SIZE,
+    fps: float = FPS,
+    panel: Panel | None = None,
+    title: str | None = None,
+    model: PushModel = "force",
+) -> Iterator[Image]:
+    """Play an episode and draw it: camera, map, words.
+
+    Parameters
+    ----------
+    house
+        The episode's house, or the stage made of it.
+    episode, assets
+        What to play, and what its obstacles are made of, by asset_id.
+    actions
+        Numbers of the twelve actions; -1 waits. The stored expert's by default.
+    size
+        Pixels a side of the camera's picture.
+    fps
+        Frames a second that the film will have: moves and slides are drawn in between.
+    panel
+        Called once for each moment (the start, then after each action); returns a picture
+        (size, w, 3) uint8 RGB of always the same width, drawn beside the map.
+    title
+        Who acts, for the title.
+    model
+        How pushes are answered: "force" or "kick".
+
+    Yields
+    ------
+    (h, w, 3) uint8 RGB, all of one size; a frame that stays is the same array again.
+
+    Raises
+    ------
+    UsageError
+        No expert, an unknown action, another house's episode, a size or rate out of bounds.
+    """
+    made = replay(house, episode, assets, actions, title=title, model=model)
+    return made.frames(size=size, fps=fps, panel=panel)
+
+
+class _Painter:
+    """Puts the pictures of a shot together."""
+
+    def __init__(self, story: Story, size: int, panel: Panel | None) -> None:
+        self._size, self._gap = size, max(4, 2 * round(size * _EDGE / 2.0))
+        self._eye, self._map = EyePainter(story, size), MapPainter(story, size)
+        self._panel, self._beside = panel, self._side(story.moments[0], panel)
+        self._moment = story.moments[0]
+        width = size + self._map.size[0] + 3 * self._gap
+        if self._beside is not None:
+            width += self._beside.shape[1] + self._gap
+        width += width % 2
+        self._header, self._footer = Header(story, width, size), Footer(story, width, size)
+        height = self._header.height + size + self._footer.height
+        self._blank: Image = np.empty((height + height % 2, width, 3), np.uint8)
+        self._blank[:] = _PAPER
+
+    def _side(self, moment: Moment, panel: Panel | None) -> Image | None:
+        if panel is None:
+            return None
+        picture = panel(moment)
+        if picture.shape[0] != self._size or picture.ndim != 3 or picture.dtype != np.uint8:
+            raise UsageError(
+                f"a replay's panel: expected a picture ({self._size}, w, 3) of uint8, got "
+                f"{picture.shape} of {picture.dtype}"
+            )
+        return picture
+
+    def draw(self, shot: Shot, card: Image | None) -> Image:
+        frame, gap = self._blank.copy(), self._gap
+        if self._panel is not None and shot.moment is not self._moment:
+            self._beside, self._moment = self._side(shot.moment, self._panel), shot.moment
+        pictures = [self._eye.draw(shot) if card is None else card, self._map.draw(shot)]
+        if self._beside is not None:
+            pictures.append(self._beside)
+        top, left = self._header.height, gap
+        frame[:top] = self._header.draw(shot)
+        for picture in pictures:
+            wide = picture.shape[1]
+            frame[top : top + self._size, left : left + wide] = picture
+            left += wide + gap
+        bottom = top + self._size
+        frame[bottom : bottom + self._footer.height] = self._footer.draw(shot)
+        return frame
