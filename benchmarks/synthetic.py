@@ -185,7 +185,7 @@ def _episode(
     mode = "blocked" if (house.scene + index) % 2 == 0 else "lengthened"
     clear = int(rng.integers(8, 70))
     obstacles = tuple(
-        _obstacle(rng, assets[int(rng.integers(len(assets)))], full)
+        _obstacle(rng, assets[int(rng.integers(len(assets)))], mode == "blocked", full)
         for _ in range(1 + int(rng.integers(2 + min(count, 6))))
     )
     way = None if mode == "blocked" and rng.random() < 0.5 else round(float(rng.uniform(2, 20)), 4)
@@ -211,7 +211,7 @@ def _episode(
         node_paths=tuple(node_paths),
         node_paths_cut=False,
         obstacles=obstacles,
-        expert=Expert(tuple(rng.integers(0, 12, 60).tolist()), 60, 1, 1, 11.0) if full else None,
+        expert=_expert(rng, index) if full else None,
         physics=Physics(
             "bullet",
             "3.2.7",
@@ -221,24 +221,23 @@ def _episode(
     )
 
 
-def _obstacle(rng: np.random.Generator, asset: Asset, full: bool) -> Obstacle:
+def _expert(rng: np.random.Generator, index: int) -> Expert | None:
+    """Actions as long as usual; none in a few episodes, as when unsolvable ones are kept."""
+    if index % 50 == 5:
+        return None
+    steps = int(rng.integers(10, 80))
+    pushes, picks = (int(count) for count in rng.integers(0, 3, 2))
+    return Expert(
+        tuple(rng.integers(0, 12, steps).tolist()), steps, pushes, picks, 0.25 * (steps // 2)
+    )
+
+
+def _obstacle(rng: np.random.Generator, asset: Asset, blocked: bool, full: bool) -> Obstacle:
     x, y = _point(rng, 15, 2)
     half = math.radians(15 * int(rng.integers(24))) / 2
     tilt = [round(float(v), 6) for v in rng.normal(0, 2e-5, 2)]
     yaw = (round(math.sin(half), 6), round(math.cos(half), 6))
-    outcomes = tuple(
-        Outcome(
-            action,
-            bool(rng.random() < 0.6),
-            round(float(rng.uniform(0, 1)), 4),
-            int(rng.integers(8, 90)),
-            round(float(rng.uniform(2, 20)), 4),
-            bool(rng.random() < 0.1),
-            round(int(rng.integers(100, 900)) / 240, 6),
-            "",
-        )
-        for action in _ACTIONS
-    )
+    outcomes = tuple(_outcome(rng, action, asset, blocked) for action in _ACTIONS)
     return Obstacle(
         asset_id=asset.asset_id,
         type=asset.type,
@@ -257,6 +256,21 @@ def _obstacle(rng: np.random.Generator, asset: Asset, full: bool) -> Obstacle:
     )
 
 
+def _outcome(rng: np.random.Generator, action: str, asset: Asset, blocked: bool) -> Outcome:
+    able = asset.pickable if action == "pick" else asset.pushable
+    success, opened = able and rng.random() < 0.6, blocked and rng.random() < 0.1
+    return Outcome(
+        action,
+        bool(success),
+        round(float(rng.uniform(0, 1)), 4),
+        int(rng.integers(8, 90)),
+        round(float(rng.uniform(2, 20)), 4),
+        bool(success and opened),
+        round(int(rng.integers(100, 900)) / 240, 6),
+        "",
+    )
+
+
 def write_synthetic(out: Path, scenes: int, episodes: int, *, full: bool = False) -> Manifest:
     """Write a dataset; `full` ones have outcomes and an expert in every episode."""
     assets = catalogue()
@@ -266,5 +280,6 @@ def write_synthetic(out: Path, scenes: int, episodes: int, *, full: bool = False
         rng = np.random.default_rng([scene, 1])
         house = _house(scene, rng, assets)
         rows = [_episode(house, index, rng, assets, full) for index in range(episodes)]
-        write_scene_work(work, scene, house, rows)
+        redraws = {"no expert": 1} if full and scene % 10 == 0 else {}
+        write_scene_work(work, scene, house, rows, redraws=redraws)
     return assemble(out, identity, assets, scenes)

@@ -47,6 +47,8 @@ def command(*, dataset: Path, split: str | None, as_json: bool) -> int:
     click.echo(
         f"clear_m: {_spread(stats['clear_m'])}; clear_steps: {_spread(stats['clear_steps'])}"
     )
+    for line in interaction_lines(stats):
+        click.echo(line)
     if stats["quarantined"]:
         click.echo(f"quarantined scenes: {stats['quarantined']}")
     return 0
@@ -63,6 +65,30 @@ def table2_lines(stats: dict[str, Any]) -> list[str]:
             f"{row['rooms']:<6}{row['episodes']:>9}" + "".join(f"{cell:>20}" for cell in cells)
         )
     return [*lines, "in brackets: Table 2 of the paper"]
+
+
+def interaction_lines(stats: dict[str, Any]) -> list[str]:
+    """Return what outcomes and experts are like, and how often something was drawn again."""
+    expert, lines = stats["expert"], []
+    for name in ("push", "pick"):
+        rows = [row for row in stats["outcomes"] if row["action"].startswith(name)]
+        possible = sum(row["possible"] for row in rows)
+        worked = sum(row["possible"] * row["success_share"] for row in rows)
+        lines.append(
+            f"{name}: {possible} possible, {worked / max(1, possible):.1%} succeed, "
+            f"{sum(row['opened'] for row in rows)} open a blocked way"
+        )
+    lines[-1] += f"; {stats['openable_share_of_blocked']:.1%} of the blocked open by one of these"
+    lines.append(
+        f"expert: solves {expert['solved']} ({expert['solved_share']:.1%}); steps "
+        f"{_spread(expert['steps'])}; {expert['pushes']:.2f} pushes, {expert['picks']:.2f} picks; "
+        f"SPL {expert['spl']:.3f}, STS {expert['sts']:.3f}"
+    )
+    again = ", ".join(f"{reason} {count}" for reason, count in stats["redraws"].items())
+    lines.append(
+        f"drawn again: {again or 'nothing'}; the expert refused {expert['refused_share']:.1%}"
+    )
+    return lines
 
 
 def _spread(figures: dict[str, float]) -> str:

@@ -4,6 +4,7 @@ from internav_data.dataset.commit import Identity, assemble, done_scenes, identi
 from internav_data.dataset.decode import from_table
 from internav_data.dataset.digest import logical_digest
 from internav_data.dataset.encode import to_table
+from internav_data.dataset.interactions import refused_share
 from internav_data.dataset.jsonschemas import (
     schema_folder,
     schema_text,
@@ -67,6 +68,7 @@ __all__ = [
     "read_manifest",
     "read_scene_rows",
     "read_table",
+    "refused_share",
     "schema_folder",
     "schema_text",
     "schemas",

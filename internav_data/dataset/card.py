@@ -27,6 +27,7 @@ def card_text(manifest: Manifest, stats: Stats) -> str:
         _front_matter(manifest),
         _summary(manifest, stats),
         _table2(stats),
+        _interactions(stats),
         _use(),
         "## Columns of an episode\n\n" + _columns(EPISODES),
         "## Columns of a scene\n\n" + _columns(SCENES),
@@ -87,6 +88,33 @@ def _table2(stats: Stats) -> str:
         for row in stats.table2
     ]
     return "\n".join(lines)
+
+
+def _interactions(stats: Stats) -> str:
+    expert = stats.expert
+    lines = [
+        "## Interactions",
+        "",
+        "What pushing each obstacle along each axis or picking it up would do (`outcomes`):",
+        "",
+        "| | possible | succeeds | opens a blocked way by itself |",
+        "|---|---|---|---|",
+    ]
+    lines += [
+        f"| `{row.action}` | {row.possible:,} | {100 * row.success_share:.1f} % | {row.opened:,} |"
+        for row in stats.outcomes
+    ]
+    return (
+        "\n".join(lines)
+        + f"""
+
+{100 * stats.openable_share_of_blocked:.1f} % of the blocked episodes open by a single one. An
+expert, replayed before it was stored, solves {100 * expert.solved_share:.1f} % of the episodes in
+{expert.steps.mean:.1f} steps on average ({expert.pushes:.2f} pushes, {expert.picks:.2f} picks); its
+SPL of {expert.spl:.3f} and STS of {expert.sts:.3f} are the ceiling to compare agents with. It
+refused {100 * expert.refused_share:.1f} % of what was drawn.
+"""
+    )
 
 
 def _use() -> str:

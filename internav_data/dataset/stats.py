@@ -7,10 +7,18 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from internav_data.dataset.figures import Spread, counts, mean, share, spread
+from internav_data.dataset.interactions import (
+    EXPERT_COLUMNS,
+    OUTCOME_COLUMNS,
+    ExpertRow,
+    OutcomeCounts,
+    OutcomeRow,
+    expert_row,
+)
 from internav_data.dataset.manifest import Manifest, open_file, read_manifest
 from internav_data.dataset.parquet import read_all
 from internav_data.dataset.tables import EPISODES
@@ -24,7 +32,6 @@ _SCALARS = (
     *("obstacle_count", "clear_m", "clear_steps", "way_m", "steps"),
 )
 _OBSTACLES = tuple(f"obstacles.list.element.{n}" for n in ("type", "pushable", "pickable"))
-_DIGITS = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,16 +66,6 @@ class RoomsRow:
 
 
 @dataclass(frozen=True, slots=True)
-class Spread:
-    """The spread of one figure over all episodes; zeros without any."""
-
-    least: float
-    median: float
-    mean: float
-    most: float
-
-
-@dataclass(frozen=True, slots=True)
 class Stats:
     """Statistics of a dataset or of one of its splits."""
 
@@ -93,8 +90,12 @@ class Stats:
     clear_steps: Spread
     detour_steps: Spread
     """Further steps of lengthened episodes: steps - clear_steps."""
+    expert: ExpertRow
+    outcomes: tuple[OutcomeRow, ...]
+    openable_share_of_blocked: float
+    """Blocked episodes that a single interaction opens."""
     redraws: Mapping[str, int]
-    """How often something was drawn again while generating, by reason."""
+    """How often something was drawn again while generating, by reason; of all splits."""
     quarantined: int
 
 
@@ -122,33 +123,43 @@ def compute_stats(dataset: Any, split: str | None = None) -> dict[str, Any]:  # 
         A file is missing or damaged.
 
     """
-    root = Path(getattr(dataset, "path", dataset))
-    chosen = split or getattr(dataset, "split", None)
+    opened = not isinstance(dataset, str | Path)  # a str has a method of that name
+    root = Path(dataset.path if opened else dataset)
+    chosen = split or (dataset.split if opened else None)
     return asdict(stats_of(root, read_manifest(root), chosen))
 
 
 def stats_of(root: Path, manifest: Manifest, split: str | None = None) -> Stats:
     """Return the statistics of the files that a manifest names."""
-    names = [*_SCALARS, *_OBSTACLES]
-    parts = []
+    names = [*_SCALARS, *_OBSTACLES, *EXPERT_COLUMNS, *OUTCOME_COLUMNS]
+    tables, kinds, outcomes = [_no_rows()], [_no_obstacles()], OutcomeCounts()
     for file in manifest.of("episodes", split):
         with open_file(root, file, EPISODES) as opened:
-            parts.append(_flat(read_all(root / file.path, opened, names)))
-    table = pa.concat_tables([p[0] for p in parts]) if parts else _no_rows()
-    kinds = pa.concat_tables([p[1] for p in parts]) if parts else _no_obstacles()
-    return _stats(table, kinds, manifest, split)
+            table = read_all(root / file.path, opened, names)
+        tables.append(_flat_rows(table))
+        for chunk in table.column("obstacles").chunks:
+            kinds.append(_flat_obstacles(chunk))
+            outcomes.add(chunk)
+    return _stats(pa.concat_tables(tables), pa.concat_tables(kinds), outcomes, manifest, split)
 
 
-def _flat(table: pa.Table) -> tuple[pa.Table, pa.Table]:
-    """Part a file's columns into those of episodes and those of obstacles."""
+def _flat_rows(table: pa.Table) -> pa.Table:
+    """Return the columns of episodes, of the expert's what its figures need."""
+    return table.select([*_SCALARS, "expert"]).cast(_no_rows().schema)
+
+
+def _flat_obstacles(column: pa.ListArray) -> pa.Table:
     names = _no_obstacles().schema.names
-    chunks = [chunk.flatten().flatten() for chunk in table.column("obstacles").chunks]
-    obstacles = [pa.table(dict(zip(names, chunk, strict=True))) for chunk in chunks]
-    return table.select(list(_SCALARS)), pa.concat_tables([_no_obstacles(), *obstacles])
+    return pa.Table.from_struct_array(column.flatten()).select(names).cast(_no_obstacles().schema)
 
 
 def _no_rows() -> pa.Table:
-    return pa.schema([EPISODES.schema.field(name) for name in _SCALARS]).empty_table()
+    """Return the columns of episodes without a row."""
+    schema = EPISODES.schema
+    kind = schema.field("expert").type
+    parts = [kind.field(name.removeprefix("expert.")) for name in EXPERT_COLUMNS]
+    scalars = [schema.field(name) for name in _SCALARS]
+    return pa.schema([*scalars, pa.field("expert", pa.struct(parts))]).empty_table()
 
 
 def _no_obstacles() -> pa.Table:
@@ -156,31 +167,40 @@ def _no_obstacles() -> pa.Table:
     return pa.schema(types).empty_table()
 
 
-def _stats(table: pa.Table, kinds: pa.Table, manifest: Manifest, split: str | None) -> Stats:
+def _stats(
+    table: pa.Table,
+    kinds: pa.Table,
+    outcomes: OutcomeCounts,
+    manifest: Manifest,
+    split: str | None,
+) -> Stats:
     rooms = table.column("room_count").to_numpy()
     blocked = pc.equal(table.column("mode"), "blocked").to_numpy()
     sealed = table.column("sealed").to_numpy()
     detours = pc.subtract(table.column("steps"), table.column("clear_steps"))
     longer = detours.filter(pc.equal(table.column("mode"), "lengthened")).drop_null()
     push, pick = (kinds.column(name).to_numpy().astype(bool) for name in ("pushable", "pickable"))
-    counts = {k: v for k, v in manifest.counts.items() if split in (None, k)}
+    held = {k: v for k, v in manifest.counts.items() if split in (None, k)}
     return Stats(
-        scenes=sum(count.scenes for count in counts.values()),
+        scenes=sum(count.scenes for count in held.values()),
         episodes=table.num_rows,
-        splits={name: count.episodes for name, count in counts.items()},
+        splits={name: count.episodes for name, count in held.items()},
         table2=tuple(_rooms_row(table, rooms, blocked, sealed, span) for span in PAPER),
         modes={"blocked": int(blocked.sum()), "lengthened": int((~blocked).sum())},
         sealed=int(sealed.sum()),
-        sealed_share_of_blocked=_mean(sealed[blocked]),
-        room_count=_counts(table.column("room_count")),
-        obstacle_count=_counts(table.column("obstacle_count")),
-        obstacle_types=_counts(kinds.column("type")),
+        sealed_share_of_blocked=mean(sealed[blocked]),
+        room_count=counts(table.column("room_count")),
+        obstacle_count=counts(table.column("obstacle_count")),
+        obstacle_types=counts(kinds.column("type")),
         obstacles_pushable=int(push.sum()),
         obstacles_pickable=int(pick.sum()),
         obstacles_fixed=int((~(push | pick)).sum()),
-        clear_m=_spread(table.column("clear_m").to_numpy()),
-        clear_steps=_spread(table.column("clear_steps").to_numpy()),
-        detour_steps=_spread(longer.to_numpy()),
+        clear_m=spread(table.column("clear_m").to_numpy()),
+        clear_steps=spread(table.column("clear_steps").to_numpy()),
+        detour_steps=spread(longer.to_numpy()),
+        expert=expert_row(table, manifest),
+        outcomes=outcomes.rows(),
+        openable_share_of_blocked=share(outcomes.openable, int(blocked.sum())),
         redraws=dict(manifest.redraws),
         quarantined=len(manifest.quarantined),
     )
@@ -199,27 +219,11 @@ def _rooms_row(
         rooms=f"{span[0]}-{span[1]}",
         scenes=len(pc.unique(part.column("scene_id"))),
         episodes=part.num_rows,
-        ratio=_mean(chosen),
-        obstacle_num=_mean(part.column("obstacle_count").to_numpy()),
-        distance_m=_mean(_STEP_M * part.column("clear_steps").to_numpy()),
-        cross_room_num=_mean(part.column("rooms_on_way").to_numpy()),
+        ratio=mean(chosen),
+        obstacle_num=mean(part.column("obstacle_count").to_numpy()),
+        distance_m=mean(_STEP_M * part.column("clear_steps").to_numpy()),
+        cross_room_num=mean(part.column("rooms_on_way").to_numpy()),
         blocked=int((chosen & blocked).sum()),
         sealed=int((chosen & sealed).sum()),
         paper=PAPER[span],
     )
-
-
-def _mean(values: NDArray[Any]) -> float:
-    return round(float(values.mean()), _DIGITS) if len(values) else 0.0
-
-
-def _spread(values: NDArray[Any]) -> Spread:
-    if not len(values):
-        return Spread(0.0, 0.0, 0.0, 0.0)
-    figures = (values.min(), np.median(values), values.mean(), values.max())
-    return Spread(*(round(float(figure), _DIGITS) for figure in figures))
-
-
-def _counts(column: pa.ChunkedArray) -> dict[str, int]:
-    pairs = [(c["values"], c["counts"]) for c in pc.value_counts(column).to_pylist()]
-    return {str(value): count for value, count in sorted(pairs)}

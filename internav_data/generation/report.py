@@ -5,11 +5,16 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
+from internav_data.dataset import refused_share
 from internav_data.generation.progress import clock
 from internav_data.records.errors import QuarantineError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
+
+    from internav_data.dataset import Manifest
+    from internav_data.generation.progress import Progress
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +32,10 @@ class Report:
     seconds: float
     quarantined: tuple[tuple[str, str], ...]
     """Scene ids in the dataset's manifest that could not be made, and why."""
+    redraws: Mapping[str, int]
+    """How often something was drawn again for the whole dataset, by reason."""
+    refused_share: float
+    """Of all that was spawned for it: what the expert found no plan for."""
 
     @property
     def exit_code(self) -> int:
@@ -36,6 +45,21 @@ class Report:
     def plain(self) -> dict[str, object]:
         """Return it for programs."""
         return asdict(self) | {"out": str(self.out)}
+
+
+def report_of(out: Path, manifest: Manifest, progress: Progress) -> Report:
+    """Gather what a run did: what the dataset holds now, and what was counted on the way."""
+    return Report(
+        out=out,
+        scenes=manifest.scenes,
+        episodes=sum(count.episodes for count in manifest.counts.values()),
+        new_scenes=progress.scenes,
+        new_episodes=progress.episodes,
+        seconds=progress.seconds,
+        quarantined=tuple((entry.scene_id, entry.reason) for entry in manifest.quarantined),
+        redraws=dict(manifest.redraws),
+        refused_share=refused_share(manifest),
+    )
 
 
 def summary(report: Report) -> str:
@@ -48,5 +72,6 @@ def summary(report: Report) -> str:
     rate = report.new_episodes / max(report.seconds, 1e-9)
     return (
         f"{report.out}: {report.scenes} scenes, {report.episodes} episodes "
-        f"({report.new_episodes} new in {clock(report.seconds)}, {rate:.1f} episodes/s)"
+        f"({report.new_episodes} new in {clock(report.seconds)}, {rate:.1f} episodes/s); "
+        f"the expert refused {report.refused_share:.1%} of what was drawn"
     )

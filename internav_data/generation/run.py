@@ -31,7 +31,7 @@ from internav_data.generation.interrupts import InterruptedRunError, Interrupts
 from internav_data.generation.lock import locked
 from internav_data.generation.messages import Done
 from internav_data.generation.progress import Progress
-from internav_data.generation.report import Report
+from internav_data.generation.report import Report, report_of
 from internav_data.generation.scenes import (
     ScenePayload,
     asset_folders,
@@ -124,7 +124,7 @@ def generate(
                 if stop():
                     raise InterruptedRunError(_interruption(out, progress), stop.signum)
             manifest = _assembled(out, identity, assets, scenes, progress)
-    return _report(out, manifest, progress)
+    return report_of(out, manifest, progress)
 
 
 def _catalogue(config: GenerationConfig) -> Catalogue:
@@ -274,18 +274,6 @@ def _interruption(out: Path, progress: Progress) -> str:
     return (
         f"interrupted after {done} of {progress.scenes_total} scenes; they are kept in {out}: "
         "run the same command again to continue"
-    )
-
-
-def _report(out: Path, manifest: Manifest, progress: Progress) -> Report:
-    return Report(
-        out=out,
-        scenes=manifest.scenes,
-        episodes=sum(count.episodes for count in manifest.counts.values()),
-        new_scenes=progress.scenes,
-        new_episodes=progress.episodes,
-        seconds=progress.seconds,
-        quarantined=tuple((entry.scene_id, entry.reason) for entry in manifest.quarantined),
     )
 
 

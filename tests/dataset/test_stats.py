@@ -54,6 +54,44 @@ def test_statistics_are_those_of_the_records(dataset_folder, split):
     )
 
 
+@pytest.mark.parametrize("split", [None, "train"])
+def test_interactions_are_those_of_the_records(dataset_folder, split):
+    episodes = list(load_dataset(dataset_folder, split))
+    stats = compute_stats(str(dataset_folder), split)
+    spl = [e.clear_m / max(e.clear_m, e.expert.path_m) if e.expert else 0.0 for e in episodes]
+    sts = [e.clear_m / 0.25 / e.expert.steps if e.expert else 0.0 for e in episodes]
+    solved = [e.expert for e in episodes if e.expert]
+    assert 0 < len(solved) < len(episodes), "some have none"
+    said = stats["expert"]
+    assert said["solved"] == len(solved)
+    assert said["solved_share"] == pytest.approx(len(solved) / len(episodes), abs=1e-6)
+    assert said["spl"] == pytest.approx(statistics.mean(spl), abs=1e-6)
+    assert said["sts"] == pytest.approx(statistics.mean(sts), abs=1e-6)
+    assert said["steps"]["mean"] == pytest.approx(statistics.mean(e.steps for e in solved))
+    assert said["pushes"] == pytest.approx(statistics.mean(e.pushes for e in solved), abs=1e-6)
+    assert said["picks"] == pytest.approx(statistics.mean(e.picks for e in solved), abs=1e-6)
+    for row in stats["outcomes"]:
+        able = "pickable" if row["action"] == "pick" else "pushable"
+        tried = [
+            outcome
+            for e in episodes
+            for o in e.obstacles
+            for outcome in o.outcomes
+            if outcome.action == row["action"] and getattr(o, able)
+        ]
+        assert row["possible"] == len(tried)
+        assert row["success_share"] == pytest.approx(
+            statistics.mean(o.success for o in tried), abs=1e-6
+        )
+        assert row["opened"] == sum(o.opened for o in tried)
+    blocked = [e for e in episodes if e.mode == "blocked"]
+    opened = [any(x.opened for o in e.obstacles for x in o.outcomes) for e in blocked]
+    assert stats["openable_share_of_blocked"] == pytest.approx(statistics.mean(opened), abs=1e-6)
+    # 130 scenes of 6: what was refused counts for the dataset as a whole, whatever the split.
+    assert said["refused"] == 13
+    assert said["refused_share"] == pytest.approx(13 / (13 + 130 * 6), abs=1e-6)
+
+
 def test_stats_file_is_what_compute_stats_says(dataset_folder):
     stored = json.loads((dataset_folder / "stats.json").read_text())
     assert stored == json.loads(json.dumps(compute_stats(dataset_folder)))
