@@ -79,12 +79,6 @@ class Player:
                 f"InterNav: no argument {unknown[0]!r}; there are "
                 f"{sorted(Arguments.__annotations__)}"
             )
-        rules = Rules(
-            arguments.get("max_steps", 500),
-            arguments.get("failed_done_reward", 0.0),
-            arguments.get("push_model", "force"),
-        )
-        rules.check()
         stay = arguments.get("episodes_per_house", 4)
         kept = arguments.get("houses_kept", HOUSES_KEPT)
         if min(count, stay, kept) < 1:
@@ -94,6 +88,12 @@ class Player:
             )
         PLACES.capacity = max(PLACES.capacity, kept)
         source = open_source(dataset, arguments.get("split"), arguments.get("filters"))
+        rules = Rules(
+            arguments.get("max_steps", 500),
+            arguments.get("failed_done_reward", 0.0),
+            arguments.get("push_model", source.push_model),
+        )
+        rules.check()
         shuffle = arguments.get("shuffle", True)
         return [Player(source, rules, stay=stay, shuffle=shuffle) for _ in range(count)]
 

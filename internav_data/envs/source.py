@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from internav_data.dataset import Dataset
     from internav_data.envs.places import Place
     from internav_data.records import Episode
+    from internav_data.world import PushModel
 
 SOURCES_KEPT: Final = 8
 
@@ -36,6 +37,14 @@ class Source:
                 f"dataset {dataset.path}: no episodes for split={dataset.split!r}, "
                 f"filters={dataset.filters!r}; there are {dataset.manifest.counts}: choose others"
             )
+
+    @property
+    def push_model(self) -> PushModel:
+        """The model that the dataset's outcomes and experts were made with."""
+        model: PushModel = self.dataset.manifest.config.get("episodes", {}).get(
+            "push_model", "force"
+        )
+        return model
 
     @cached_property
     def bounds(self) -> NDArray[np.int64]:

@@ -14,6 +14,7 @@ from internav_data.envs import EnvState, InterNavVectorEnv
 from internav_data.envs.order import EpisodeOrder
 from internav_data.envs.places import FIELDS_KEPT, Places
 from internav_data.envs.source import open_source
+from internav_data.generation import generate, load_config
 from internav_data.navigation import WayFinder
 from internav_data.records.errors import CorruptDataError, UsageError
 from internav_data.world import Action, Stage, World
@@ -219,6 +220,28 @@ def test_options_that_cannot_be_meant(small, options, message):
 def test_arguments_that_cannot_be_meant(small, arguments, message):
     with pytest.raises(UsageError, match=message):
         make(small, **arguments)
+
+
+@pytest.mark.parametrize("model", ["force", "kick"])
+def test_experts_reach_the_goal_by_the_push_model_of_their_dataset(small, tmp_path, model):
+    out = small
+    if model == "kick":
+        out = tmp_path / "d"
+        overrides = ["episodes_per_scene=3", "house.rooms=1-2", "episodes.push_model=kick"]
+        generate(out, load_config(overrides=overrides), 1, workers=1)
+    env = make(out)
+    assert open_source(out).push_model == model
+    env.reset(seed=0)
+    assert env.unwrapped._player.play.world.model == model
+    for episode in load_dataset(out):
+        env.reset(options={"episode_id": episode.episode_id})
+        for action in episode.expert.actions:
+            *_, terminated, _, info = env.step(action)
+            assert info["action_success"]
+        assert terminated
+        assert info["metrics"]["success"]
+        assert info["metrics"]["steps"] == episode.expert.steps
+        assert info["metrics"]["path_m"] == episode.expert.path_m
 
 
 def test_no_dataset(tmp_path):
