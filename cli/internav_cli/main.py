@@ -14,6 +14,7 @@ COMMANDS = {
     "validate": "Prove a dataset right, or say what in it is wrong.",
     "stats": "Tell what a dataset is like, beside the paper's Table 2.",
     "show": "Draw a house or an episode from above as a PNG.",
+    "replay": "Film an episode: the agent's camera beside the map.",
     "schema": "Print the JSON Schemas of every row and file.",
     "assets": "List what can stand in a house or on a way.",
     "doctor": "Look for what keeps this machine from generating.",

@@ -1,14 +1,50 @@
-"""Pictures: houses and episodes from above, assets in perspective, contact sheets."""
+"""Pictures: houses and episodes from above, assets in perspective, contact sheets, replays."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from internav_data.views.plan import draw_house, house_line
 from internav_data.views.sheets import contact_sheet, write_png
 from internav_data.views.tasks import draw_episode, episode_lines
 
+if TYPE_CHECKING:
+    from internav_data.views.replay import Replay, replay_frames
+    from internav_data.views.replay_actions import ActionList, read_actions
+    from internav_data.views.replay_story import Moment
+    from internav_data.views.video import film_format, write_video
+
 __all__ = [
+    "ActionList",
+    "Moment",
+    "Replay",
     "contact_sheet",
     "draw_episode",
     "draw_house",
     "episode_lines",
+    "film_format",
     "house_line",
+    "read_actions",
+    "replay_frames",
     "write_png",
+    "write_video",
 ]
+
+_HOMES = {
+    "ActionList": "replay_actions",
+    "Moment": "replay_story",
+    "Replay": "replay",
+    "film_format": "video",
+    "read_actions": "replay_actions",
+    "replay_frames": "replay",
+    "write_video": "video",
+}
+
+
+def __getattr__(name: str) -> object:
+    """Import what is asked for: a picture of a house needs neither physics nor camera."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module  # noqa: PLC0415 - as all the rest
+
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

@@ -53,7 +53,8 @@ def write_gif(file: BinaryIO, frames: Iterable[Image], fps: float) -> int:
         Without frames, or with frames of several sizes.
     """
     shown: Image | None = None
-    waiting, last = b"", None
+    waiting = b""
+    last: Image | None = None
     count = shown_until = 0
     for frame in frames:
         if shown is None:
@@ -64,7 +65,7 @@ def write_gif(file: BinaryIO, frames: Iterable[Image], fps: float) -> int:
         if last is None or not np.array_equal(frame, last):
             now = round(100.0 * count / fps)
             _stay(file, waiting, now - shown_until)
-            waiting, shown_until = _picture(frame, shown, whole=last is None), now
+            waiting, shown_until = _picture(frame, shown, last), now
             last = frame
         count += 1
     if not count:
@@ -88,9 +89,12 @@ def _stay(file: BinaryIO, picture: bytes, hundredths: int) -> None:
         file.write(b"\x21\xf9\x04" + struct.pack("<BHBB", 0b101, stay, _UNCHANGED, 0) + picture)
 
 
-def _picture(frame: Image, shown: Image, *, whole: bool) -> bytes:
+def _picture(frame: Image, shown: Image, last: Image | None) -> bytes:
     """Encode what changed, and bring `shown` in line with what a viewer will see."""
-    changed = np.ones(frame.shape[:2], np.uint8) if whole else _changed(frame, shown, _TOLERANCE)
+    if last is None:
+        changed = np.ones(frame.shape[:2], np.uint8)
+    else:
+        changed = _changed(frame, shown, last, _TOLERANCE)
     rows, columns = np.flatnonzero(changed.any(axis=1)), np.flatnonzero(changed.any(axis=0))
     if not len(rows):
         rows = columns = np.zeros(1, np.int64)
@@ -124,15 +128,17 @@ def _palette(part: Image, mask: Image) -> tuple[Image, NDArray[np.int64]]:
 
 
 @njit(cache=True)
-def _changed(frame: Image, shown: Image, tolerance: int) -> Image:
+def _changed(frame: Image, shown: Image, last: Image, tolerance: int) -> Image:
+    """Mark pixels that are others than in the frame before and far from what is shown, (h, w)."""
     height, width = frame.shape[:2]
     out = np.zeros((height, width), np.uint8)
     for y in range(height):
         for x in range(width):
+            far, other = False, False
             for k in range(3):
-                if abs(int(frame[y, x, k]) - int(shown[y, x, k])) > tolerance:
-                    out[y, x] = 1
-                    break
+                far |= abs(int(frame[y, x, k]) - int(shown[y, x, k])) > tolerance
+                other |= frame[y, x, k] != last[y, x, k]
+            out[y, x] = far and other
     return out
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Self
 
 import numpy as np
 
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 SIZE: Final = 480
 """Pixels a side of the camera's picture."""
 FPS: Final = 12.0
+DEFAULTS: Final = {"mp4": (SIZE, FPS), "gif": (360, 8.0)}
+"""Camera size and frames a second by kind of film; GIFs are smaller, as they hold more bytes."""
 SIZES: Final = (160, 1080)
 """Smallest and largest camera picture a replay is made of."""
 _PAPER: Final[RGB] = (250, 249, 246)
@@ -44,6 +46,22 @@ class Replay:
 
     story: Story
     title: str
+
+    @classmethod
+    def of(
+        cls,
+        house: House | Stage,
+        episode: Episode,
+        assets: Mapping[str, Asset],
+        actions: Sequence[int] | None = None,
+        *,
+        title: str | None = None,
+        model: PushModel = "force",
+    ) -> Self:
+        """Play an episode; draw it later, as often as wanted. Parameters as in `replay_frames`."""
+        stage = house if isinstance(house, Stage) else Stage.of(house)
+        who = title or ("expert" if actions is None else "given actions")
+        return cls(played(stage, episode, assets, actions, model), who)
 
     @property
     def success(self) -> bool:
@@ -75,21 +93,6 @@ class Replay:
             frame = painter.draw(shot, card if k == 0 else None)
             for _ in range(shot.frames):
                 yield frame
-
-
-def replay(
-    house: House | Stage,
-    episode: Episode,
-    assets: Mapping[str, Asset],
-    actions: Sequence[int] | None = None,
-    *,
-    title: str | None = None,
-    model: PushModel = "force",
-) -> Replay:
-    """Play an episode; draw it later, as often as wanted. Parameters as in `replay_frames`."""
-    stage = house if isinstance(house, Stage) else Stage.of(house)
-    who = title or ("expert" if actions is None else "given actions")
-    return Replay(played(stage, episode, assets, actions, model), who)
 
 
 def replay_frames(
@@ -135,7 +138,7 @@ def replay_frames(
     UsageError
         No expert, an unknown action, another house's episode, a size or rate out of bounds.
     """
-    made = replay(house, episode, assets, actions, title=title, model=model)
+    made = Replay.of(house, episode, assets, actions, title=title, model=model)
     return made.frames(size=size, fps=fps, panel=panel)
 
 

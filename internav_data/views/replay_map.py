@@ -89,6 +89,8 @@ class MapPainter:
         self._outlines: dict[tuple[int, Pose], list[Outline]] = {}
         self._first = {k: story.moments[0].pose(k) for k in self._moving()}
         self._still = self._drawn_once()
+        self._furnished: tuple[object, Image] = (None, self._still)
+        """The latest picture with things on it: most actions move none."""
 
     def _moving(self) -> Iterable[int]:
         return (*self._story.moved, *self._story.moments[0].world.obstacles)
@@ -113,11 +115,16 @@ class MapPainter:
     def draw(self, shot: Shot) -> Image:
         """Return the map at a shot, (h, w, 3) uint8 RGB."""
         canvas = self._canvas
-        canvas.image[:] = self._still
+        key = (tuple(shot.poses.items()), shot.target)
+        if key == self._furnished[0]:
+            canvas.image[:] = self._furnished[1]
+        else:
+            canvas.image[:] = self._still
+            self._paint_ghosts(shot.poses)
+            self._paint_things(shot)
+            self._paint_arrows(shot.poses)
+            self._furnished = (key, canvas.image.copy())
         self._paint_cone(shot)
-        self._paint_ghosts(shot.poses)
-        self._paint_things(shot)
-        self._paint_arrows(shot.poses)
         self._paint_trail(shot)
         self._paint_agent(shot)
         picture = canvas.finished()

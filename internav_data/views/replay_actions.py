@@ -1,0 +1,76 @@
+"""Action lists in small files: what `internav-gen replay --actions` reads."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from internav_data.records.errors import UsageError
+from internav_data.views.replay_story import ACTIONS_AT_MOST
+from internav_data.world import Action
+
+_BYTES_AT_MOST: Final = 1_000_000
+_KEYS: Final = {"episode_id", "actions"}
+_NAMES: Final = {action.name.replace("_", "").lower(): action for action in Action}
+_EXAMPLE: Final = '["MoveAhead", "PushAhead", 0, 11] or {"episode_id": ..., "actions": [...]}'
+_WAIT: Final = -1
+
+
+@dataclass(frozen=True, slots=True)
+class ActionList:
+    """Actions, and of which episode they are, where the file says so."""
+
+    episode_id: str | None
+    actions: tuple[int, ...]
+
+
+def read_actions(path: Path) -> ActionList:
+    """Read actions from a JSON file.
+
+    A list of actions, or an object of `actions` and (if wanted) the `episode_id` they are for. An
+    action is its number (0 MoveAhead to 11 Done; -1 waits) or its name: MoveAhead, move_ahead and
+    MOVE_AHEAD are one.
+
+    Raises
+    ------
+    UsageError
+        The file cannot be read, or does not hold such a list.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            raw = file.read(_BYTES_AT_MOST + 1)
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be read: {error.strerror}") from error
+    if len(raw) > _BYTES_AT_MOST:
+        raise UsageError(f"{path}: too large for a list of actions: over {_BYTES_AT_MOST} bytes")
+    try:
+        data = json.loads(raw.decode("utf-8"))
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise UsageError(f"{path}: not JSON ({error}); expected {_EXAMPLE}") from error
+    episode_id = None
+    if isinstance(data, dict):
+        if not {"actions"} <= set(data) <= _KEYS:
+            keys = ", ".join(map(repr, data)) or "none"
+            raise UsageError(f"{path}: the keys are {keys}; expected {_EXAMPLE}")
+        episode_id, data = data.get("episode_id"), data["actions"]
+        if episode_id is not None and not isinstance(episode_id, str):
+            raise UsageError(f"{path}: episode_id: expected a string, got {episode_id!r}")
+    if not isinstance(data, list):
+        raise UsageError(f"{path}: expected a list of actions, as in {_EXAMPLE}")
+    if not 0 < len(data) <= ACTIONS_AT_MOST:
+        raise UsageError(f"{path}: {len(data)} actions; expected 1 to {ACTIONS_AT_MOST}")
+    return ActionList(episode_id, tuple(_action(path, k, entry) for k, entry in enumerate(data)))
+
+
+def _action(path: Path, place: int, entry: object) -> int:
+    if isinstance(entry, str):
+        found = _NAMES.get(entry.replace("_", "").lower())
+        if found is not None:
+            return int(found)
+    elif type(entry) is int and _WAIT <= entry <= Action.WAIT:
+        return entry
+    names = ", ".join(f"{int(a)} {a.name.title().replace('_', '')}" for a in Action)
+    raise UsageError(f"{path}: action {place} is {str(entry)[:40]!r}; expected one of {names}, -1")
