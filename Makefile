@@ -65,7 +65,7 @@ setup: $(STAMP) ## only set up .venv
 .PHONY: demo
 demo: $(STAMP) ## make a small dataset, prove it right, draw it: about three minutes
 	$(BIN)/internav-gen generate --out $(DEMO)/dataset --scenes 24 --episodes-per-scene 5
-	$(BIN)/internav-gen validate $(DEMO)/dataset
+	$(BIN)/internav-gen validate $(DEMO)/dataset --level physics
 	$(BIN)/internav-gen stats $(DEMO)/dataset
 	$(BIN)/internav-gen show $(DEMO)/dataset --scene 6 --out $(DEMO)/house.png
 	$(BIN)/internav-gen show $(DEMO)/dataset --scene 6 --episode 0 --out $(DEMO)/blocked.png

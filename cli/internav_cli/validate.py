@@ -12,7 +12,7 @@ from internav_cli.options import DATASET, JSON, positive
 if TYPE_CHECKING:
     from pathlib import Path
 
-LEVELS = ("files", "schema", "geometry")
+LEVELS = ("files", "schema", "geometry", "physics")
 
 
 @click.command(
@@ -21,7 +21,17 @@ LEVELS = ("files", "schema", "geometry")
 Examples:
   internav-gen validate data/demo
   internav-gen validate data/demo --level files         hashes and checksums only
-  internav-gen validate data/paper --sample 300 --workers 2
+  internav-gen validate data/demo --level physics       every push, pick and expert again
+  internav-gen validate data/paper --level physics --sample 300 --workers 2
+
+\b
+Levels:
+  files     every file of the manifest is there, unchanged, readable, and none besides
+  schema    columns, ranges, ids, order; what outcomes and experts must be by themselves
+  geometry  houses, obstacles and distances derived again by shapely, scipy and networkx
+  physics   every obstacle falls again, every outcome and expert is played again, and the
+            distances that follow are derived as at geometry; what geometry finds untrue
+            is not played
 
 Exit code 3 when something in the dataset is not true, 5 when it cannot be read.""",
 )
@@ -33,7 +43,9 @@ Exit code 3 when something in the dataset is not true, 5 when it cannot be read.
     show_default=True,
     help="Each level runs those before it.",
 )
-@click.option("--sample", type=int, callback=positive, help="Geometry of so many scenes only.")
+@click.option(
+    "--sample", type=int, callback=positive, help="Geometry and physics of so many scenes only."
+)
 @click.option("--workers", type=int, callback=positive, help="Processes.  [default: one a core]")
 @JSON
 def command(

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import numpy as np
-import shapely
 from shapely import Point, Polygon
 
-from internav_data.verification.ground import KEEP_M, SPACING_M
+from internav_data.verification.ground import SPACING_M
+from internav_data.verification.lengths import Between
 from internav_data.verification.obstacles import check_obstacles
-from internav_data.verification.ways import FINE, FINEST, Sight, ellipse, grown, joined
 
 if TYPE_CHECKING:
     from shapely import Geometry
@@ -21,36 +19,29 @@ if TYPE_CHECKING:
     from internav_data.verification.site import Site
 
 LEAST_CLEAR_M = 2.0
-AGREE = 0.0005
-"""Any-angle distances agree with the visibility graph within this share …"""
-AGREE_M = 0.001
-"""… and this length. The format promises 1 %; the generator's own graph is exact."""
-LOOK = 1.05
-"""Ways longer than this share of what is stated need not be known closer."""
 ROUNDED_M = 1e-4
 """Stored lengths are rounded to 0.1 mm."""
-BAND_M = 5e-5
-"""Where a radius this much larger or smaller changes the answer, either answer stands."""
-NEAR_M = 0.5
-"""What lies farther than this outside an ellipse of ways keeps no disc off them."""
 YAWS_DEG = (0, 90, 180, 270)
 
 
-def check_episode(site: Site, episode: Episode, report: Collector, *, exact: bool) -> None:
-    """Judge every predicate of one episode; `exact` adds the finely cut visibility graph."""
+def check_episode(site: Site, episode: Episode, report: Collector, *, exact: bool) -> bool:
+    """Judge every predicate of one episode; `exact` adds the finely cut visibility graph.
+
+    Returns
+    -------
+    bool
+        Whether all of them hold.
+
+    """
+    before = sum(report.by_predicate.values())
     judge = _Judge(site, episode, report)
-    if not judge.ends():
-        return
-    judge.paths()
-    taken = check_obstacles(site, episode, report)
-    if taken is None:
-        return
-    judge.steps(taken)
-    judge.lengths(taken, exact=exact)
-
-
-def _slack(length: float) -> float:
-    return AGREE * length + AGREE_M
+    if judge.ends():
+        judge.paths()
+        taken = check_obstacles(site, episode, report)
+        if taken is not None:
+            judge.steps(taken)
+            judge.lengths(taken, exact=exact)
+    return sum(report.by_predicate.values()) == before
 
 
 class _Judge:
@@ -162,18 +153,19 @@ class _Judge:
         self.expect(
             episode.sealed == (episode.way_m is None), "sealed-way", episode.sealed, episode.way_m
         )
-        if self._agrees(site.sight, episode.clear_m) or self._second_look([], episode.clear_m):
-            self.expect(True, "clear-m", "", "")  # noqa: FBT003 - counted
-        else:
-            self._report("clear-m", [], episode.clear_m)
+        clear = Between(site, self.from_xy, self.to_xy)
+        agrees = clear.agrees(episode.clear_m)
+        found = episode.clear_m if agrees else f"{clear.length():.4f} m"
+        self.expect(agrees, "clear-m", found, episode.clear_m)
+        way = Between(site, self.from_xy, self.to_xy, taken)
         if episode.way_m is None:
-            shut = not self._connected(taken)
+            shut = not way.connected(stated=False)
             self.expect(shut, "sealed", "not sealed: the disc can pass", "sealed")
         else:
             self._bounds("way-m", episode.way_m, episode.clear_m, episode.steps)
-            self._open_way(taken, episode.way_m)
+            self._open_way(way, episode.way_m)
         if exact:
-            close = self._second_look([], episode.clear_m)
+            close = clear.agrees_exactly(episode.clear_m)
             self.expect(close, "clear-m-exact", "the finely cut graph's length", episode.clear_m)
 
     def _bounds(self, name: str, length: float, least: float, steps: int | None) -> None:
@@ -184,54 +176,10 @@ class _Judge:
             high = length <= most + ROUNDED_M
             self.expect(high, f"{name}-bounds", f"at most {most:.2f} m", length)
 
-    def _length(self, sight: Sight, most: float) -> float:
-        return sight.length(self.from_xy, self.to_xy, most)
-
-    def _agrees(self, sight: Sight, stated: float) -> bool:
-        found = self._length(sight, stated + _slack(stated))
-        return abs(found - stated) <= _slack(stated)
-
-    def _sight(self, taken: list[Geometry]) -> Sight:
-        base = self.site.sight
-        return Sight(base.base, grown(taken), base) if taken else base
-
-    def _second_look(self, taken: list[Geometry], stated: float) -> bool:
-        """Whether finely cut arcs, or ties within the band, agree with what is stated."""
-        most = stated * LOOK + AGREE_M
-        near = ellipse(self.from_xy, self.to_xy, most + NEAR_M)
-        blockers = [b for b in (*self.site.blockers, *taken) if shapely.intersects(near, b)]
-
-        def agrees(chords: int, slack_m: float) -> bool:
-            sight = Sight(grown(blockers, chords, slack_m), portals=self.site.portals)
-            return abs(self._length(sight, most) - stated) <= _slack(stated)
-
-        # A gap as wide as the disc is open for the smaller disc and shut for the larger one.
-        return agrees(FINE, 0.0) or agrees(FINEST, -BAND_M) or agrees(FINEST, BAND_M)
-
-    def _report(self, name: str, taken: list[Geometry], stated: float) -> None:
-        found = self._length(self._sight(taken), math.inf)
-        self.expect(False, name, f"{found:.4f} m", stated)  # noqa: FBT003 - reached where it fails
-
-    def _open_way(self, taken: list[Geometry], stated: float) -> None:
-        sight = self._sight(taken)
-        if self._agrees(sight, stated) or self._second_look(taken, stated):
+    def _open_way(self, way: Between, stated: float) -> None:
+        if way.agrees(stated):
             self.expect(True, "way-m", "", "")  # noqa: FBT003 - counted
-        elif not self._connected(taken):
+        elif not way.connected(stated=True):
             self.expect(False, "sealed", "sealed: no way for the disc", f"{stated} m")  # noqa: FBT003
         else:
-            self._report("way-m", taken, stated)
-
-    def _connected(self, taken: list[Geometry]) -> bool:
-        """Whether the disc gets from start to goal; ties within the band say what is stated."""
-        array = np.array(taken, dtype=object)
-        near = shapely.union_all(shapely.buffer(array, KEEP_M, quad_segs=FINE))
-        way = joined(self.from_xy, self.to_xy, self.site.free, near)
-        stated = self.episode.way_m is not None
-        if way == stated:
-            return way
-        blockers = np.array([*self.site.blockers, *taken], dtype=object)
-        for slack in (0.0, -BAND_M, BAND_M):
-            solid = shapely.union_all(shapely.buffer(blockers, KEEP_M + slack, quad_segs=FINEST))
-            if joined(self.from_xy, self.to_xy, self.site.outline, solid) == stated:
-                return stated
-        return way
+            self.expect(False, "way-m", f"{way.length():.4f} m", stated)  # noqa: FBT003

@@ -12,9 +12,9 @@ from internav_data.records.errors import ValidationError
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-Level = Literal["files", "schema", "geometry"]
-LEVELS: tuple[Level, ...] = ("files", "schema", "geometry")
-"""In order: each level runs those before it. Physics will be the fourth."""
+Level = Literal["files", "schema", "geometry", "physics"]
+LEVELS: tuple[Level, ...] = ("files", "schema", "geometry", "physics")
+"""In order: each level runs those before it."""
 
 KEPT = 1000
 """Findings kept in full; further ones are only counted, so that memory stays bounded."""
@@ -54,6 +54,8 @@ class Findings:
     total: int
     """How many there were in all."""
     by_predicate: dict[str, int] = field(default_factory=dict)
+    notes: dict[str, int] = field(default_factory=dict)
+    """What could not be judged and why, and in how many episodes. No fault of the data."""
 
     @property
     def ok(self) -> bool:
@@ -63,14 +65,15 @@ class Findings:
     def summary(self) -> str:
         """Return a text for a terminal: what was checked, then the first findings."""
         looked = ", ".join(f"{count} {name}" for name, count in self.checked.items())
+        notes = [f"note: {count} x {text}" for text, count in self.notes.items()]
         if self.ok:
-            return f"valid at level {self.level}: {looked}"
+            return "\n".join([f"valid at level {self.level}: {looked}", *notes])
         lines = [f"invalid at level {self.level}: {self.total} findings in {looked}"]
         lines += [f"  {name}: {count}" for name, count in self.by_predicate.items()]
         lines += [str(finding) for finding in self.found[:SHOWN]]
         if self.total > SHOWN:
             lines.append(f"… and {self.total - SHOWN} more")
-        return "\n".join(lines)
+        return "\n".join(lines + notes)
 
     def to_json(self) -> str:
         """Return the whole result as a JSON object."""
@@ -92,6 +95,7 @@ class Collector:
         self.found: list[Finding] = []
         self.counts: Counter[str] = Counter()
         self.by_predicate: Counter[str] = Counter()
+        self.notes: Counter[str] = Counter()
 
     def expect(
         self, holds: object, predicate: str, expected: object, got: object, episode: str = ""
@@ -112,6 +116,7 @@ class Collector:
         self.found = sorted(self.found + other.found)[:KEPT]
         self.counts += other.counts
         self.by_predicate += other.by_predicate
+        self.notes += other.notes
 
     def findings(self, level: Level) -> Findings:
         """Return the result, in an order that no worker count changes."""
@@ -121,6 +126,7 @@ class Collector:
             tuple(sorted(self.found)[:KEPT]),
             sum(self.by_predicate.values()),
             dict(sorted(self.by_predicate.items())),
+            dict(sorted(self.notes.items())),
         )
 
 

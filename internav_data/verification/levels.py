@@ -14,6 +14,7 @@ from internav_data.records.errors import UsageError
 from internav_data.verification.files import check_file, check_listing, check_manifest
 from internav_data.verification.findings import LEVELS, Collector, Findings, Level, join
 from internav_data.verification.scenes import check_scene
+from internav_data.verification.settings import Settings, settings_of
 from internav_data.verification.shapes import Shapes
 from internav_data.verification.tables import check_tables, number_of
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     Progress = Callable[[str, int, int], None]
 
+UNTRUE = "schema not as stated: physics not checked"
 SCENES_A_UNIT = 10
 """Scenes that a worker judges before it reports."""
 
@@ -46,6 +48,8 @@ class Unit:
     root: Path
     assets: DataFile
     places: tuple[Place, ...]
+    physics: Settings | None = None
+    """To play the episodes again; None to leave physics alone."""
 
 
 def validate(
@@ -64,12 +68,14 @@ def validate(
     level
         `files`: hashes, page checksums, nothing unlisted. `schema`: columns, ranges, ids.
         `geometry`: every predicate of every house and episode, derived again by shapely, scipy
-        and networkx. Each level runs those before it.
+        and networkx. `physics`: settling, outcomes and experts, played again. Each level runs
+        those before it; an episode whose geometry is untrue is not played.
     sample
-        Look at the geometry of so many scenes only, drawn from the dataset's seed; None for all.
+        Look at the geometry and physics of so many scenes only, drawn from the dataset's seed;
+        None for all.
     workers
-        Processes for the geometry. With more than one, a script that calls this needs the usual
-        `if __name__ == "__main__":`.
+        Processes for geometry and physics. With more than one, a script that calls this needs the
+        usual `if __name__ == "__main__":`.
     progress
         Called with a level, what is done of it and how much there is.
 
@@ -100,14 +106,20 @@ def validate(
             damaged |= {file.path}
         whole.absorb(report)
         tell("files", done, len(manifest.files))
+    tables = Collector()
     if level != "files":
         tell("schema", 0, 1)
         tables = check_tables(path, manifest, damaged)
         whole.absorb(tables)
         tell("schema", 1, 1)
         damaged |= {f.file for f in tables.found if f.predicate == "schema.columns"}
-    if level == "geometry":
-        _check_geometry(path, manifest, damaged, whole, sample, workers, tell)
+    if level in {"geometry", "physics"}:
+        physics = settings_of(manifest.config) if level == "physics" else None
+        if physics is not None and tables.by_predicate:
+            # An engine is not asked about what may be no number at all.
+            physics = None
+            whole.notes[UNTRUE] += sum(counts.episodes for counts in manifest.counts.values())
+        _check_scenes(path, manifest, damaged, whole, sample, workers, tell, physics)
     return whole.findings(level)
 
 
@@ -120,7 +132,7 @@ def _check_arguments(level: str, sample: int | None, workers: int) -> None:
         raise UsageError(f"workers: expected at least 1, got {workers}")
 
 
-def _check_geometry(
+def _check_scenes(
     root: Path,
     manifest: Manifest,
     damaged: frozenset[str],
@@ -128,6 +140,7 @@ def _check_geometry(
     sample: int | None,
     workers: int,
     tell: Progress,
+    physics: Settings | None,
 ) -> None:
     assets = [file for file in manifest.of("assets") if file.path not in damaged]
     places = _places(root, manifest, damaged)
@@ -138,14 +151,14 @@ def _check_geometry(
         chosen = sorted(rng.permutation(len(places))[:sample].tolist())
         places = [places[k] for k in chosen]
     units = [
-        Unit(root, assets[0], tuple(places[k : k + SCENES_A_UNIT]))
+        Unit(root, assets[0], tuple(places[k : k + SCENES_A_UNIT]), physics)
         for k in range(0, len(places), SCENES_A_UNIT)
     ]
     done = 0
     for unit, report in zip(units, _judged(units, workers), strict=True):
         whole.absorb(report)
         done += len(unit.places)
-        tell("geometry", done, len(places))
+        tell("geometry" if physics is None else "physics", done, len(places))
 
 
 def _judged(units: Sequence[Unit], workers: int) -> Iterator[Collector]:
@@ -208,7 +221,7 @@ _SHAPES: dict[str, Shapes] = {}
 
 
 def check_unit(unit: Unit) -> Collector:
-    """Judge the geometry of some scenes."""
+    """Judge the geometry of some scenes, and the physics if asked."""
     key = unit.assets.sha256
     if key not in _SHAPES:
         _SHAPES.clear()
@@ -218,5 +231,6 @@ def check_unit(unit: Unit) -> Collector:
     reports = []
     for place in unit.places:
         file = place.episodes[0] if place.episodes else place.house[0]
-        reports.append(check_scene(reader.house(place), reader.episodes(place), _SHAPES[key], file))
+        house, episodes = reader.house(place), reader.episodes(place)
+        reports.append(check_scene(house, episodes, _SHAPES[key], file, unit.physics))
     return join(reports)

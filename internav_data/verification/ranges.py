@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
+from internav_data.verification.interactions import OUTCOMES, PICK_REASONS, PUSH_REASONS
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
@@ -19,6 +21,8 @@ METRES = 4
 """Positions and lengths are rounded to 0.1 mm."""
 TURNS = 6
 """Quaternions are rounded to 1e-6."""
+MOST_PUSH_S = 5.5
+"""Half a second of pushing, five until at rest."""
 UNIT = 3e-6
 """How far from 1 the length of a rounded quaternion may be."""
 
@@ -48,6 +52,14 @@ SPLIT = Rule(choices=("train", "val", "test"))
 TURN = Rule(-1.0, 1.0, digits=TURNS)
 FROM_ZERO = Rule(0.0, 1.0)
 
+OUTCOME_RULES: Mapping[str, Rule] = {
+    "action": Rule(choices=OUTCOMES),
+    "displacement_m": Rule(0.0, 1e4, digits=METRES),
+    "steps": Rule(1),
+    "way_m": Rule(0.0, 1e4, digits=METRES),
+    "seconds": Rule(0.0, MOST_PUSH_S),
+    "reason": Rule(choices=tuple(sorted({*PUSH_REASONS, *PICK_REASONS}))),
+}
 EPISODE_RULES: Mapping[str, Rule] = {
     "episode_id": Rule(pattern=r"scene-\d{6,}/\d{4,}"),
     "scene_id": SCENE,
@@ -79,6 +91,12 @@ EPISODE_RULES: Mapping[str, Rule] = {
     "obstacles.element.segment": Rule(0),
     "obstacles.element.settle_s": FROM_ZERO,
     "obstacles.element.settle_penetration_m": FROM_ZERO,
+    **{f"obstacles.element.outcomes.element.{n}": rule for n, rule in OUTCOME_RULES.items()},
+    "expert.actions.element": Rule(0, 11),
+    "expert.steps": Rule(1, 500),
+    "expert.pushes": Rule(0, 500),
+    "expert.picks": Rule(0, 500),
+    "expert.path_m": Rule(0.0, 125.0, digits=2),
     "physics.engine": NAME,
     "physics.build": WORDS,
     "physics.settle_s": FROM_ZERO,

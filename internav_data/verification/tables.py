@@ -10,7 +10,9 @@ from internav_data.dataset import ASSETS, EPISODES, SCENES, TABLES, from_table, 
 from internav_data.records import OUTSIDE
 from internav_data.records.errors import InternavError
 from internav_data.verification.findings import Collector
+from internav_data.verification.interactions import check_interactions
 from internav_data.verification.ranges import check_ranges
+from internav_data.verification.settings import settings_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -203,20 +205,22 @@ def _check_episodes(
         ):
             expect("room_count", len(scene.room_ids) if scene else 0, room_count)
     report.scene = ""
-    _check_references(table, keys, report)
+    solvable = settings_of(manifest.config).solvable
+    _check_references(table, keys, report, solvable=solvable)
 
 
 def _lengths(table: pa.Table, name: str) -> list[int]:
     return [n for chunk in table.column(name).chunks for n in chunk.value_lengths().to_pylist()]
 
 
-def _check_references(table: pa.Table, keys: Keys, report: Collector) -> None:
-    """Judge the room, door and asset ids that episodes name."""
+def _check_references(table: pa.Table, keys: Keys, report: Collector, *, solvable: bool) -> None:
+    """Judge the room, door and asset ids that episodes name, and what their interactions say."""
     for episode in from_table(table, EPISODES):
         scene = keys.scenes.get(episode.scene_id)
         if scene is None:
             continue
         report.scene = episode.scene_id
+        check_interactions(episode, report, solvable=solvable)
         rooms = {episode.start.room, episode.goal.room}
         rooms.update(room for path in episode.room_paths for room in path)
         doors = {door for path in episode.node_paths for door in path.doors}

@@ -35,10 +35,10 @@ def part(shape, centre, size):
     return Part(shape, centre, size, UPRIGHT, (), (120, 90, 60), "wood")
 
 
-def asset(asset_id, size, parts=None, *, mass=8.0, spawnable=True):
+def asset(asset_id, size, parts=None, *, mass=8.0, spawnable=True, pickable=False):
     parts = parts or (part("box", (0.0, 0.0, size[2] / 2), size),)
     return Asset(
-        asset_id, asset_id.split("_")[0], size, mass, 0.6, True, False, spawnable, True, parts
+        asset_id, asset_id.split("_")[0], size, mass, 0.6, True, pickable, spawnable, True, parts
     )
 
 
@@ -63,6 +63,8 @@ ASSETS = {
         asset("Box_2", (0.3, 0.4, 0.6)),
         asset("Bar_1", (1.2, 0.2, 0.7)),
         asset("Drum_1", (0.5, 0.5, 0.6), (part("cylinder", (0.0, 0.0, 0.3), (0.5, 0.5, 0.6)),)),
+        asset("Pot_1", (0.4, 0.4, 0.4), mass=3.0, pickable=True),
+        asset("Safe_1", (0.6, 0.6, 0.9), mass=300.0),
         table("Table_1", 1.4, 0.8, 0.75),
         asset("Cupboard_1", (1.0, 0.5, 1.8), spawnable=False),
     )
@@ -412,9 +414,10 @@ IDENTITY = Identity(
 )
 
 
-def write_dataset(root, scenes, assets=None):
+def write_dataset(root, scenes, assets=None, config=None):
     """Write scenes as a dataset, by the same road as the generator."""
-    work = open_work(root, IDENTITY)
+    identity = replace(IDENTITY, config={**IDENTITY.config, **(config or {})})
+    work = open_work(root, identity)
     for number, (house, episodes) in enumerate(scenes):
         write_scene_work(work, number, house, episodes)
-    return assemble(root, IDENTITY, list((assets or ASSETS).values()), len(scenes))
+    return assemble(root, identity, list((assets or ASSETS).values()), len(scenes))

@@ -56,7 +56,7 @@ def test_sample_looks_at_so_many_scenes(dataset):
 
 def test_arguments_are_judged(dataset, tmp_path):
     with pytest.raises(UsageError, match="level"):
-        validate(dataset, "physics")
+        validate(dataset, "chemistry")
     with pytest.raises(UsageError, match="sample"):
         validate(dataset, sample=0)
     with pytest.raises(UsageError, match="workers"):

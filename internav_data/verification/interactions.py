@@ -1,0 +1,161 @@
+"""What outcomes and experts must be whatever physics says: order, counts, flags that follow."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from internav_data.records import Episode, Expert, Obstacle, Outcome
+    from internav_data.verification.findings import Collector
+
+PUSH_OUTCOMES = ("push_east", "push_north", "push_west", "push_south")
+PICK_OUTCOME = "pick"
+OUTCOMES = (*PUSH_OUTCOMES, PICK_OUTCOME)
+PUSH_REASONS = ("", "not pushable", "too heavy", "something is in the way")
+PICK_REASONS = ("", "not pickable", "something rests on it")
+PUSHED_M = 0.05
+"""A push that moves a thing less has failed."""
+
+ACTIONS = 12
+MOVE, ROTATE_LEFT, ROTATE_RIGHT = 0, 1, 2
+PUSHES = (5, 6, 7, 8)
+PICK, DROP, DONE = 9, 10, 11
+MOST_ACTIONS = 500
+SPACING_M = 0.25
+ROUNDED_M = 1e-4
+"""Stored lengths are rounded to 0.1 mm."""
+
+
+class _Judge:
+    """One episode before its predicates."""
+
+    def __init__(self, episode: Episode, report: Collector) -> None:
+        self._episode = episode
+        self._report = report
+
+    def expect(self, holds: object, name: str, expected: object, got: object) -> None:
+        self._report.expect(
+            holds, f"schema.episodes.{name}", expected, got, self._episode.episode_id
+        )
+
+    def outcomes(self) -> None:
+        """Judge the outcomes: of all obstacles or of none."""
+        known = [o.outcomes is not None for o in self._episode.obstacles]
+        self.expect(all(known) or not any(known), "outcomes.all", "all or none", known)
+        for number, obstacle in enumerate(self._episode.obstacles):
+            if obstacle.outcomes is None:
+                continue
+            what = f"obstacle {number} ({obstacle.asset_id})"
+            actions = tuple(outcome.action for outcome in obstacle.outcomes)
+            self.expect(actions == OUTCOMES, "outcomes.order", f"{what}: {OUTCOMES}", actions)
+            for outcome in obstacle.outcomes:
+                self._outcome(obstacle, outcome, f"{what}, {outcome.action}")
+
+    def _outcome(self, obstacle: Obstacle, outcome: Outcome, what: str) -> None:
+        pick = outcome.action == PICK_OUTCOME
+        reasons = PICK_REASONS if pick else PUSH_REASONS
+        reason, able = outcome.reason, obstacle.pickable if pick else obstacle.pushable
+        self.expect(reason in reasons, "outcomes.reason", f"{what}: one of {reasons}", reason)
+        self.expect(
+            (reason == "") == outcome.success,
+            "outcomes.success",
+            f"{what}: a reason when it fails, none else",
+            f"success {outcome.success}, reason {reason!r}",
+        )
+        self.expect(
+            (reason == reasons[1]) == (not able),
+            "outcomes.able",
+            f"{what}: {reasons[1]!r} if and only if it is",
+            repr(reason),
+        )
+        far, seconds = outcome.displacement_m, outcome.seconds
+        moved = far == 0.0 if pick or not outcome.success else far >= PUSHED_M
+        self.expect(
+            moved, "outcomes.displacement", f"{what}: {PUSHED_M} m or more if pushed, else 0", far
+        )
+        idle = pick or not able
+        self.expect(
+            (seconds == 0.0) == idle, "outcomes.seconds", f"{what}: 0 unless pushed", seconds
+        )
+        self._distances(outcome, what, pick=pick)
+
+    def _distances(self, outcome: Outcome, what: str, *, pick: bool) -> None:
+        episode = self._episode
+        steps, way_m = outcome.steps, outcome.way_m
+        opened = outcome.success and episode.steps is None and steps is not None
+        self.expect(
+            outcome.opened == opened, "outcomes.opened", f"{what}: {opened}", outcome.opened
+        )
+        if not outcome.success:
+            before = (episode.steps, episode.way_m)
+            same = (steps, way_m) == before
+            self.expect(same, "outcomes.unchanged", f"{what}: {before}", (steps, way_m))
+            return
+        straight = math.dist((episode.start.x, episode.start.y), (episode.goal.x, episode.goal.y))
+        least = max(straight, episode.clear_m) if pick else straight
+        most = math.inf if steps is None else steps * SPACING_M
+        if pick and episode.way_m is not None:
+            most = min(most, episode.way_m)
+        # A way on the lattice is a way; less in it makes no way longer.
+        length = math.inf if way_m is None else way_m
+        self.expect(
+            least - ROUNDED_M <= length <= most + ROUNDED_M,
+            "outcomes.way_m",
+            f"{what}: {least:.4f} … {most:.4f} m",
+            way_m,
+        )
+        if pick:
+            far = math.inf if steps is None else steps
+            longest = math.inf if episode.steps is None else episode.steps
+            self.expect(
+                episode.clear_steps <= far <= longest,
+                "outcomes.steps",
+                f"{what}: {episode.clear_steps} … {longest}",
+                steps,
+            )
+
+    def expert(self, expert: Expert) -> None:
+        """Judge what the expert's own actions say."""
+        actions = expert.actions
+        unknown = [a for a in actions if not 0 <= a < ACTIONS]
+        self.expect(not unknown, "expert.actions", f"0 … {ACTIONS - 1}", unknown)
+        self.expect(
+            0 < len(actions) <= MOST_ACTIONS,
+            "expert.actions",
+            f"1 … {MOST_ACTIONS} actions",
+            len(actions),
+        )
+        ends = [k for k, action in enumerate(actions) if action == DONE]
+        last = [len(actions) - 1]
+        self.expect(ends == last, "expert.done", f"Done ({DONE}) once, at the end", ends)
+        for name, true in (
+            ("steps", len(actions)),
+            ("pushes", sum(actions.count(push) for push in PUSHES)),
+            ("picks", actions.count(PICK)),
+            ("path_m", SPACING_M * actions.count(MOVE)),
+        ):
+            stated = getattr(expert, name)
+            self.expect(stated == true, f"expert.{name}", true, stated)
+        hands = [a for a in actions if a in {PICK, DROP}]
+        by_turns = all(a == (PICK, DROP)[k % 2] for k, a in enumerate(hands))
+        self.expect(by_turns, "expert.hands", "Pickup and Drop by turns", hands)
+
+
+def check_interactions(episode: Episode, report: Collector, *, solvable: bool) -> None:
+    """Judge the outcomes and the expert of an episode, where it has them.
+
+    Parameters
+    ----------
+    episode, report
+        What to judge, and where findings go.
+    solvable
+        Whether every episode of the dataset was promised to have an expert.
+
+    """
+    judge = _Judge(episode, report)
+    judge.outcomes()
+    if episode.expert is not None:
+        judge.expert(episode.expert)
+    elif solvable:
+        judge.expect(False, "expert.present", "an expert", None)  # noqa: FBT003 - counted

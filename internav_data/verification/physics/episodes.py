@@ -1,0 +1,40 @@
+"""Plays one episode again: settling, outcomes, expert."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from internav_data.verification.physics.experts import check_expert
+from internav_data.verification.physics.outcomes import check_outcomes
+from internav_data.verification.physics.settling import check_settling
+from internav_data.world import engine_of_this_process
+
+if TYPE_CHECKING:
+    from internav_data.records import Episode
+    from internav_data.verification.findings import Collector
+    from internav_data.verification.physics.theatre import Theatre
+
+
+def replay_episode(theatre: Theatre, episode: Episode, report: Collector) -> None:
+    """Judge the physics of an episode whose geometry is true.
+
+    What cannot be judged is counted among the report's notes.
+    """
+    name = episode.episode_id
+
+    def expect(holds: object, predicate: str, expected: object, got: object) -> bool:
+        return report.expect(holds, predicate, expected, got, name)
+
+    engine = engine_of_this_process()
+    made = f"{episode.physics.engine} of {episode.physics.build}"
+    here = f"{engine.name} of {engine.build}"
+    if made != here:
+        report.notes[f"made by {made}, checked by {here}: results may differ"] += 1
+    check_settling(theatre, episode, expect)
+    if any(obstacle.outcomes is None for obstacle in episode.obstacles):
+        report.notes["no outcomes stored: not checked"] += 1
+    check_outcomes(theatre, episode, expect)
+    if episode.expert is None:
+        report.notes["no expert stored: not checked"] += 1
+    check_expert(theatre, episode, expect)
+    report.counts["replayed"] += 1

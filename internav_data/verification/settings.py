@@ -1,0 +1,48 @@
+"""What of a dataset's config the validator has to know."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+from internav_data.records.errors import CorruptDataError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+GAP_M = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How the episodes were made, as far as it changes what is true of them."""
+
+    push_model: Literal["force", "kick"] = "force"
+    gap_m: float = GAP_M
+    """Least distance of a spawned obstacle from everything else, metres."""
+    solvable: bool = False
+    """Every episode was promised to have an expert."""
+
+
+def settings_of(config: Mapping[str, Any]) -> Settings:
+    """Read them from a manifest's config; what it does not say is the default.
+
+    Raises
+    ------
+    CorruptDataError
+        A value that no generator writes.
+
+    """
+    episodes = config.get("episodes")
+    values: Mapping[str, Any] = episodes if isinstance(episodes, dict) else {}
+    model, gap = values.get("push_model", "force"), values.get("gap_m", GAP_M)
+    if model not in {"force", "kick"}:
+        raise CorruptDataError(
+            f"manifest.json: config.episodes.push_model: expected force or kick, got {model!r}; "
+            "generate the dataset again"
+        )
+    return Settings(
+        push_model=model,
+        gap_m=float(gap) if isinstance(gap, int | float) else GAP_M,
+        solvable=values.get("keep_unsolvable") is False,
+    )

@@ -1,0 +1,75 @@
+"""Hand-made scenes whose obstacles have settled, with outcomes and experts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import scenery
+from scenery import ASSETS, Grid, obstacle, small_scenes, thing
+
+from internav_data.episodes.expert import expert_of_episode
+from internav_data.episodes.outcomes import outcomes_of
+from internav_data.records import Pose
+from internav_data.world import Stage, World, engine_of_this_process, settle
+
+
+def settled(one):
+    """An obstacle where it comes to rest."""
+    asset = ASSETS[one.asset_id]
+    spot = Pose(one.x, one.y, 0.0, one.quaternion)
+    rest = settle(asset, spot, 0.01, list)
+    assert not rest.refusal
+    return replace(
+        one,
+        x=rest.pose.x,
+        y=rest.pose.y,
+        z=rest.pose.z,
+        quaternion=rest.pose.quaternion,
+        settle_s=rest.seconds,
+        settle_penetration_m=rest.penetration_m,
+    )
+
+
+def played(house, episode, model="force"):
+    """An episode with settled obstacles, outcomes and expert."""
+    engine = engine_of_this_process()
+    resting = tuple(settled(one) for one in episode.obstacles)
+    episode = replace(
+        episode,
+        obstacles=resting,
+        physics=replace(
+            episode.physics,
+            engine=engine.name,
+            build=engine.build,
+            settle_s=max(o.settle_s for o in resting),
+            penetration_m=max(o.settle_penetration_m for o in resting),
+        ),
+    )
+    stage = Stage.of(replace(house, assets=ASSETS))
+    outcomes = outcomes_of(World.of_episode(stage, episode, ASSETS, model))
+    return replace(
+        episode,
+        obstacles=tuple(
+            replace(o, outcomes=five) for o, five in zip(resting, outcomes, strict=True)
+        ),
+        expert=expert_of_episode(stage, episode, ASSETS, model),
+    )
+
+
+def crowded():
+    """A safe and a pot before the door, and furniture where the pot goes when it is pushed."""
+    things = (thing(0, "Table_1", 0, 1.0, 0.6), thing(1, "Box_2", 0, 3.4, 2.7))
+    house = Grid(2, 1).house(2, things)
+    pot = obstacle("Pot_1", 3.4, 2.1)
+    safe = obstacle("Safe_1", 3.4, 1.4)
+    shut = scenery.episode(house, 0, (4, 8), (28, 8), [safe, pot], clear_m=6.0, way_m=None)
+    box = obstacle("Box_1", 2.5, 2.0)
+    way_m = small_scenes()[0][1][1].way_m
+    longer = scenery.episode(house, 1, (4, 8), (28, 8), [box], clear_m=6.0, way_m=way_m)
+    return house, [shut, longer]
+
+
+def physical_scenes(model="force"):
+    """Three scenes: a bar in a door, a box on the way, and `crowded`."""
+    raw = [*small_scenes()[:2], crowded()]
+    return [(house, [played(house, e, model) for e in episodes]) for house, episodes in raw]

@@ -1,0 +1,149 @@
+"""Outcomes and experts that cannot be, whatever physics says."""
+
+from dataclasses import replace
+
+import physical
+import pytest
+from scenery import write_dataset
+
+from internav_data.verification import validate
+from internav_data.verification.findings import Collector
+from internav_data.verification.interactions import check_interactions
+
+
+@pytest.fixture(scope="module")
+def scenes():
+    return physical.physical_scenes()
+
+
+def judged(episode, *, solvable=False):
+    report = Collector()
+    check_interactions(episode, report, solvable=solvable)
+    return {name.removeprefix("schema.episodes.") for name in report.by_predicate}
+
+
+def with_outcome(episode, place, number=0, /, **changes):
+    obstacles = list(episode.obstacles)
+    five = list(obstacles[number].outcomes)
+    five[place] = replace(five[place], **changes)
+    obstacles[number] = replace(obstacles[number], outcomes=tuple(five))
+    return replace(episode, obstacles=tuple(obstacles))
+
+
+def test_true_ones_pass(scenes):
+    for _, episodes in scenes:
+        for episode in episodes:
+            assert judged(episode, solvable=True) == set()
+
+
+# scene, episode, place among the five, obstacle, changes
+OUTCOMES = {
+    "order": ((0, 0, 0, 0, {"action": "push_south"}), "outcomes.order"),
+    "reason of another kind": (
+        (0, 0, 4, 0, {"reason": "something is in the way"}),
+        "outcomes.reason",
+    ),
+    "no reason": ((2, 0, 0, 0, {"reason": ""}), "outcomes.success"),
+    "a reason for success": ((0, 0, 0, 0, {"reason": "too heavy"}), "outcomes.success"),
+    "pushable after all": (
+        (2, 0, 0, 0, {"reason": "not pushable", "seconds": 0.0}),
+        "outcomes.able",
+    ),
+    "not pickable after all": (
+        (0, 0, 4, 0, {"success": True, "reason": ""}),
+        "outcomes.able",
+    ),
+    "hardly moved": ((0, 0, 2, 0, {"displacement_m": 0.04}), "outcomes.displacement"),
+    "moved though it failed": ((2, 0, 0, 0, {"displacement_m": 0.2}), "outcomes.displacement"),
+    "picking moves": ((2, 0, 4, 1, {"displacement_m": 0.1}), "outcomes.displacement"),
+    "picking takes time": ((2, 0, 4, 1, {"seconds": 0.1}), "outcomes.seconds"),
+    "pushing takes none": ((0, 0, 2, 0, {"seconds": 0.0}), "outcomes.seconds"),
+    "not opened": ((0, 0, 2, 0, {"opened": False}), "outcomes.opened"),
+    "opened what was open": ((0, 1, 0, 0, {"opened": True}), "outcomes.opened"),
+    "changed though it failed": ((2, 0, 0, 0, {"way_m": 6.5}), "outcomes.unchanged"),
+    "steps though it failed": ((0, 1, 4, 0, {"steps": 27}), "outcomes.unchanged"),
+    "longer than the lattice": ((0, 0, 2, 0, {"way_m": 8.1}), "outcomes.way_m"),
+    "shorter than straight": ((0, 0, 2, 0, {"way_m": 5.9}), "outcomes.way_m"),
+    "no way off the lattice": ((0, 0, 2, 0, {"way_m": None}), "outcomes.way_m"),
+    "fewer steps than on clear ground": ((2, 0, 4, 1, {"steps": 22}), "outcomes.steps"),
+}
+
+
+@pytest.mark.parametrize("case", OUTCOMES)
+def test_outcome_cannot_be(scenes, case):
+    (scene, index, place, number, changes), predicate = OUTCOMES[case]
+    episode = with_outcome(scenes[scene][1][index], place, number, **changes)
+    assert predicate in judged(episode)
+
+
+def test_a_longer_way_once_something_is_gone(scenes):
+    box = scenes[0][1][1].obstacles[0]
+    gone = replace(
+        box.outcomes[4], success=True, reason="", steps=30, way_m=6.4, displacement_m=0.0
+    )
+    light = replace(box, pickable=True, outcomes=(*box.outcomes[:4], gone))
+    episode = replace(scenes[0][1][1], obstacles=(light,))
+    assert judged(episode) == {"outcomes.way_m", "outcomes.steps"}
+
+
+def test_outcomes_of_some_obstacles_only(scenes):
+    episode = scenes[2][1][0]
+    some = (replace(episode.obstacles[0], outcomes=None), *episode.obstacles[1:])
+    assert judged(replace(episode, obstacles=some)) == {"outcomes.all"}
+
+
+EXPERTS = {
+    "unknown action": (lambda e: {"actions": (12, *e.actions), "steps": e.steps + 1}, "actions"),
+    "nothing done": (lambda _: {"actions": (), "steps": 0, "pushes": 0, "path_m": 0.0}, "actions"),
+    "too much done": (
+        lambda e: {"actions": (1, 1) * 250 + e.actions, "steps": e.steps + 500},
+        "actions",
+    ),
+    "not done": (lambda e: {"actions": e.actions[:-1], "steps": e.steps - 1}, "done"),
+    "done twice": (lambda e: {"actions": (11, *e.actions), "steps": e.steps + 1}, "done"),
+    "steps": (lambda e: {"steps": e.steps + 1}, "steps"),
+    "pushes": (lambda e: {"pushes": e.pushes + 1}, "pushes"),
+    "picks": (lambda e: {"picks": e.picks + 1}, "picks"),
+    "path": (lambda e: {"path_m": e.path_m + 0.25}, "path_m"),
+    "dropped unpicked": (lambda e: {"actions": (10, *e.actions), "steps": e.steps + 1}, "hands"),
+}
+
+
+@pytest.mark.parametrize("case", EXPERTS)
+def test_expert_cannot_be(scenes, case):
+    change, predicate = EXPERTS[case]
+    expert = scenes[0][1][0].expert
+    episode = replace(scenes[0][1][0], expert=replace(expert, **change(expert)))
+    assert f"expert.{predicate}" in judged(episode)
+
+
+def test_two_picks_without_a_drop(scenes):
+    expert = scenes[2][1][0].expert
+    twice = replace(expert, actions=(9, *expert.actions), steps=expert.steps + 1, picks=2)
+    assert judged(replace(scenes[2][1][0], expert=twice)) == {"expert.hands"}
+
+
+def test_a_missing_expert_is_untrue_where_one_was_promised(tmp_path, scenes):
+    house, episodes = scenes[0]
+    bare = [(house, [replace(episodes[0], expert=None), episodes[1]]), *scenes[1:]]
+    for keep, untrue in ((False, {"schema.episodes.expert.present"}), (True, set())):
+        root = tmp_path / str(keep)
+        write_dataset(root, bare, config={"episodes": {"keep_unsolvable": keep}})
+        assert set(validate(root, "schema").by_predicate) == untrue
+
+
+RANGES = {
+    "reason": (lambda e: with_outcome(e, 0, reason="no luck"), "outcomes.element.reason"),
+    "action": (lambda e: with_outcome(e, 0, action="kick_east"), "outcomes.element.action"),
+    "seconds": (lambda e: with_outcome(e, 0, seconds=5.6), "outcomes.element.seconds"),
+    "unrounded": (lambda e: with_outcome(e, 0, way_m=6.12345678), "outcomes.element.way_m"),
+}
+
+
+@pytest.mark.parametrize("case", RANGES)
+def test_value_out_of_its_range(tmp_path, scenes, case):
+    change, column = RANGES[case]
+    house, episodes = scenes[0]
+    write_dataset(tmp_path, [(house, [change(episodes[0]), episodes[1]]), *scenes[1:]])
+    found = validate(tmp_path, "schema").by_predicate
+    assert f"schema.episodes.obstacles.element.{column}" in found

@@ -1,0 +1,349 @@
+"""Settling, outcomes and experts are changed one at a time; playing them again must find it."""
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import physical
+import pytest
+import scenery
+from scenery import ASSETS, write_dataset
+
+import internav_data.world.steps
+from internav_data.navigation import Lattice
+from internav_data.records import Pose
+from internav_data.records.errors import CorruptDataError
+from internav_data.verification import validate
+from internav_data.verification.interactions import check_interactions
+from internav_data.verification.physics import Theatre
+from internav_data.verification.physics.outcomes import _Judge
+from internav_data.verification.scenes import check_scene
+from internav_data.verification.settings import Settings
+from internav_data.verification.shapes import Shapes
+from internav_data.verification.site import Site
+from internav_data.world import Item, World
+
+FORCE = Settings()
+
+
+@pytest.fixture(scope="module")
+def scenes():
+    return physical.physical_scenes()
+
+
+def judged(tmp_path, scenes, level="physics", assets=None, config=None, **options):
+    write_dataset(tmp_path / "ds", scenes, assets, config)
+    return validate(tmp_path / "ds", level, **options)
+
+
+def changed(scenes, scene, index, /, **changes):
+    house, episodes = scenes[scene]
+    episodes = list(episodes)
+    episodes[index] = replace(episodes[index], **changes)
+    return [*scenes[:scene], (house, episodes), *scenes[scene + 1 :]]
+
+
+def found_in(scenes, scene, index, assets=None):
+    """What is found in one episode, as read back: schema's interactions, geometry, physics."""
+    house, episodes = scenes[scene]
+    report = check_scene(house, episodes[index : index + 1], Shapes(assets or ASSETS), "", FORCE)
+    check_interactions(episodes[index], report, solvable=True)
+    assert {f.episode for f in report.found} <= {f"scene-{scene:06d}/{index:04d}"}
+    return set(report.by_predicate)
+
+
+def obstacle_changed(scenes, scene, index, number=0, **changes):
+    """Change an obstacle, and the maxima that follow from it."""
+    episode = scenes[scene][1][index]
+    obstacles = list(episode.obstacles)
+    obstacles[number] = replace(obstacles[number], **changes)
+    physics = replace(
+        episode.physics,
+        settle_s=max(o.settle_s for o in obstacles),
+        penetration_m=max(o.settle_penetration_m for o in obstacles),
+    )
+    return changed(scenes, scene, index, obstacles=tuple(obstacles), physics=physics)
+
+
+def outcome_changed(scenes, scene, index, action, number=0, **changes):
+    obstacle = scenes[scene][1][index].obstacles[number]
+    outcomes = tuple(
+        replace(one, **changes) if one.action == action else one for one in obstacle.outcomes
+    )
+    return obstacle_changed(scenes, scene, index, number, outcomes=outcomes)
+
+
+def expert_changed(scenes, scene, index, edit):
+    """Edit an expert's actions; its counts are kept true."""
+    expert = scenes[scene][1][index].expert
+    actions = tuple(edit(list(expert.actions)))
+    expert = replace(
+        expert,
+        actions=actions,
+        steps=len(actions),
+        pushes=sum(5 <= a <= 8 for a in actions),
+        picks=actions.count(9),
+        path_m=0.25 * actions.count(0),
+    )
+    return changed(scenes, scene, index, expert=expert)
+
+
+def test_scenes_hold_what_the_tests_need(scenes):
+    # 0: a bar in a door, opened by pushing; 2: a safe too heavy, a pot to pick up, furniture moved.
+    reasons = {o.reason for _, es in scenes for e in es for b in e.obstacles for o in b.outcomes}
+    assert reasons == {"", "too heavy", "not pickable"}
+    assert scenes[0][1][0].obstacles[0].outcomes[2].opened
+    assert scenes[2][1][0].obstacles[1].outcomes[4].opened
+    assert scenes[2][1][0].expert.picks == 1
+    assert scenes[0][1][0].expert.pushes > 0
+    stage = physical.Stage.of(replace(scenes[2][0], assets=ASSETS))
+    world = World.of_episode(stage, scenes[2][1][0], ASSETS)
+    assert [k for k, _ in world.pushed(2, 1, agent=False).moved] == [0]
+    assert stage.thing_ids[0] == 1
+
+
+def test_what_is_true_is_valid(tmp_path, scenes):
+    findings = judged(tmp_path, scenes)
+    assert findings.ok, findings.summary()
+    assert findings.level == "physics"
+    assert findings.checked["replayed"] == findings.checked["episodes"] == 6
+    assert findings.notes == {}
+
+
+def test_workers_and_sample_change_nothing(tmp_path, scenes, monkeypatch):
+    wrong = outcome_changed(scenes, 2, 0, "push_east", number=1, displacement_m=0.4)
+    told = []
+    alone = judged(tmp_path, wrong, progress=lambda *step: told.append(step))
+    assert set(alone.by_predicate) == {"physics.outcome-displacement"}
+    assert told[-1] == ("physics", 3, 3)
+    monkeypatch.setattr("internav_data.verification.levels.SCENES_A_UNIT", 1)
+    assert validate(tmp_path / "ds", "physics", workers=2) == alone
+    sample = validate(tmp_path / "ds", "physics", sample=1)
+    assert sample.checked["scenes"] == 1
+    assert sample.checked["replayed"] == 2
+    assert sample == validate(tmp_path / "ds", "physics", sample=1)
+
+
+SETTLING = {
+    "higher": ({"z": 0.0021}, "physics.settle-pose"),
+    "leaning": ({"quaternion": (0.001, 0.0, 0.707107, 0.707106)}, "physics.settle-pose"),
+    "turned": ({"quaternion": (0.0, 0.0, 0.713251, 0.70091)}, "physics.settle-pose"),
+    "later": ({"settle_s": 0.5}, "physics.settle-time"),
+    "deeper": ({"settle_penetration_m": 0.001}, "physics.settle-depth"),
+}
+
+
+@pytest.mark.parametrize("case", SETTLING)
+def test_settled_otherwise(scenes, case):
+    changes, predicate = SETTLING[case]
+    found = found_in(obstacle_changed(scenes, 0, 0, **changes), 0, 0)
+    assert predicate in found
+    assert all(name.startswith("physics.") for name in found)
+
+
+def test_what_topples_was_not_settled(scenes):
+    # A tray on one leg in its corner covers what the box covers, and cannot stand.
+    tray = scenery.part("box", (0.0, 0.0, 0.59), (0.3, 0.4, 0.02))
+    leg = scenery.part("box", (0.14, 0.19, 0.29), (0.02, 0.02, 0.58))
+    assets = {**ASSETS, "Box_2": scenery.asset("Box_2", (0.3, 0.4, 0.6), (tray, leg))}
+    assert "physics.settle-refused" in found_in(scenes, 1, 1, assets)
+
+
+FAILED = {"success": False, "displacement_m": 0.0, "opened": False}
+OUTCOMES = {
+    "another reason": (
+        (2, 0, "push_east", 0, {"reason": "something is in the way"}),
+        "physics.outcome-reason",
+    ),
+    "no success": (
+        (0, 0, "push_north", 0, {**FAILED, "way_m": None, "reason": "too heavy"}),
+        "physics.outcome-success",
+    ),
+    "no pick": (
+        (
+            2,
+            0,
+            "pick",
+            1,
+            {**FAILED, "steps": None, "way_m": None, "reason": "something rests on it"},
+        ),
+        "physics.outcome-success",
+    ),
+    "success": (
+        (2, 0, "push_east", 0, {"success": True, "displacement_m": 0.1, "reason": ""}),
+        "physics.outcome-success",
+    ),
+    "farther": ((0, 0, "push_west", 0, {"displacement_m": 0.7}), "physics.outcome-displacement"),
+    "longer": ((0, 0, "push_west", 0, {"seconds": 1.0}), "physics.outcome-seconds"),
+    "more steps": ((0, 1, "push_north", 0, {"steps": 28}), "physics.outcome-steps"),
+    "still shut": (
+        (0, 0, "push_west", 0, {"steps": None, "opened": False}),
+        "physics.outcome-steps",
+    ),
+    "more steps round moved furniture": (
+        (2, 0, "push_north", 1, {"steps": 28, "opened": True}),
+        "physics.outcome-steps",
+    ),
+    "a longer way": ((0, 1, "push_north", 0, {"way_m": 6.03}), "physics.outcome-way-m"),
+    "a longer way round moved furniture": (
+        (2, 0, "push_north", 1, {"way_m": 6.03}),
+        "physics.outcome-way-m",
+    ),
+    "a way where none is": ((0, 0, "push_south", 0, {"way_m": 6.5}), "physics.outcome-way-m"),
+    "no way where one is": ((0, 0, "push_north", 0, {"way_m": None}), "physics.outcome-way-m"),
+    "more steps once picked": ((2, 0, "pick", 1, {"steps": 26}), "physics.outcome-steps"),
+}
+
+
+@pytest.mark.parametrize("case", OUTCOMES)
+def test_outcome_says_something_untrue(scenes, case):
+    (scene, index, action, number, changes), predicate = OUTCOMES[case]
+    wrong = outcome_changed(scenes, scene, index, action, number, **changes)
+    found = found_in(wrong, scene, index)
+    assert predicate in found
+    assert all(name.startswith("physics.outcome") for name in found)
+
+
+def without(action):
+    def edit(actions):
+        actions.remove(action)
+        return actions
+
+    return edit
+
+
+EXPERTS = {
+    "a step less": (0, 0, without(0)),
+    "a turn less": (0, 1, lambda actions: [a for a in actions if a not in {1, 2}]),
+    "no push": (0, 0, lambda actions: [a for a in actions if not 5 <= a <= 8]),
+    "another push": (0, 0, lambda actions: [6 if a == 8 else a for a in actions]),
+    "no pick": (2, 0, without(9)),
+    "a look too far": (2, 1, lambda actions: [3, 3, 3, *actions]),
+}
+
+
+@pytest.mark.parametrize("case", EXPERTS)
+def test_expert_does_not_get_there(scenes, case):
+    scene, index, edit = EXPERTS[case]
+    found = found_in(expert_changed(scenes, scene, index, edit), scene, index)
+    assert found == {"physics.expert-action"}
+
+
+def test_a_detour_is_no_untruth(scenes):
+    assert not found_in(expert_changed(scenes, 2, 1, lambda actions: [1, 2, *actions]), 2, 1)
+
+
+# the world itself is wrong: what the validator derives by its own means must say so
+
+
+def test_world_that_calls_any_place_the_goal(scenes, monkeypatch):
+    monkeypatch.setattr(internav_data.world.steps, "GOAL_M", 99.0)
+    there = expert_changed(scenes, 2, 1, lambda _: [1, 11])
+    assert found_in(there, 2, 1) == {"physics.expert-goal"}
+
+
+def test_world_that_lets_the_agent_through_things(scenes, monkeypatch):
+    monkeypatch.setattr(Lattice, "edge_free", lambda *_: True)
+    straight = expert_changed(scenes, 2, 1, lambda _: [2, *[0] * 24, 11])
+    assert found_in(straight, 2, 1) == {"physics.expert-clear"}
+
+
+def test_world_that_reaches_everything(scenes, monkeypatch):
+    monkeypatch.setattr(World, "target", lambda world, **_: world.obstacles[-1])
+    early = expert_changed(scenes, 2, 0, lambda actions: [9, *without(9)(actions)])
+    assert found_in(early, 2, 0) == {"physics.expert-reach"}
+
+
+def test_what_carries_something_is_not_picked_up(scenes):
+    house, episodes = scenes[2]
+    tall = scenery.part("box", (0.0, 0.0, 0.602), (0.3, 0.4, 0.396))
+    assets = {**ASSETS, "Bar_1": scenery.asset("Bar_1", (0.3, 0.4, 0.6), (tall,))}
+
+    def at(asset_id, x):
+        return Item.at(assets[asset_id], Pose(x, 2.0, 0.0, (0.0, 0.0, 0.0, 1.0)))
+
+    outcome = episodes[0].obstacles[0].outcomes[4]
+    theatre = Theatre(Site(house, Shapes(assets)), FORCE)
+    judge = _Judge(theatre, episodes[0], outcome, "", lambda *_: True)
+    under, over = at("Pot_1", 3.0), at("Bar_1", 3.1)
+    assert judge._carries([under, over], 0)
+    assert not judge._carries([under, over], 1)
+    assert not judge._carries([under, at("Bar_1", 3.6)], 0)
+
+
+# what cannot be judged is said
+
+
+def test_null_columns_are_counted(tmp_path, scenes):
+    house, episodes = scenes[0]
+    bare = replace(
+        episodes[0],
+        expert=None,
+        obstacles=tuple(replace(o, outcomes=None) for o in episodes[0].obstacles),
+    )
+    findings = judged(tmp_path, [(house, [bare, replace(episodes[1], expert=None)]), *scenes[1:]])
+    assert findings.ok, findings.summary()
+    assert findings.notes == {
+        "no expert stored: not checked": 2,
+        "no outcomes stored: not checked": 1,
+    }
+    assert "note: 2 x no expert stored" in findings.summary()
+
+
+def test_another_build_is_noted(tmp_path, scenes):
+    physics = replace(scenes[0][1][0].physics, build="pybullet 9.9.9")
+    findings = judged(tmp_path, changed(scenes, 0, 0, physics=physics))
+    assert findings.ok
+    (note,) = findings.notes
+    assert "made by bullet of pybullet 9.9.9, checked by bullet of pybullet" in note
+    assert findings.notes[note] == 1
+
+
+def test_untrue_geometry_is_not_played(tmp_path, scenes):
+    findings = judged(tmp_path, changed(scenes, 0, 1, clear_steps=26))
+    assert "episode.clear-steps" in findings.by_predicate
+    assert findings.notes == {"geometry not as stated: physics not checked": 1}
+    assert findings.checked["replayed"] == 5
+
+
+def test_untrue_house_is_not_played(tmp_path, scenes):
+    house, episodes = scenes[0]
+    findings = judged(tmp_path, [(replace(house, area_m2=1.0), episodes), *scenes[1:]])
+    assert findings.notes == {"geometry not as stated: physics not checked": 2}
+
+
+def test_untrue_schema_is_not_played(tmp_path, scenes):
+    findings = judged(tmp_path, changed(scenes, 0, 1, index=3))
+    assert findings.notes == {"schema not as stated: physics not checked": 6}
+    assert "replayed" not in findings.checked
+
+
+# how the data were made
+
+
+def test_kicks_are_judged_as_kicks(tmp_path, scenes):
+    kicked = physical.physical_scenes("kick")
+    assert kicked != scenes
+    kick = {"episodes": {"push_model": "kick"}}
+    assert judged(tmp_path / "a", kicked, config=kick).ok
+    untrue = judged(tmp_path / "b", kicked).by_predicate
+    assert "physics.outcome-success" in untrue  # a kick moves the safe
+
+
+def test_unknown_push_model(tmp_path, scenes):
+    with pytest.raises(CorruptDataError, match="push_model"):
+        judged(tmp_path, scenes, config={"episodes": {"push_model": "shove"}})
+
+
+def test_geometry_needs_no_engine(tmp_path, scenes):
+    write_dataset(tmp_path / "ds", scenes)
+    script = (
+        "import sys\nfrom pathlib import Path\nfrom internav_data.verification import validate\n"
+        "assert validate(Path(sys.argv[1])).ok\n"
+        "assert not {'pybullet', 'internav_data.world', 'internav_data.navigation'} & {\n"
+        "    *sys.modules\n}\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, tmp_path / "ds"], capture_output=True, check=False, text=True
+    )
+    assert done.returncode == 0, done.stderr
