@@ -136,7 +136,9 @@ def _changed(frame: Image, shown: Image, last: Image, tolerance: int) -> Image:
         for x in range(width):
             far, other = False, False
             for k in range(3):
-                far |= abs(int(frame[y, x, k]) - int(shown[y, x, k])) > tolerance
+                # Signed: the difference of two uint8 wraps around.
+                off = np.int64(frame[y, x, k]) - np.int64(shown[y, x, k])
+                far |= abs(off) > tolerance
                 other |= frame[y, x, k] != last[y, x, k]
             out[y, x] = far and other
     return out

@@ -79,6 +79,16 @@ def test_what_did_not_change_is_not_stored_again(tmp_path):
     assert np.abs(pictures[1][50:60, 70:90].astype(int) - second[50:60, 70:90]).mean() < 16.0
 
 
+def test_a_shade_more_or_less_is_left_as_it_is():
+    rng = np.random.default_rng(5)
+    first = blocks(rng, 60)
+    second = np.clip(first + rng.integers(-2, 3, first.shape), 0, 255).astype(np.uint8)
+    one, two = io.BytesIO(), io.BytesIO()
+    write_gif(one, [first], 5.0)
+    write_gif(two, [first, second], 5.0)
+    assert len(two.getvalue()) - len(one.getvalue()) < 900
+
+
 def test_a_film_lasts_as_long_as_its_frames(tmp_path):
     rng = np.random.default_rng(4)
     a, b, c = (blocks(rng, 20) for _ in range(3))

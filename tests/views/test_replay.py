@@ -131,9 +131,20 @@ def test_what_is_held_is_told_and_leaves_an_outline(stage, hand_episode):
     assert told[3].startswith("drop Apple 2")
     cut = list(shots(played.story, 4.0))
     assert [s.poses[3] is None for s in cut] == [False, False, True, True, False, False]
-    held, before = (list(played.frames(size=SIZE, fps=4.0))[k] for k in (-10, 0))
     assert played.story.moments[1].world.held == 3
-    assert not np.array_equal(held, before)
+    # The camera no longer has it; what is shown in a corner instead is not the camera's.
+    assets, film = stage.house.assets, list(played.frames(size=SIZE, fps=4.0))
+    chair = episode.obstacles[0]
+    view = View(*_alone(stage, [(assets[chair.asset_id], chair.pose)]), 3.0, 1.25, 90.0, 30.0)
+    seen, wanted = eye(film[-9]), Camera(SIZE).render([view]).rgb[0]
+    assert np.array_equal(seen[: SIZE // 2], wanted[: SIZE // 2])
+    assert np.array_equal(seen[:, : SIZE // 2], wanted[:, : SIZE // 2])
+    assert not np.array_equal(seen[SIZE // 2 :, SIZE // 2 :], wanted[SIZE // 2 :, SIZE // 2 :])
+
+
+def _alone(stage, obstacles):
+    scenery = Scenery.of(stage.house)
+    return scenery, scenery.props(obstacles)
 
 
 def test_the_map_shows_the_agent_where_it_stands(tried, frames):
@@ -152,6 +163,43 @@ def test_the_map_shows_the_agent_where_it_stands(tried, frames):
     near = first[rows.start // 2 : rows.stop // 2, columns.start // 2 : columns.stop // 2]
     assert (np.abs(near.astype(int) - np.array(AGENT)).max(axis=-1) < 30).mean() < 0.1
     assert np.array_equal(painter.draw(shot), picture), "nothing of one picture is left in the next"
+
+
+def share_of(picture, canvas, low, high, colour):
+    """How much of a rectangle of the map, metres, is about of a colour."""
+    rows, columns = canvas.window(low, high)
+    near = picture[rows.start // 2 : rows.stop // 2, columns.start // 2 : columns.stop // 2]
+    return (np.abs(near.astype(int) - np.array(colour)).max(axis=-1) < 40).mean()
+
+
+def test_the_map_shows_the_trail_and_where_things_stood(tried):
+    from internav_data.views.replay_map import _GHOST, AGENT, MapPainter
+
+    painter = MapPainter(tried.story, 400)
+    all_shots = list(shots(tried.story, 12.0))
+    first, last = painter.draw(all_shots[0]), painter.draw(all_shots[-1])
+    trail = ((2.95, 1.5), (3.05, 1.7))
+    assert share_of(last, painter._canvas, *trail, AGENT) > 0.3
+    assert share_of(first, painter._canvas, *trail, AGENT) == 0.0
+    stood = ((4.75, 2.18), (5.25, 2.27))  # the chair's back
+    assert share_of(last, painter._canvas, *stood, _GHOST) > 0.1
+    for shot in all_shots[20::9]:
+        fresh = MapPainter(tried.story, 400)
+        assert np.array_equal(fresh.draw(shot), painter.draw(shot)), "of the shot alone"
+
+
+def test_words_are_written_below_and_fit(tried, frames, stage, hand_episode):
+    footer = 2 * round(38 * SIZE / 400)
+    red = np.array((200, 36, 24))
+
+    def words(frame):
+        return frame[-footer : -footer + 16]
+
+    assert (words(frames[20]) < 100).all(axis=-1).sum() > 30
+    assert (np.abs(words(frames[-1]).astype(int) - red).max(axis=-1) < 40).sum() > 30
+    assert (np.abs(words(frames[20]).astype(int) - red).max(axis=-1) < 40).sum() == 0
+    for frame in frames:
+        assert (words(frame)[:, -3:] > 200).all(), "nothing runs over the edge"
 
 
 def test_a_panel_is_asked_once_a_moment_and_drawn_beside(stage, hand_episode, frames):
