@@ -43,6 +43,8 @@ def compared(config: GenerationConfig, scenes: int, workers: int) -> dict[str, o
         "episodes": report.episodes,
         "quarantined": len(report.quarantined),
         "sealed_share_of_blocked": stats["sealed_share_of_blocked"],
+        "redraws": stats["redraws"],
+        "expert": stats["expert"],
         "rows": rows,
         "largest_deviation": max(
             abs(row[f"{column}_to_paper"] - 1.0) for row in rows for column in COLUMNS
@@ -68,7 +70,12 @@ def main() -> None:
         ]
         result = compared(load_config(None, given), args.scenes, args.workers)
         results.append(result)
-        print(f"seed {seed}: {result['episodes']} episodes", file=sys.stderr)
+        refused = result["expert"]["refused_share"]
+        print(
+            f"seed {seed}: {result['episodes']} episodes, largest deviation "
+            f"{result['largest_deviation']:.1%}, the expert refused {refused:.1%}",
+            file=sys.stderr,
+        )
         for row in result["rows"]:
             line = "  ".join(
                 f"{c} {row[c]:.2f} ({100 * (row[f'{c}_to_paper'] - 1):+.1f} %)" for c in COLUMNS

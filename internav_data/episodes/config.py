@@ -16,7 +16,7 @@ class EpisodeConfig:
 
     max_obstacles: tuple[int, int, int] = (4, 9, 15)
     """Most obstacles in houses of 1-2, 3-5 and 6-10 rooms; then start and goal are drawn anew."""
-    sideways_m: float = 0.43
+    sideways_m: float = 0.40
     """Standard deviation of an obstacle's distance from the way, metres."""
     gap_m: float = 0.01
     """Least distance between an obstacle and everything else when it is spawned, metres."""
