@@ -71,8 +71,11 @@ demo: $(STAMP) ## make a small dataset, prove it right, draw it: about three min
 	$(BIN)/internav-gen show $(DEMO)/dataset --scene 6 --episode 0 --out $(DEMO)/blocked.png
 	$(BIN)/internav-gen show $(DEMO)/dataset --scene 6 --episode 1 --out $(DEMO)/lengthened.png
 	$(BIN)/python examples/contact_sheet.py $(DEMO)/dataset $(DEMO)/houses.png
+	$(BIN)/internav-gen replay $(DEMO)/dataset 9/1 --force \
+	  --out $(DEMO)/replay.mp4 --out $(DEMO)/replay.gif
 	@echo
 	@echo "Look at   $(DEMO)/house.png  $(DEMO)/blocked.png  $(DEMO)/lengthened.png  $(DEMO)/houses.png"
+	@echo "Watch     $(DEMO)/replay.gif in a browser, $(DEMO)/replay.mp4 in a player: things moved out of the way"
 	@echo "The data  $(DEMO)/dataset (begin with its README.md)"
 	@echo "Load it   $(BIN)/python examples/stream_episodes.py $(DEMO)/dataset"
 	@echo "Make more $(BIN)/internav-gen generate --help"

@@ -16,6 +16,8 @@ from internav_cli.main import COMMANDS
 ROOT = Path(__file__).resolve().parents[1]
 PICTURED = (0, 14, 0)
 """Seed, scene and episode of the picture."""
+FILMED = (0, 9, 1)
+"""Seed, scene and episode of the replay."""
 
 
 def settings() -> str:
@@ -63,10 +65,24 @@ def draw_pictures() -> None:
     (episode,) = generate_episodes(house, count=1, first=index)
     picture = draw_episode(house, episode, catalogue().assets, pixels=1000)
     write_png(ROOT / "docs" / "episode.png", picture)
+    draw_replay()
     sheet = draw_asset_sheet(catalogue())
     height, width = sheet.shape[:2]
     smaller = cv2.resize(sheet, (1000, round(1000 * height / width)), interpolation=cv2.INTER_AREA)
     write_png(ROOT / "docs" / "catalogue.png", smaller)
+
+
+def draw_replay() -> None:
+    """Film an expert at work for the README."""
+    from internav_data import generate_episodes, generate_house  # noqa: PLC0415 - seconds
+    from internav_data.catalog import catalogue  # noqa: PLC0415
+    from internav_data.views import replay_frames, write_video  # noqa: PLC0415
+
+    seed, scene, index = FILMED
+    house = generate_house(seed=seed, scene=scene)
+    (episode,) = generate_episodes(house, count=1, first=index)
+    frames = replay_frames(house, episode, catalogue().assets, size=280, fps=5.0)
+    write_video(ROOT / "docs" / "replay.gif", frames, 5.0)
 
 
 def main() -> None:

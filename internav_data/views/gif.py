@@ -138,8 +138,8 @@ def _changed(frame: Image, shown: Image, last: Image, tolerance: int) -> Image:
             for k in range(3):
                 # Signed: the difference of two uint8 wraps around.
                 off = np.int64(frame[y, x, k]) - np.int64(shown[y, x, k])
-                far |= abs(off) > tolerance
-                other |= frame[y, x, k] != last[y, x, k]
+                far |= bool(abs(off) > tolerance)
+                other |= bool(frame[y, x, k] != last[y, x, k])
             out[y, x] = far and other
     return out
 

@@ -42,6 +42,8 @@ _TARGET: Final[RGB] = (235, 60, 30)
 _MARGIN_M: Final = 0.7
 """Shown around a house, and (`_ROOM_M`) around what happens where not all of it is shown."""
 _ROOM_M: Final = 1.8
+_MOST: Final = 0.55
+"""A house is shown whole where this share of it would be."""
 _RADIUS_M: Final = 0.2
 _NARROWEST, _WIDEST = 0.75, 1.6
 """Of a map, as a share of its height."""
@@ -56,12 +58,13 @@ def _box(story: Story) -> tuple[Vec2, Vec2]:
     for moment in story.moments:
         poses = (moment.pose(k) for k in (*story.moved, *moment.world.obstacles))
         points += [(p.x, p.y) for p in poses if p is not None]
-    low, high = [], []
-    for axis in (0, 1):
-        inside, house = [p[axis] for p in points], [p[axis] for p in outline]
-        low.append(max(min(inside) - _ROOM_M, min(house) - _MARGIN_M))
-        high.append(min(max(inside) + _ROOM_M, max(house) + _MARGIN_M))
-    return (low[0], low[1]), (high[0], high[1])
+    inside, house = np.array(points), np.array(outline)
+    first, last = house.min(axis=0) - _MARGIN_M, house.max(axis=0) + _MARGIN_M
+    low = np.maximum(inside.min(axis=0) - _ROOM_M, first)
+    high = np.minimum(inside.max(axis=0) + _ROOM_M, last)
+    if float(np.prod(high - low)) > _MOST * float(np.prod(last - first)):
+        low, high = first, last
+    return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
 
 
 class MapPainter:
