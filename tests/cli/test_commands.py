@@ -108,6 +108,7 @@ def test_completion_is_there():
         (("generate", "--out", "x", "--assets", "no-folder"), ["no-folder"]),
         (("generate", "--out", "x", "--floor-plan", "none.toml"), ["none.toml"]),
         (("generate", "--episode", "3"), ["--scene"]),
+        (("generate", "--out", "x", "--push-model", "shove"), ["shove", "kick"]),
         (("validate", ".", "--level", "magic"), ["magic", "geometry"]),
         (("validate", ".", "--sample", "0"), ["1 or more"]),
         (("show", "--out", "x.png", "--scene", "-1"), ["from 0"]),
@@ -149,6 +150,8 @@ def test_a_dataset_and_what_looks_at_it(dataset, tmp_path):
     stats = run("stats", dataset)
     assert stats.returncode == 0
     assert "Table 2 of the paper" in stats.stdout
+    assert "expert: solves 5 (100.0%)" in stats.stdout
+    assert "the expert refused" in stats.stdout
     assert json.loads(run("stats", dataset, "--json").stdout)["episodes"] == 5
     found = run("validate", dataset, "--level", "schema", "--json")
     assert json.loads(found.stdout)["ok"], found.stdout
@@ -169,6 +172,12 @@ def test_a_finished_dataset_is_left_alone(dataset):
     one_line(again, 0, "already", "--scenes")
     other = run("generate", "--out", dataset, *SMALL, "--seed", 5)
     one_line(other, 2, "another config", "seed")
+
+
+def test_options_of_episodes_are_settings():
+    told = run("generate", "--push-model", "kick", "--keep-unsolvable", "--print-config")
+    assert 'push_model = "kick"' in told.stdout
+    assert "keep_unsolvable = true" in told.stdout
 
 
 def test_a_single_episode_again(dataset):

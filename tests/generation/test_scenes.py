@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from collections import Counter
 from types import SimpleNamespace
 
 import pytest
@@ -31,6 +32,41 @@ def test_python_makes_what_the_dataset_holds(dataset):
     assert house == load_dataset(dataset).scene("scene-000002")
     assert list(generate_episodes(house, 2, config=CONFIG)) == held
     assert generate_episodes(house, 1, first=1, config=CONFIG) == (held[1],)
+
+
+def test_redraws_of_all_scenes_are_in_manifest_and_report(dataset, tmp_path):
+    from internav_data.dataset import compute_stats, read_manifest
+
+    counts = Counter()
+    for scene in range(3):
+        counts.update(build_scene(scene, CONFIG, catalogue()).redraws)
+    assert counts, "nothing was drawn again: choose other scenes"
+    assert read_manifest(dataset).redraws == counts
+    again = generate(dataset, CONFIG, 3, workers=1)
+    refused = counts["no expert"] / (counts["no expert"] + 5)
+    assert again.redraws == counts
+    assert again.refused_share == pytest.approx(refused, abs=1e-6)
+    assert compute_stats(dataset)["expert"]["solved"] == 5
+
+
+def test_unsolvable_episodes_are_kept_on_demand(tmp_path):
+    from internav_data.dataset import compute_stats, load_dataset, read_manifest
+
+    config = dataclasses.replace(
+        CONFIG,
+        episodes_per_scene=8,
+        house=dataclasses.replace(CONFIG.house, rooms="1"),
+        episodes=dataclasses.replace(CONFIG.episodes, keep_unsolvable=True),
+    )
+    generate(tmp_path / "d", config, 3, workers=1)
+    episodes = list(load_dataset(tmp_path / "d"))
+    unsolved = [episode for episode in episodes if episode.expert is None]
+    assert unsolved, "the expert solves everything: choose other scenes"
+    assert all(o.outcomes for episode in unsolved for o in episode.obstacles)
+    assert "no expert" not in read_manifest(tmp_path / "d").redraws
+    stats = compute_stats(tmp_path / "d")
+    assert stats["expert"]["solved"] == len(episodes) - len(unsolved)
+    assert stats["expert"]["refused"] == 0
 
 
 def test_real_scenes_have_the_same_bytes_for_any_workers(dataset, tmp_path):
