@@ -1,5 +1,6 @@
 """Settling, outcomes and experts are changed one at a time; playing them again must find it."""
 
+import math
 import subprocess
 import sys
 from dataclasses import replace
@@ -7,7 +8,7 @@ from dataclasses import replace
 import physical
 import pytest
 import scenery
-from scenery import ASSETS, write_dataset
+from scenery import ASSETS, Grid, brute_steps, thing, write_dataset
 
 import internav_data.world.steps
 from internav_data.navigation import Lattice
@@ -15,6 +16,7 @@ from internav_data.records import Pose
 from internav_data.records.errors import CorruptDataError
 from internav_data.verification import validate
 from internav_data.verification.interactions import check_interactions
+from internav_data.verification.lengths import Between
 from internav_data.verification.physics import Theatre
 from internav_data.verification.physics.outcomes import _Judge
 from internav_data.verification.scenes import check_scene
@@ -269,6 +271,28 @@ def test_what_carries_something_is_not_picked_up(scenes):
     assert judge._carries([under, over], 0)
     assert not judge._carries([under, over], 1)
     assert not judge._carries([under, at("Bar_1", 3.6)], 0)
+
+
+def test_furniture_that_was_moved_is_no_longer_where_it_stood():
+    bar = thing(0, "Bar_1", 0, 3.5, 1.94, yaw_deg=90.0)
+    house = Grid(2, 1).house(2, (bar, thing(1, "Table_1", 0, 1.0, 0.6)))
+    theatre = Theatre(Site(house, Shapes(ASSETS)), FORCE)
+    items = theatre.stage.items
+    assert [item.asset.asset_id for item in items] == ["Bar_1"]
+    there = scenery.obstacle("Bar_1", 2.0, 2.0, yaw_deg=90.0)
+    for changes, things, obstacles in (
+        ({}, house.things, []),
+        ({0: there.pose}, house.things[1:], [there]),
+        ({0: None}, house.things[1:], []),
+    ):
+        found = theatre.scenery(items, changes)
+        ground = found.site.ground
+        free = ground.with_obstacles(found.taken)
+        steps = ground.distances(ground.node(28, 8), free)[ground.node(4, 8)]
+        wanted = brute_steps(replace(house, things=things), (4, 8), (28, 8), obstacles)
+        assert steps == (math.inf if wanted is None else wanted)
+        way = Between(found.site, (1.0, 2.0), (7.0, 2.0), found.taken)
+        assert way.connected(stated=True) == (changes != {})
 
 
 # what cannot be judged is said
