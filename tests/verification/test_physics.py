@@ -256,6 +256,18 @@ def test_world_that_reaches_everything(scenes, monkeypatch):
     assert found_in(early, 2, 0) == {"physics.expert-reach"}
 
 
+@pytest.mark.parametrize("into", [{"z": -0.02}, {"x": 3.7, "y": 1.0}])
+def test_world_that_pushes_into_floor_or_wall(scenes, monkeypatch, into):
+    push = World.pushed
+
+    def sinking(world, *args, **options):
+        pushed = push(world, *args, **options)
+        return replace(pushed, pose=replace(pushed.pose, **into))
+
+    monkeypatch.setattr(World, "pushed", sinking)
+    assert "physics.outcome-sunk" in found_in(scenes, 1, 1)
+
+
 def test_what_carries_something_is_not_picked_up(scenes):
     house, episodes = scenes[2]
     tall = scenery.part("box", (0.0, 0.0, 0.602), (0.3, 0.4, 0.396))

@@ -13,6 +13,7 @@ import shapely
 
 from internav_data.verification.interactions import PICK_OUTCOME, PUSH_OUTCOMES
 from internav_data.verification.lengths import Between
+from internav_data.verification.overlaps import overlapping_plans
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,6 +29,8 @@ REST_M = 0.01
 """What begins this much above another thing's lowest point, and not above its top, rests on it."""
 TOUCH_M = 0.005
 """Things this near touch."""
+SUNK_M = 0.01
+"""What comes to rest deeper in the floor or a wall is not where a push could lead."""
 
 
 def check_outcomes(theatre: Theatre, episode: Episode, expect: Expect) -> None:
@@ -72,7 +75,9 @@ class _Judge:
         pushed = world.pushed(index, PUSH_OUTCOMES.index(outcome.action), agent=False)
         far = pushed.displacement_m if pushed.success else 0.0
         if self._ends(pushed.reason, far, pushed.seconds) and pushed.success:
-            self._distances(world, {index: pushed.pose, **dict(pushed.moved)})
+            ends: dict[int, Pose | None] = {index: pushed.pose, **dict(pushed.moved)}
+            self._above_ground(world, ends)
+            self._distances(world, ends)
 
     def pick(self, world: World, index: int) -> None:
         """Take an obstacle away and compare."""
@@ -109,6 +114,19 @@ class _Judge:
 
     def _plan(self, asset_id: str, pose: Pose) -> Geometry:
         return shapely.union_all(list(self.theatre.footprint(asset_id, pose)))
+
+    def _above_ground(self, world: World, ends: dict[int, Pose | None]) -> None:
+        """Judge that nothing was pushed into the floor or a wall."""
+        theatre = self.theatre
+        for k, pose in ends.items():
+            asset_id = world.items[k].asset.asset_id
+            if pose is None:
+                continue
+            low, _ = theatre.span(asset_id, pose)
+            name = f"{asset_id} ends above the floor"
+            self.expect("sunk", name, f"{low:.4f} m", holds=low >= -SUNK_M)
+            hits = overlapping_plans(theatre.footprint(asset_id, pose), theatre.site.walls, SUNK_M)
+            self.expect("sunk", f"{asset_id} ends clear of walls", len(hits), holds=not hits)
 
     def _distances(self, world: World, changes: dict[int, Pose | None]) -> None:
         """Judge both distances with things where they came to rest."""
