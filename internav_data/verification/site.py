@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise, product
 from typing import TYPE_CHECKING
@@ -18,10 +19,12 @@ from internav_data.verification.shapes import AGENT_HEIGHT_M, STEP_OVER_M
 from internav_data.verification.ways import COARSE, FINE, Sight, grown
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from shapely import Geometry
 
     from internav_data.records import House
-from internav_data.verification.shapes import Shapes
+    from internav_data.verification.shapes import Shapes
 
 MOST_PATHS = 64
 """Room paths and node paths listed at most."""
@@ -32,7 +35,10 @@ RoomPaths = tuple[tuple[int, ...], ...]
 class Site:
     """A house, its footprints, its lattice and its visibility graph without obstacles."""
 
-    def __init__(self, house: House, shapes: Shapes) -> None:
+    def __init__(
+        self, house: House, shapes: Shapes, prints: Mapping[int, list[Geometry]] | None = None
+    ) -> None:
+        """Measure a house; `prints` are footprints of its things where they are known."""
         self.house = house
         self.shapes = shapes
         self.outline = Polygon(house.outline)
@@ -41,10 +47,19 @@ class Site:
             for w in house.walls
             if w.z_max > STEP_OVER_M and w.z_min < AGENT_HEIGHT_M
         ]
-        self.prints = {t.thing_id: self.shapes.footprint(t.asset_id, t.pose) for t in house.things}
+        known = prints or {}
+        self.prints: dict[int, list[Geometry]] = {
+            t.thing_id: known.get(t.thing_id) or shapes.footprint(t.asset_id, t.pose)
+            for t in house.things
+        }
         self.blockers = self.walls + [plan for plans in self.prints.values() for plan in plans]
         self.ground = Ground(self.blockers, self.outline)
         self._room_paths: dict[tuple[int, int], tuple[RoomPaths, bool]] = {}
+
+    def without(self, gone: frozenset[int]) -> Site:
+        """Return the house without some of its things (ids)."""
+        things = tuple(t for t in self.house.things if t.thing_id not in gone)
+        return Site(replace(self.house, things=things), self.shapes, self.prints)
 
     @cached_property
     def components(self) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:

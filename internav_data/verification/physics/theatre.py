@@ -9,7 +9,6 @@ import numpy as np
 import shapely
 from shapely import Point
 
-from internav_data.verification.site import Site
 from internav_data.world import Stage, World
 
 if TYPE_CHECKING:
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
 
     from internav_data.records import Asset, Episode, Pose
     from internav_data.verification.settings import Settings
+    from internav_data.verification.site import Site
     from internav_data.world import Item
 
 SITES_KEPT = 8
@@ -98,8 +98,6 @@ class Theatre:
         if moved not in self._sites:
             if len(self._sites) >= SITES_KEPT:
                 del self._sites[next(iter(self._sites))]
-            gone = {self.stage.thing_ids[k] for k in moved}
-            things = tuple(t for t in self.site.house.things if t.thing_id not in gone)
-            house = replace(self.site.house, things=things)
-            self._sites[moved] = Site(house, self.site.shapes)
+            gone = frozenset(self.stage.thing_ids[k] for k in moved)
+            self._sites[moved] = self.site.without(gone)
         return self._sites[moved]
