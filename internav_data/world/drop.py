@@ -20,6 +20,7 @@ from internav_data.geometry.planar import segment_polygon_distance
 from internav_data.navigation import CLEARANCE_M, RADIUS_M
 from internav_data.records import Pose
 from internav_data.world.frames import TURNS, turned
+from internav_data.world.octagons import square_round
 from internav_data.world.settle import settle
 from internav_data.world.sight import axis_distance
 
@@ -29,7 +30,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.records import Asset, Vec2
-    from internav_data.world.setting import Body, Box
+    from internav_data.world.octagons import Octagon
+    from internav_data.world.setting import Body
     from internav_data.world.settle import Settled
 
     Floats = NDArray[np.float64]
@@ -52,8 +54,8 @@ class Ground(NamedTuple):
     walls: Polygons
     solid: Sequence[Polygons]
     """Footprints of all that is fixed and of all that can move."""
-    bodies: Callable[[Box], Sequence[Body]]
-    """Gathers what can be touched in a box of the house."""
+    bodies: Callable[[Octagon], Sequence[Body]]
+    """Gathers what reaches into an octagon of the house."""
 
 
 def drop(asset: Asset, agent: Vec2, heading: int, ground: Ground) -> Settled | None:
@@ -107,8 +109,8 @@ def _crosses(ax: float, ay: float, bx: float, by: float, vertices: Floats, offse
 
 def _let_go(asset: Asset, pose: Pose, agent: Vec2, ground: Ground) -> Settled | None:
     reach = math.hypot(asset.size[0], asset.size[1]) / 2.0 + NEAR_M
-    box = (pose.x - reach, pose.y - reach, pose.x + reach, pose.y + reach)
-    settled = settle(asset, pose, ROOM_M, lambda: ground.bodies(box))
+    around = square_round(pose.x, pose.y, reach)
+    settled = settle(asset, pose, ROOM_M, lambda: ground.bodies(around))
     if settled.refusal:
         return None
     exact = footprint(asset, settled.pose)

@@ -15,7 +15,7 @@ from internav_data.records import Pose
 
 if TYPE_CHECKING:
     from internav_data.records import Quaternion, Vec2
-    from internav_data.world.setting import Box
+    from internav_data.world.octagons import Octagon
 
 _HALF: Final = math.sqrt(0.5)
 TURNS: Final[tuple[Quaternion, ...]] = (
@@ -62,13 +62,9 @@ class Frame:
         x, y = turned(-self.heading, point[0] - self.x, point[1] - self.y)
         return round_m(x), round_m(y)
 
-    def leave_box(self, box: Box, margin: float) -> Box:
-        """Box in the house, grown by a margin."""
-        ax, ay = turned(self.heading, box[0], box[1])
-        bx, by = turned(self.heading, box[2], box[3])
-        return (
-            self.x + min(ax, bx) - margin,
-            self.y + min(ay, by) - margin,
-            self.x + max(ax, bx) + margin,
-            self.y + max(ay, by) + margin,
-        )
+    def leave_octagon(self, octagon: Octagon) -> Octagon:
+        """Octagon in the house."""
+        first = -2 * self.heading
+        a, b, c, d, e, f, g, h = (octagon[(first + k) % 8] for k in range(8))
+        x, y = self.x, self.y
+        return a + x, b + x + y, c + y, d + y - x, e - x, f - x - y, g - y, h + x - y

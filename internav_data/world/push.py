@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final, Literal
 from internav_data.geometry import centre_of_mass, round_m
 from internav_data.records import Pose
 from internav_data.world.frames import Frame
+from internav_data.world.octagons import grown, octagon_of_disc, overlap
 from internav_data.world.setting import Body, Column, Setting, Shove
 from internav_data.world.settle import engine_of_this_process
 from internav_data.world.sweeps import extent_of
@@ -18,10 +19,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from internav_data.records import Asset, Quaternion, Vec2, Vec3
-    from internav_data.world.setting import Box, Engine, Motion
+    from internav_data.world.octagons import Octagon
+    from internav_data.world.setting import Engine, Motion
 
-    Near = Callable[[Box], Sequence[tuple[int, Body]]]
-    """Bodies, with their keys in ascending order, that reach into a box of the house."""
+    Near = Callable[[Octagon], Sequence[tuple[int, Body]]]
+    """Bodies, with their keys in ascending order, that reach into an octagon of the house."""
 
 PushModel = Literal["force", "kick"]
 SHOVES: Final[dict[PushModel, Shove]] = {
@@ -99,7 +101,7 @@ def push(
     heading
         0, 1, 2, 3: along +x, +y, -x, -y.
     near
-        Gathers what else reaches into a box, without the thing itself.
+        Gathers what else reaches into an octagon, without the thing itself.
     agent
         Where the agent stands; None without it.
     agent_gap_m
@@ -114,14 +116,17 @@ def push(
     entered = frame.enter(pose)
     start = Pose(0.0, 0.0, pose.z, _coarse(entered.quaternion))
     free = _push_alone(asset, start, shove, engine)
-    column = _column(frame, agent, agent_gap_m)
     motion = free
     movers: tuple[tuple[int, Body], ...] = ()
     if _shift(asset, pose, frame.leave(free.poses[0])) < SUCCESS_M:
         # Too heavy alone, so whatever stands beside it makes it no lighter.
-        pass
-    elif _meets(column, free.sweeps[0]) or near(frame.leave_box(free.sweeps[0], TOUCH_M)):
-        motion, movers = _push_among(asset, start, frame, near, column, shove, free.sweeps[0])
+        return _judged(asset, pose, frame, motion, movers, free)
+    if _reached(frame, near, free.sweeps, TOUCH_M):
+        motion, movers = _push_among(asset, start, frame, near, None, shove, free.sweeps)
+    column = _column(frame, agent, agent_gap_m)
+    if column is not None and _meets(column, motion.sweeps):
+        # Only now: what never comes near the agent is solved once, wherever it stands.
+        motion, movers = _push_among(asset, start, frame, near, column, shove, motion.sweeps)
     return _judged(asset, pose, frame, motion, movers, free)
 
 
@@ -143,15 +148,14 @@ def _push_among(
     near: Near,
     column: Column | None,
     shove: Shove,
-    sweep: Box,
+    sweeps: Sequence[Octagon],
 ) -> tuple[Motion, tuple[tuple[int, Body], ...]]:
     """Push among what can be touched: gathered anew until nothing left out was reached."""
     engine = engine_of_this_process()
-    known = dict(near(frame.leave_box(sweep, AROUND_M)))
+    known = _reached(frame, near, sweeps, AROUND_M)
     for body in [body for body in known.values() if body.moves]:
         # What is met may be driven on.
-        low_x, low_y, high_x, high_y = extent_of(body.asset, body.pose).plan
-        known.update(near((low_x - ON_M, low_y - ON_M, high_x + ON_M, high_y + ON_M)))
+        known.update(near(grown(extent_of(body.asset, body.pose).octagon, ON_M)))
     for left in reversed(range(ROUNDS)):
         around = [(key, known[key]) for key in sorted(known)]
         movers = tuple(pair for pair in around if pair[1].moves)
@@ -161,18 +165,21 @@ def _push_among(
         )
         setting = Setting((Body(asset, start, moves=True), *bodies), column)
         motion = _push_in(setting, shove, engine)
-        reached = dict(_reached(frame, near, motion.sweeps))
+        reached = _reached(frame, near, motion.sweeps, TOUCH_M)
         if reached.keys() <= known.keys():
             break
         known.update(reached)
         if left == 1:
-            known.update(near(frame.leave_box(sweep, FAR_M)))
+            known.update(_reached(frame, near, sweeps, FAR_M))
     return motion, movers
 
 
-def _reached(frame: Frame, near: Near, sweeps: Iterable[Box]) -> Iterable[tuple[int, Body]]:
+def _reached(frame: Frame, near: Near, sweeps: Iterable[Octagon], margin: float) -> dict[int, Body]:
+    """Gather what lies within a margin of what was swept."""
+    found: dict[int, Body] = {}
     for sweep in sweeps:
-        yield from near(frame.leave_box(sweep, TOUCH_M))
+        found.update(near(grown(frame.leave_octagon(sweep), margin)))
+    return found
 
 
 def _judged(
@@ -220,13 +227,10 @@ def _column(frame: Frame, agent: Vec2 | None, gap: float) -> Column | None:
     return Column(x, y, min(AGENT_M, max(AGENT_LEAST_M, round_m(gap))))
 
 
-def _meets(column: Column | None, box: Box) -> bool:
-    """Whether the agent's column reaches into a box."""
-    if column is None:
-        return False
-    dx = max(box[0] - column.x, 0.0, column.x - box[2])
-    dy = max(box[1] - column.y, 0.0, column.y - box[3])
-    return math.hypot(dx, dy) < column.radius_m + TOUCH_M
+def _meets(column: Column, sweeps: Iterable[Octagon]) -> bool:
+    """Whether anything swept comes near the agent's column."""
+    disc = octagon_of_disc(column.x, column.y, column.radius_m + TOUCH_M)
+    return any(overlap(disc, sweep) for sweep in sweeps)
 
 
 def _rotated(quaternion: Quaternion, vector: Vec3) -> Vec3:

@@ -9,6 +9,7 @@ from internav_data.records import Asset, Part, Pose
 
 if TYPE_CHECKING:
     from internav_data.records import Quaternion, Wall
+    from internav_data.world.octagons import Octagon
 
 UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
@@ -92,17 +93,13 @@ class Shove:
     seconds: float
 
 
-Box = tuple[float, float, float, float]
-"""Lowest x and y, highest x and y, metres."""
-
-
 @dataclass(frozen=True, slots=True)
 class Motion:
     """Where a push led the moving bodies of a setting, in their order."""
 
     poses: tuple[Pose, ...]
     """Not rounded: the caller moves them into place first."""
-    sweeps: tuple[Box, ...]
+    sweeps: tuple[Octagon, ...]
     """What each body's corners swept in the plane, its start included."""
     seconds: float
     """Simulated time from the first touch until at rest, or the time limit."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from internav_data.geometry import Polygons, footprint, wall_footprints
 from internav_data.navigation import SPACING_M, Lattice, WayFinder
+from internav_data.world.octagons import NOWHERE, octagon_of_rectangle
 from internav_data.world.setting import Body, wall_body
 from internav_data.world.sweeps import extent_of
 
@@ -18,12 +19,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.records import Asset, House, Pose, Vec2
-    from internav_data.world.setting import Box
+    from internav_data.world.octagons import Octagon
 
     Floats = NDArray[np.float64]
 
-NOWHERE: Final[Box] = (np.inf, np.inf, -np.inf, -np.inf)
-"""The box of what is held: it touches nothing."""
 WAYS_KEPT: Final = 16
 """Any-angle graphs kept a house: one for each set of furniture that was moved."""
 
@@ -36,7 +35,7 @@ class Item:
     pose: Pose | None
     """None while it is held."""
     footprint: Polygons
-    box: Box
+    octagon: Octagon
     low_m: float
     high_m: float
 
@@ -46,7 +45,9 @@ class Item:
         if pose is None:
             return Item(asset, None, Polygons.of([]), NOWHERE, np.inf, -np.inf)
         extent = extent_of(asset, pose)
-        return Item(asset, pose, footprint(asset, pose), extent.plan, extent.low_m, extent.high_m)
+        return Item(
+            asset, pose, footprint(asset, pose), extent.octagon, extent.low_m, extent.high_m
+        )
 
 
 def is_movable(asset: Asset) -> bool:
@@ -61,8 +62,8 @@ class Stage:
     house: House
     fixed: tuple[Body, ...]
     """Walls, then things that never move; rugs and their like left out."""
-    boxes: Floats
-    """Bounding boxes of `fixed` in the plane, (n, 4)."""
+    octagons: Floats
+    """How far each of `fixed` reaches in the plane, (n, 8)."""
     walls: Polygons
     footprints: Polygons
     """Of all that is fixed, walls first."""
@@ -80,7 +81,7 @@ class Stage:
     def of(house: House) -> Stage:
         """Prepare a house for any number of worlds."""
         bodies = [wall_body(wall) for wall in house.walls]
-        boxes = [(w.x_min, w.y_min, w.x_max, w.y_max) for w in house.walls]
+        octagons = [octagon_of_rectangle(w.x_min, w.y_min, w.x_max, w.y_max) for w in house.walls]
         walls = wall_footprints(house.walls)
         plans, items, thing_ids = [walls], [], []
         for thing in house.things:
@@ -90,7 +91,7 @@ class Stage:
                 thing_ids.append(thing.thing_id)
             elif asset.blocks:
                 bodies.append(Body(asset, thing.pose, moves=False))
-                boxes.append(extent_of(asset, thing.pose).plan)
+                octagons.append(extent_of(asset, thing.pose).octagon)
                 plans.append(footprint(asset, thing.pose))
         footprints = Polygons.joined(plans)
         lattice = Lattice.of_polygons(footprints, house.outline)
@@ -98,7 +99,7 @@ class Stage:
         return Stage(
             house=house,
             fixed=tuple(bodies),
-            boxes=np.array(boxes, dtype=np.float64).reshape(-1, 4),
+            octagons=np.array(octagons, dtype=np.float64).reshape(-1, 8),
             walls=walls,
             footprints=footprints,
             items=tuple(items),
@@ -144,6 +145,6 @@ def _node(point: Vec2) -> tuple[int, int]:
     return round(point[0] / SPACING_M), round(point[1] / SPACING_M)
 
 
-def box_rows(items: Iterable[Item]) -> Floats:
-    """Bounding boxes of items in the plane, (n, 4)."""
-    return np.array([item.box for item in items], dtype=np.float64).reshape(-1, 4)
+def octagon_rows(items: Iterable[Item]) -> Floats:
+    """Octagons of items, (n, 8)."""
+    return np.array([item.octagon for item in items], dtype=np.float64).reshape(-1, 8)

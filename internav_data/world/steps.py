@@ -10,6 +10,7 @@ from internav_data.navigation import CLEARANCE_M
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import HORIZONS_DEG, PUSH_TURNS, Action, Reason, StepResult
 from internav_data.world.drop import Ground, drop
+from internav_data.world.octagons import grown, square_round
 from internav_data.world.push import TOUCH_M
 from internav_data.world.sight import axis_distance
 from internav_data.world.stage import Item
@@ -19,7 +20,8 @@ if TYPE_CHECKING:
 
     from internav_data.geometry import Polygons
     from internav_data.records import Pose
-    from internav_data.world.setting import Body, Box
+    from internav_data.world.octagons import Octagon
+    from internav_data.world.setting import Body
     from internav_data.world.world import World
 
 GOAL_M: Final = 0.2
@@ -124,9 +126,7 @@ def _pick(world: World, action: Action) -> StepResult:
 def carries(world: World, index: int) -> bool:
     """Whether another movable thing rests on a thing, and would hang in the air without it."""
     below = world.items[index]
-    low_x, low_y, high_x, high_y = below.box
-    grown = (low_x - TOUCH_M, low_y - TOUCH_M, high_x + TOUCH_M, high_y + TOUCH_M)
-    for key, _ in world.near(grown, index):
+    for key, _ in world.near(grown(below.octagon, TOUCH_M), index):
         if key >= len(world.items):
             break
         above = world.items[key]
@@ -142,12 +142,12 @@ def _drop(world: World, action: Action) -> StepResult:
     if world.held < 0:
         return _failed(action, "hands are empty")
     target, (x, y) = world.held, world.position
-    box = (x - DROP_ROUND_M, y - DROP_ROUND_M, x + DROP_ROUND_M, y + DROP_ROUND_M)
+    around = world.near(square_round(x, y, DROP_ROUND_M))
     solid: list[Polygons] = [world.stage.footprints]
-    solid += [world.items[k].footprint for k, _ in world.near(box) if k < len(world.items)]
+    solid += [world.items[k].footprint for k, _ in around if k < len(world.items)]
 
-    def bodies(near: Box) -> Sequence[Body]:
-        return [body for _, body in world.near(near)]
+    def bodies(octagon: Octagon) -> Sequence[Body]:
+        return [body for _, body in world.near(octagon)]
 
     ground = Ground(world.stage.walls, solid, bodies)
     settled = drop(world.items[target].asset, world.position, world.quarter, ground)

@@ -12,13 +12,13 @@ from internav_data.navigation import SPACING_M
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import START_HORIZON_DEG
 from internav_data.world.frames import HEADINGS
+from internav_data.world.octagons import square_round, touching
 from internav_data.world.push import AGENT_M, push
 from internav_data.world.setting import Body
 from internav_data.world.shells import placed_shell
 from internav_data.world.sight import REACH_M, Screen, axis_distance, view_from
-from internav_data.world.stage import Item, Stage, box_rows
+from internav_data.world.stage import Item, Stage, octagon_rows
 from internav_data.world.steps import act
-from internav_data.world.sweeps import touching
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from internav_data.navigation import Lattice
     from internav_data.records import Asset, Episode, Pose, Vec2
     from internav_data.world.actions import StepResult
+    from internav_data.world.octagons import Octagon
     from internav_data.world.push import Pushed, PushModel
-    from internav_data.world.setting import Box
 
 
 class World:
@@ -60,8 +60,8 @@ class World:
     """
 
     __slots__ = (
-        "_boxes",
         "_handles",
+        "_octagons",
         "goal",
         "held",
         "horizon_deg",
@@ -77,7 +77,7 @@ class World:
     stage: Stage
     items: tuple[Item, ...]
     lattice: Lattice
-    _boxes: NDArray[np.float64]
+    _octagons: NDArray[np.float64]
     _handles: tuple[int, ...]
 
     def __init__(
@@ -94,7 +94,7 @@ class World:
         self.lattice = stage.lattice.copy()
         self._handles = stage.handles + tuple(self.lattice.add(e.footprint) for e in extra)
         self.items = stage.items + tuple(extra)
-        self._boxes = box_rows(self.items)
+        self._octagons = octagon_rows(self.items)
         self.i, self.j, self.quarter = start[0], start[1], start[2] % 4
         self.horizon_deg = START_HORIZON_DEG
         self.held = -1
@@ -171,8 +171,8 @@ class World:
     def target(self, *, pick: bool) -> int:
         """Index of the closest visible thing to pick up, or to push; -1 without one."""
         x, y = self.position
-        box = (x - REACH_M, y - REACH_M, x + REACH_M, y + REACH_M)
-        near = touching(self._boxes, box)
+        round_here = square_round(x, y, REACH_M)
+        near = touching(self._octagons, round_here)
         wanted = []
         for k in near:
             asset = self.items[k].asset
@@ -181,7 +181,7 @@ class World:
         if not wanted:
             return -1
         shells = [placed_shell(item.asset, pose) for k in near for item, pose in [self._at(k)]]
-        fixed = [self.stage.fixed[k] for k in touching(self.stage.boxes, box)]
+        fixed = [self.stage.fixed[k] for k in touching(self.stage.octagons, round_here)]
         screen = Screen(shells + [placed_shell(body.asset, body.pose) for body in fixed])
         view = view_from(x, y, HEADINGS[self.quarter], self.horizon_deg)
         for _, k in sorted(wanted):
@@ -195,14 +195,13 @@ class World:
         gap = math.inf
         if agent:
             x, y = self.position
-            box = (x - AGENT_M, y - AGENT_M, x + AGENT_M, y + AGENT_M)
-            loose = touching(self._boxes, box)
+            loose = touching(self._octagons, square_round(x, y, AGENT_M))
             gap = min((self.away(k, x, y) for k in loose), default=math.inf)
         return push(
             item.asset,
             pose,
             heading,
-            lambda box: self.near(box, index),
+            lambda octagon: self.near(octagon, index),
             self.position if agent else None,
             agent_gap_m=gap,
             model=self.model,
@@ -211,17 +210,18 @@ class World:
     def put(self, changes: Iterable[tuple[int, Pose | None]]) -> None:
         """Lay things elsewhere, or (pose None) take them off the floor: no questions asked."""
         lattice = self.lattice.copy()
-        items, handles, boxes = list(self.items), list(self._handles), self._boxes.copy()
+        items, handles = list(self.items), list(self._handles)
+        octagons = self._octagons.copy()
         for k, pose in changes:
             if items[k].pose is not None:
                 lattice.remove(handles[k])
             home = self.stage.items[k] if k < len(self.stage.items) else None
             back = home is not None and home.pose == pose
             items[k] = home if back and home is not None else Item.at(items[k].asset, pose)
-            boxes[k] = items[k].box
+            octagons[k] = items[k].octagon
             handles[k] = -1 if pose is None else lattice.add(items[k].footprint)
         self.lattice, self.items = lattice, tuple(items)
-        self._handles, self._boxes = tuple(handles), boxes
+        self._handles, self._octagons = tuple(handles), octagons
 
     def digest(self) -> str:
         """Sha256 of the state: equal for equal worlds, whatever happened before."""
@@ -261,16 +261,16 @@ class World:
         item = self.items[index]
         if len(item.footprint):
             return axis_distance(x, y, item.footprint)
-        low_x, low_y, high_x, high_y = item.box
-        return math.hypot(max(low_x - x, 0.0, x - high_x), max(low_y - y, 0.0, y - high_y))
+        east, _, north, _, west, _, south, _ = item.octagon
+        return math.hypot(max(-west - x, 0.0, x - east), max(-south - y, 0.0, y - north))
 
-    def near(self, box: Box, skip: int = -1) -> list[tuple[int, Body]]:
-        """Bodies that reach into a box: items by their index, then what is fixed."""
+    def near(self, octagon: Octagon, skip: int = -1) -> list[tuple[int, Body]]:
+        """Bodies that reach into an octagon: items by their index, then what is fixed."""
         bodies = []
-        for k in touching(self._boxes, box):
+        for k in touching(self._octagons, octagon):
             if k != skip:
                 item, pose = self._at(k)
                 bodies.append((k, Body(item.asset, pose, moves=True)))
         first = len(self.items)
-        bodies += [(first + k, self.stage.fixed[k]) for k in touching(self.stage.boxes, box)]
+        bodies += [(first + k, self.stage.fixed[k]) for k in touching(self.stage.octagons, octagon)]
         return bodies

@@ -10,6 +10,7 @@ from internav_data.geometry import asset_corners, footprint, transform, yaw_quat
 from internav_data.records import Asset, Part, Pose, Wall
 from internav_data.world import Body, push, wall_body
 from internav_data.world.bullet import pybullet
+from internav_data.world.octagons import overlap
 from internav_data.world.push import AGENT_LEAST_M, SHOVES
 from internav_data.world.sight import axis_distance
 from internav_data.world.sweeps import extent_of
@@ -47,15 +48,11 @@ def alone(box):
 
 
 def among(*bodies):
-    """Everything whose bounding box reaches into a box, as a world gathers it."""
-    extents = [extent_of(body.asset, body.pose).plan for body in bodies]
+    """Everything whose octagon overlaps one, as a world gathers it."""
+    extents = [extent_of(body.asset, body.pose).octagon for body in bodies]
 
-    def near(box):
-        return [
-            (k, bodies[k])
-            for k, e in enumerate(extents)
-            if e[0] < box[2] and e[2] > box[0] and e[1] < box[3] and e[3] > box[1]
-        ]
+    def near(octagon):
+        return [(k, bodies[k]) for k, extent in enumerate(extents) if overlap(extent, octagon)]
 
     return near
 
@@ -144,7 +141,7 @@ def test_what_a_neighbour_runs_into_takes_part():
     wall = wall_body(Wall(5.2, 0.0, 5.32, 8.0, 0.0, 2.6))
     pushed = push(low_box(3.0, 0.4), STANDING, 0, among(*row, wall))
     for k, pose in pushed.moved:
-        assert extent_of(row[k].asset, pose).plan[2] <= 5.2 + 0.002
+        assert extent_of(row[k].asset, pose).octagon[0] <= 5.2 + 0.002
 
 
 def test_what_only_a_neighbour_reaches_takes_part_too():
