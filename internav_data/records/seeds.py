@@ -24,6 +24,7 @@ class Purpose(IntEnum):
     SPAWN = 8
     LOADER = 9
     WINDOWS = 10
+    EVALUATION = 11
 
 
 def generator(

@@ -1,0 +1,1 @@
+"""CaMP and its baselines: trained on the shards, measured like the paper."""
