@@ -14,7 +14,7 @@ PUSH_MODELS = ("force", "kick")
 class EpisodeConfig:
     """Settings of the episodes; the defaults are calibrated to Table 2 of the paper."""
 
-    max_obstacles: tuple[int, int, int] = (4, 9, 15)
+    max_obstacles: tuple[int, int, int] = (4, 9, 16)
     """Most obstacles in houses of 1-2, 3-5 and 6-10 rooms; then start and goal are drawn anew."""
     sideways_m: float = 0.40
     """Standard deviation of an obstacle's distance from the way, metres."""

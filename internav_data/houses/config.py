@@ -51,7 +51,7 @@ class HouseConfig:
     """Share of the sensible further doors that are built, so that there are ways round."""
     wide_openings: float = 0.95
     """Share of wide, double and open doorways where they make sense. `paper` only."""
-    wings: float = 0.8
+    wings: float = 1.0
     """Share of drawn plans whose living room leads to rooms of its own: longer room paths."""
     rooms_on_way_medium: float = 2.7
     """Rooms on the way between two random points that plans of 3-5 rooms aim at. `paper` only."""
