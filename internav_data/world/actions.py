@@ -47,6 +47,7 @@ START_HORIZON_DEG: Final = 30
 Reason = Literal[
     "",
     "something is in the way",
+    "the agent is in the way",
     "cannot look further",
     "nothing to push in sight and reach",
     "nothing to pick up in sight and reach",

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from internav_data.geometry import asset_corners, centre_of_mass, multiply, rotation_matrix
 from internav_data.records import Pose
-from internav_data.world.bullet_scene import STEP_S, Builder, pybullet
+from internav_data.world.bullet_scene import RULES, STEP_S, Builder, pybullet
 from internav_data.world.setting import Motion, Rest
 from internav_data.world.sweeps import trail_of
 
@@ -48,7 +48,7 @@ class Bullet:
 
     _builder: Builder
     name: str = "bullet"
-    build: str = field(default_factory=lambda: f"pybullet {version('pybullet')}")
+    build: str = field(default_factory=lambda: f"pybullet {version('pybullet')}, rules {RULES}")
 
     def settle(self, setting: Setting) -> Rest:
         """Let the first body fall until at rest, one second at most."""

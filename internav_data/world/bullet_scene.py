@@ -40,6 +40,9 @@ def _import_quietly() -> ModuleType:
 
 pybullet: Any = _import_quietly()
 
+RULES = 2
+"""Raised with every change of what scenes, settling or pushing give: certificates name it, so a
+dataset made by other rules is told from a wrong one."""
 STEP_S = 1.0 / 240.0
 GRAVITY = 9.81
 SOLVER_ITERATIONS = 20

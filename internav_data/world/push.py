@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
     Near = Callable[[Octagon], Sequence[tuple[int, Body]]]
     """Bodies, with their keys in ascending order, that reach into an octagon of the house."""
+    Movers = tuple[tuple[int, Body], ...]
+    """Bodies that move besides what is pushed, with their keys."""
 
 PushModel = Literal["force", "kick"]
 SHOVES: Final[dict[PushModel, Shove]] = {
@@ -55,7 +57,7 @@ _START_DIGITS: Final = 4
 """Orientations of a free push are rounded to 0.1 mrad, which moves a corner by less than the 0.1 mm
 of stored positions: nearly equal ones share their solution."""
 
-Failure = Literal["", "too heavy", "something is in the way"]
+Failure = Literal["", "too heavy", "something is in the way", "the agent is in the way"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,17 +119,22 @@ def push(
     start = Pose(0.0, 0.0, pose.z, _coarse(entered.quaternion))
     free = _push_alone(asset, start, shove, engine)
     motion = free
-    movers: tuple[tuple[int, Body], ...] = ()
-    if _shift(asset, pose, frame.leave(free.poses[0])) < SUCCESS_M:
-        # Too heavy alone, so whatever stands beside it makes it no lighter.
-        return _judged(asset, pose, frame, motion, movers, free)
-    if _reached(frame, near, free.sweeps, TOUCH_M):
+    movers: Movers = ()
+    failure: Failure = "too heavy"
+
+    def moves() -> bool:
+        return _shift(asset, pose, frame.leave(motion.poses[0])) >= SUCCESS_M
+
+    # What is too heavy alone is not lighter among others, nor freer beside the agent.
+    if moves() and _reached(frame, near, free.sweeps, TOUCH_M):
+        failure = "something is in the way"
         motion, movers = _push_among(asset, start, frame, near, None, shove, free.sweeps)
     column = _column(frame, agent, agent_gap_m)
-    if column is not None and _meets(column, motion.sweeps):
+    if column is not None and moves() and _meets(column, motion.sweeps):
         # Only now: what never comes near the agent is solved once, wherever it stands.
+        failure = "the agent is in the way"
         motion, movers = _push_among(asset, start, frame, near, column, shove, motion.sweeps)
-    return _judged(asset, pose, frame, motion, movers, free)
+    return _judged(asset, pose, frame, motion, movers, failure)
 
 
 @lru_cache(maxsize=32768)
@@ -149,7 +156,7 @@ def _push_among(
     column: Column | None,
     shove: Shove,
     sweeps: Sequence[Octagon],
-) -> tuple[Motion, tuple[tuple[int, Body], ...]]:
+) -> tuple[Motion, Movers]:
     """Push among what can be touched: gathered anew until nothing left out was reached."""
     engine = engine_of_this_process()
     known = _reached(frame, near, sweeps, AROUND_M)
@@ -187,8 +194,8 @@ def _judged(
     pose: Pose,
     frame: Frame,
     motion: Motion,
-    movers: tuple[tuple[int, Body], ...],
-    free: Motion,
+    movers: Movers,
+    failure: Failure,
 ) -> Pushed:
     """Move a motion from the thing's own frame into the house, round it, and judge it."""
     end = frame.leave(motion.poses[0])
@@ -199,10 +206,6 @@ def _judged(
         if not _still(body, there):
             moved.append((key, there))
     success = far >= SUCCESS_M
-    reason: Failure = ""
-    if not success:
-        alone = _shift(asset, pose, frame.leave(free.poses[0])) >= SUCCESS_M
-        reason = "something is in the way" if alone else "too heavy"
     return Pushed(
         pose=end,
         displacement_m=far,
@@ -210,7 +213,7 @@ def _judged(
         toppled=_tilt_deg(pose.quaternion, end.quaternion) > TOPPLED_DEG,
         moved=tuple(moved),
         success=success,
-        reason=reason,
+        reason="" if success else failure,
         at_rest=motion.at_rest,
     )
 

@@ -115,7 +115,8 @@ class Stage:
             left = (item.footprint for k, item in enumerate(self.items) if k not in displaced)
             finder = WayFinder.of_polygons(Polygons.joined([self.footprints, *left]))
             if len(self._ways) >= WAYS_KEPT:
-                del self._ways[next(iter(self._ways))]
+                # The oldest goes, but never the one with all furniture in its place.
+                del self._ways[next(key for key in self._ways if key)]
             self._ways[displaced] = finder
         return finder
 
