@@ -1,4 +1,4 @@
-"""`internav-gen`: finds the command, and turns every error into one line and an exit code."""
+"""`internav-gen`: finds the command. `launch` turns every error into a line and an exit code."""
 
 from __future__ import annotations
 
@@ -68,11 +68,16 @@ def cli(*, debug: bool) -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line and exit with its code."""
+    """Run `internav-gen` and exit with its code."""
+    launch(cli, "internav-gen", arguments)
+
+
+def launch(command: click.Command, program: str, arguments: list[str] | None = None) -> None:
+    """Run a command line and exit with its code; every error becomes one line."""
     given = sys.argv[1:] if arguments is None else arguments
     debug = bool(given) and given[0] == "--debug"
     try:
-        result = cli.main(given, prog_name="internav-gen", standalone_mode=False)
+        result = command.main(given, prog_name=program, standalone_mode=False)
         sys.stdout.flush()
     except BrokenPipeError:
         sys.stdout = None  # who read our output has gone: nothing is left to flush at the end
@@ -80,11 +85,11 @@ def main(arguments: list[str] | None = None) -> None:
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - every one becomes one line
         if debug:
             traceback.print_exc()
-        sys.exit(_told(error, given))
+        sys.exit(_told(error, program, given))
     sys.exit(result if isinstance(result, int) else 0)
 
 
-def _told(error: BaseException, given: list[str]) -> int:
+def _told(error: BaseException, program: str, given: list[str]) -> int:
     """Say on stderr what went wrong and return the exit code."""
     from internav_data.records.errors import InternavError
 
@@ -92,23 +97,23 @@ def _told(error: BaseException, given: list[str]) -> int:
         error.show()
         return error.exit_code
     if isinstance(error, KeyboardInterrupt | click.Abort):
-        return _say("interrupted", INTERRUPTED)
+        return _say(program, "interrupted", INTERRUPTED)
     if isinstance(error, click.ClickException):
-        return _say(_with_help(error), error.exit_code)
+        return _say(program, _with_help(error), error.exit_code)
     if isinstance(error, InternavError):
         signum = getattr(error, "signum", 0)
-        return _say(str(error), 128 + signum if signum else error.exit_code)
-    return _say(_unforeseen(error, given), 1)
+        return _say(program, str(error), 128 + signum if signum else error.exit_code)
+    return _say(program, _unforeseen(error, program, given), 1)
 
 
-def _unforeseen(error: BaseException, given: list[str]) -> str:
+def _unforeseen(error: BaseException, program: str, given: list[str]) -> str:
     if isinstance(error, OSError):
         where = f" ({error.filename})" if error.filename else ""
         return f"{error.strerror or error}{where}"
     if isinstance(error, ModuleNotFoundError):
         hint = "install everything with `pip install 'internav-data[all]'`"
         return f"{error.name} is missing: {hint}; `internav-gen doctor` tells more"
-    again = shlex.join(["internav-gen", "--debug", *given])
+    again = shlex.join([program, "--debug", *given])
     return f"{type(error).__name__}: {error}; this is a bug: `{again}` shows where"
 
 
@@ -118,6 +123,6 @@ def _with_help(error: click.ClickException) -> str:
     return f"{error.format_message()}{hint}"
 
 
-def _say(text: str, code: int) -> int:
-    click.echo(f"internav-gen: {' '.join(text.split())}", err=True)
+def _say(program: str, text: str, code: int) -> int:
+    click.echo(f"{program}: {' '.join(text.split())}", err=True)
     return code

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from types import NoneType
@@ -99,6 +100,17 @@ def read_evaluation(folder: Path) -> Evaluation:
     if len({result.episode_id for result in results}) != len(results):
         raise CorruptDataError(f"{table_path}: an episode is there twice; evaluate again")
     return Evaluation(about, results)
+
+
+def folder_name(name: str) -> str:
+    """Return a folder's name for a row."""
+    return re.sub(r"[^\w.]+", "-", name).strip("-.") or "agent"
+
+
+def forget_evaluations(folder: Path) -> None:
+    """Take away what makes evaluations of the folders in a folder; new ones replace them."""
+    for path in folder.glob(f"*/{ABOUT}"):
+        path.unlink()
 
 
 def find_evaluations(path: Path) -> list[Path]:
