@@ -53,6 +53,8 @@ ON_M: Final = 0.2
 STILL_M: Final = 0.0005
 STILL_RAD: Final = 0.001
 """A neighbour that moved less has not moved: the engine's own trembling."""
+_HEIGHT_DIGITS: Final = 3
+"""What settled lies 0.9 or 1.0 mm high: one solution serves both."""
 _START_DIGITS: Final = 4
 """Orientations of a free push are rounded to 0.1 mrad, which moves a corner by less than the 0.1 mm
 of stored positions: nearly equal ones share their solution."""
@@ -112,13 +114,10 @@ def push(
         "force" or "kick".
 
     """
-    engine = engine_of_this_process()
     shove = SHOVES[model]
     frame = Frame(pose.x, pose.y, heading)
-    entered = frame.enter(pose)
-    start = Pose(0.0, 0.0, pose.z, _coarse(entered.quaternion))
-    free = _push_alone(asset, start, shove, engine)
-    motion = free
+    start = _start(frame, pose)
+    motion = free = _push_alone(asset, start, shove, engine_of_this_process())
     movers: Movers = ()
     failure: Failure = "too heavy"
 
@@ -135,6 +134,20 @@ def push(
         failure = "the agent is in the way"
         motion, movers = _push_among(asset, start, frame, near, column, shove, motion.sweeps)
     return _judged(asset, pose, frame, motion, movers, failure)
+
+
+def crowd(asset: Asset, pose: Pose, heading: int, near: Near, model: PushModel = "force") -> int:
+    """Count the things that may be moved besides what is pushed: what a push will cost to solve.
+
+    Parameters as in `push`.
+    """
+    frame = Frame(pose.x, pose.y, heading)
+    free = _push_alone(asset, _start(frame, pose), SHOVES[model], engine_of_this_process())
+    return sum(body.moves for body in _gathered(frame, near, free.sweeps).values())
+
+
+def _start(frame: Frame, pose: Pose) -> Pose:
+    return Pose(0.0, 0.0, round(pose.z, _HEIGHT_DIGITS), _coarse(frame.enter(pose).quaternion))
 
 
 @lru_cache(maxsize=32768)
@@ -159,10 +172,7 @@ def _push_among(
 ) -> tuple[Motion, Movers]:
     """Push among what can be touched: gathered anew until nothing left out was reached."""
     engine = engine_of_this_process()
-    known = _reached(frame, near, sweeps, AROUND_M)
-    for body in [body for body in known.values() if body.moves]:
-        # What is met may be driven on.
-        known.update(near(grown(extent_of(body.asset, body.pose).octagon, ON_M)))
+    known = _gathered(frame, near, sweeps)
     for left in reversed(range(ROUNDS)):
         around = [(key, known[key]) for key in sorted(known)]
         movers = tuple(pair for pair in around if pair[1].moves)
@@ -179,6 +189,14 @@ def _push_among(
         if left == 1:
             known.update(_reached(frame, near, sweeps, FAR_M))
     return motion, movers
+
+
+def _gathered(frame: Frame, near: Near, sweeps: Sequence[Octagon]) -> dict[int, Body]:
+    """Gather what a push may meet, and what that may be driven on to."""
+    known = _reached(frame, near, sweeps, AROUND_M)
+    for body in [body for body in known.values() if body.moves]:
+        known.update(near(grown(extent_of(body.asset, body.pose).octagon, ON_M)))
+    return known
 
 
 def _reached(frame: Frame, near: Near, sweeps: Iterable[Octagon], margin: float) -> dict[int, Body]:

@@ -13,7 +13,7 @@ from internav_data.records.errors import UsageError
 from internav_data.world.actions import START_HORIZON_DEG
 from internav_data.world.frames import HEADINGS
 from internav_data.world.octagons import square_round, touching
-from internav_data.world.push import AGENT_M, push
+from internav_data.world.push import AGENT_M, crowd, push
 from internav_data.world.setting import Body
 from internav_data.world.shells import placed_shell
 from internav_data.world.sight import REACH_M, Screen, axis_distance, view_from
@@ -206,6 +206,11 @@ class World:
             agent_gap_m=gap,
             model=self.model,
         )
+
+    def crowd(self, index: int, heading: int) -> int:
+        """Count the things that pushing one along a heading may move besides it."""
+        item, pose = self._at(index)
+        return crowd(item.asset, pose, heading, lambda o: self.near(o, index), self.model)
 
     def put(self, changes: Iterable[tuple[int, Pose | None]]) -> None:
         """Lay things elsewhere, or (pose None) take them off the floor: no questions asked."""
