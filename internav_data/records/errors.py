@@ -33,3 +33,9 @@ class CorruptDataError(InternavError):
     """A file that is damaged, edited, missing or of a version this release cannot read."""
 
     exit_code: ClassVar[int] = 5
+
+
+class NotFiniteError(InternavError):
+    """Training met NaN or infinity: in what an environment said, or in a loss."""
+
+    exit_code: ClassVar[int] = 6

@@ -25,6 +25,7 @@ class Purpose(IntEnum):
     LOADER = 9
     WINDOWS = 10
     EVALUATION = 11
+    TRAINING = 12
 
 
 def generator(

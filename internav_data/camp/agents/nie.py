@@ -1,0 +1,135 @@
+"""`nie`: PPO that foresees what each action does to objects in sight.
+
+After Zeng et al. 2021, "Pushing it out of the way", as the facts sheet describes the released code:
+eight keypoints an object; for each action a 3x4 affine, the identity at the start, says where they
+go; an L1 loss on the action that was taken; a summary by attention joins the GRU's input. Objects
+are known by instance masks: **privileged input** that no other method gets. Ours: keypoints are the
+corners of the box round an object's visible points, level with the floor, in metres from the eye;
+the object's type is not given.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from internav_data.camp.agents.flat import PPOAgent
+from internav_data.records.errors import UsageError
+from internav_data.world.actions import ACTION_COUNT, HORIZONS_DEG
+
+if TYPE_CHECKING:
+    from internav_data.camp.agents.protocol import Batch, Evaluated, State
+    from internav_data.camp.config import CampConfig
+    from internav_data.camp.networks import Course
+
+SUMMARY: Final = 64
+_CORNERS: Final = 8
+_NOWHERE: Final = 1e6
+
+
+class NIEAgent(PPOAgent):
+    """`ppo` with a neural interaction engine; environments are made with `ids=True`."""
+
+    def __init__(self, config: CampConfig) -> None:
+        super().__init__(config, extra=SUMMARY)
+        self._objects, self._weight = config.agent.nie_objects, config.agent.nie_weight
+        self.object = nn.Sequential(nn.Linear(3 * _CORNERS, SUMMARY), nn.ReLU())
+        self.affine = nn.Linear(SUMMARY, ACTION_COUNT * 12)
+        nn.init.zeros_(self.affine.weight)
+        self.affine.bias.data.copy_(torch.eye(3, 4).flatten().repeat(ACTION_COUNT))
+        self.query = nn.Linear(self.encoder.size, SUMMARY)
+        self.content = nn.Linear(SUMMARY + 3 * _CORNERS * ACTION_COUNT, SUMMARY)
+
+    def run(
+        self, seen: dict[str, Tensor], course: Course, state: State, record: dict[str, Tensor]
+    ) -> tuple[Tensor, State, dict[str, Tensor]]:
+        """See `PPOAgent`."""
+        record = record if "objects" in record else {**record, **self.sighted(seen)}
+        out, after, noted = super().run(seen, course, state, record)
+        return out, after, {**noted, **{name: record[name] for name in ("objects", "corners")}}
+
+    def features(self, seen: dict[str, Tensor], record: dict[str, Tensor]) -> Tensor:
+        """See `PPOAgent`: what is seen, and a summary of what could become of it."""
+        features = super().features(seen, record)
+        corners, there = record["corners"], record["objects"] >= 0
+        each = self.object(corners.flatten(-2))
+        moves = (self.foreseen(each, corners) - corners.unsqueeze(-3)).flatten(-3)
+        likeness = (each * self.query(features).unsqueeze(-2)).sum(-1) / SUMMARY**0.5
+        weights = torch.softmax(likeness.masked_fill(~there, -_NOWHERE), -1) * there
+        content = self.content(torch.cat([each, moves], -1))
+        return torch.cat([features, (weights.unsqueeze(-1) * content).sum(-2)], -1)
+
+    def foreseen(self, each: Tensor, corners: Tensor) -> Tensor:
+        """Return where keypoints (…, K, 8, 3) would go by each action, (…, K, 12, 8, 3)."""
+        affine: Tensor = self.affine(each).view(*each.shape[:-1], ACTION_COUNT, 3, 4)
+        padded = functional.pad(corners, (0, 1), value=1.0).unsqueeze(-3)
+        ahead: Tensor = padded @ affine.transpose(-1, -2)
+        return ahead
+
+    def evaluate(self, batch: Batch) -> Evaluated:
+        """See `Agent`; the loss is that of the keypoints foreseen."""
+        sighted = {name: batch.record[name] for name in ("objects", "corners")}
+        said = super().evaluate(batch)
+        objects, corners = sighted["objects"], sighted["corners"]
+        index = batch.record["choice"][..., None, None, None, None]
+        ahead = self.foreseen(self.object(corners.flatten(-2)), corners)
+        ahead = ahead.take_along_dim(index, -3).squeeze(-3)
+        same = objects[:-1, :, :, None] == objects[1:, :, None, :]
+        same &= (objects[:-1, :, :, None] >= 0) & ~batch.starts[1:, :, None, None]
+        apart = (ahead[:-1, :, :, None] - corners[1:, :, None]).abs().mean((-1, -2))
+        loss = (apart * same).sum((-1, -2)) / same.sum((-1, -2)).clamp(min=1)
+        return replace(said, loss=self._weight * functional.pad(loss, (0, 0, 0, 1)))
+
+    @torch.no_grad()
+    def sighted(self, seen: dict[str, Tensor]) -> dict[str, Tensor]:
+        """Return the nearest objects in sight: ids (T, n, K), -1 for none; corners (T, n, K, 8, 3).
+
+        Raises
+        ------
+        UsageError
+            The observations have no instance ids.
+        """
+        if "ids" not in seen:
+            raise UsageError("nie needs instance masks: make the environments with ids=True")
+        steps, count, size, _ = seen["ids"].shape
+        ids = seen["ids"].reshape(steps * count, -1).long().clamp(min=0)  # 1 and up are objects
+        points = _points(seen["depth"].reshape(steps * count, size, size), seen["horizon"])
+        index = ids.unsqueeze(-1).expand_as(points)
+        nothing = points.new_full((len(ids), int(ids.max()) + 2, 3), _NOWHERE)
+        low = nothing.scatter_reduce(1, index, points, "amin")
+        high = (-nothing).scatter_reduce(1, index, points, "amax")
+        low, high = low[:, 1:], high[:, 1:]
+        far = low.clamp(min=0.0)[..., 0] + low[..., 0].eq(_NOWHERE) * _NOWHERE
+        wanted = min(self._objects, far.shape[1])
+        near, places = far.topk(wanted, dim=1, largest=False)
+        there = near < _NOWHERE
+        ends = [side.take_along_dim(places.unsqueeze(-1), 1) for side in (low, high)]
+        box = torch.stack(ends, -2) * there[..., None, None]
+        grid = torch.cartesian_prod(*[torch.arange(2, device=box.device)] * 3)
+        corners = torch.stack([box[:, :, grid[:, axis], axis] for axis in range(3)], -1)
+        short = self._objects - wanted
+        objects = functional.pad(places.masked_fill(~there, -1), (0, short), value=-1)
+        corners = functional.pad(corners, (0, 0, 0, 0, 0, short))
+        return {
+            "objects": objects.view(steps, count, -1),
+            "corners": corners.view(steps, count, -1, _CORNERS, 3),
+        }
+
+
+def _points(depth: Tensor, horizon: Tensor) -> Tensor:
+    """Return the points of pixels, (N, pixels, 3): metres ahead, left and up from a level eye.
+
+    The field of view is 90 degrees, so a pixel's slope is its place between -1 and 1.
+    """
+    size = depth.shape[-1]
+    slopes = (torch.arange(size, device=depth.device) + 0.5) * (2.0 / size) - 1.0
+    left, up = -slopes[None, None, :] * depth, -slopes[None, :, None] * depth
+    degrees = torch.tensor(HORIZONS_DEG, dtype=depth.dtype, device=depth.device)
+    down = torch.deg2rad(degrees)[horizon.flatten().long()][:, None, None]
+    ahead = depth * down.cos() + up * down.sin()
+    level = up * down.cos() - depth * down.sin()
+    return torch.stack([ahead, left, level], -1).flatten(1, 2)

@@ -1,0 +1,263 @@
+"""Every hyperparameter of training, with what it means; the presets `paper` and `small`."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+from internav_data.generation import values
+from internav_data.records.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+Intent = Literal["integrated", "policy", "recursive", "none"]
+Preset = Literal["paper", "small"]
+INTERACTION_ACTIONS: Final = 11
+"""After so many actions an interaction closes (CAMP.md 4; the released code cuts after 10)."""
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkConfig:
+    """Sizes of the networks."""
+
+    image_size: int = 64
+    """Pixels a side of what the agent sees."""
+    encoder: Preset = "small"
+    """"paper": one network for colour and one for depth, fused (facts sheet); "small": one network
+    over all four channels."""
+    hidden: int = 128
+    """Features of an encoder and units of each GRU."""
+    goal_embedding: int = 32
+    """Into which (distance, cos bearing, sin bearing) is embedded."""
+    shared_encoder: bool = True
+    """One encoder for all policies; False: one for Navigate, intent and global, one for Push, one
+    for Pick."""
+    depth_limit_m: float = 10.0
+    """Depth is cut here and divided by it."""
+    goal_scale_m: float = 10.0
+    """The goal's distance is divided by this."""
+
+
+@dataclass(frozen=True, slots=True)
+class AgentConfig:
+    """What the learners are told to be, besides their method."""
+
+    intent: Intent = "integrated"
+    """What global is fed (Table 4): the integrated intent of equation (7); the intent policy's
+    choice of option; equation (7) run twice; or nothing but the plane vector."""
+    sync_every: int = 3
+    """Rollouts between copies of global into the intent policy (K)."""
+    forbidden: tuple[Literal["push", "pick"], ...] = ()
+    """Options that are never opened."""
+    end_chance: float = 0.01
+    """Chance at the start that a decision ends the episode, the same for every learner. Uniform
+    heads would end episodes after about ten steps."""
+    interact_chance: float = 0.045
+    """Share at the start of Push, and of Pick, among what does not end the episode; Navigate has
+    the rest."""
+    nie_objects: int = 6
+    """Objects that `nie` looks at: the nearest in sight."""
+    nie_weight: float = 3.0
+    """Of the L1 loss on `nie`'s predicted keypoints (released code)."""
+
+
+@dataclass(frozen=True, slots=True)
+class PPOConfig:
+    """Rollouts and updates."""
+
+    environments: int = 16
+    """Stepped side by side."""
+    steps: int = 64
+    """Of each environment in a rollout."""
+    epochs: int = 3
+    """Passes over a rollout (the paper's k)."""
+    minibatches: int = 4
+    """Of whole environments, a pass."""
+    clip: float = 0.2
+    """How far the ratio of probabilities may leave 1 before it earns nothing."""
+    clip_value: bool = False
+    """Clip values by `clip` too. 0.1 against returns near 10 throttles the critic."""
+    value_coefficient: float = 0.5
+    """Of half the squared error of values."""
+    entropy_coefficient: float = 0.01
+    """Of the entropy that is rewarded."""
+    gamma: float = 0.99
+    """Discount a step."""
+    lam: float = 0.95
+    """Decay of generalised advantages (lambda)."""
+    gradient_norm: float = 0.5
+    """Longer gradients are cut to this length."""
+    kl_limit: float | None = 0.03
+    """Updates on a rollout stop before the step whose minibatch is farther from the rollout's
+    policy than this; none: never."""
+    normalise_advantages: bool = True
+    """To mean 0 and deviation 1, over a rollout."""
+    critic_rollouts: int = 10
+    """First rollouts after a start whose critic is new: they train the critic alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class CloningConfig:
+    """Cloning the dataset's expert (`--init-from expert`)."""
+
+    frames: int = 150_000
+    """Of the expert, an epoch."""
+    epochs: int = 4
+    """Passes over them."""
+    environments: int = 16
+    """Experts replayed side by side."""
+    steps: int = 64
+    """Frames of each in an update, its GRUs carried from one update to the next."""
+    learning_rate: float = 3e-4
+    """Of Adam; falls to 0 in a straight line."""
+    sync_every: int = 100
+    """Updates between copies of global into the intent policy."""
+
+
+@dataclass(frozen=True, slots=True)
+class StagesConfig:
+    """Environment steps, and how the stages share them; auxiliary ones count."""
+
+    steps: int = 300_000
+    """In all stages together, the same for every method."""
+    auxiliary_share: float = 0.1
+    """On the three auxiliary tasks; flat methods: the main task in single rooms."""
+    single_room_share: float = 0.1
+    """Of joint training in scenes of a single room."""
+    side_by_side: bool = True
+    """Auxiliary tasks at once, environments split in three; False: one after the other."""
+    learning_rate: float = 3e-4
+    """Of auxiliary stages and of flat methods."""
+    joint_learning_rate: float = 1e-4
+    """Of joint training of a hierarchy."""
+    decay_over: Literal["stage", "all"] = "stage"
+    """What the learning rate falls to 0 over: each stage, with a fresh Adam, or all steps."""
+
+
+@dataclass(frozen=True, slots=True)
+class CampConfig:
+    """All of it: equal configs, seeds and datasets give equal runs on one thread."""
+
+    seed: int = 0
+    """Every random number derives from it; 0 or more."""
+    network: NetworkConfig = field(default_factory=NetworkConfig)
+    """Sizes of the networks."""
+    agent: AgentConfig = field(default_factory=AgentConfig)
+    """What the learner is told to be."""
+    ppo: PPOConfig = field(default_factory=PPOConfig)
+    """Rollouts and updates."""
+    cloning: CloningConfig = field(default_factory=CloningConfig)
+    """Cloning the expert."""
+    stages: StagesConfig = field(default_factory=StagesConfig)
+    """How many steps, where."""
+
+    def check(self) -> None:
+        """Raise UsageError for values that cannot be meant."""
+        for key, (value, low, high) in _bounds(self).items():
+            if not low <= value <= high:
+                raise UsageError(f"{key} is {value}: expected {low} … {high}")
+        if self.ppo.environments % self.ppo.minibatches:
+            raise UsageError(
+                f"ppo.minibatches is {self.ppo.minibatches}: minibatches are of whole "
+                f"environments, so it must divide ppo.environments ({self.ppo.environments})"
+            )
+        least = 36 if self.network.encoder == "paper" else 16
+        if self.network.image_size < least:
+            raise UsageError(
+                f"network.image_size is {self.network.image_size}: the {self.network.encoder!r} "
+                f"encoder needs {least} pixels a side at least"
+            )
+        shares = self.stages.auxiliary_share + self.stages.single_room_share
+        if shares > 1.0:
+            raise UsageError(f"stages: the shares of the first stages add up to {shares}, above 1")
+
+
+def preset(name: str) -> CampConfig:
+    """Return the config `paper` or `small`.
+
+    Raises
+    ------
+    UsageError
+        There is no such preset.
+    """
+    if name not in _PRESETS:
+        raise UsageError(f"preset {name!r}: expected one of {', '.join(_PRESETS)}")
+    return _PRESETS[name]()
+
+
+def from_mapping(config: CampConfig, changes: Mapping[str, Any], where: str) -> CampConfig:
+    """Return a checked config with some values replaced.
+
+    Parameters
+    ----------
+    config
+        A preset.
+    changes
+        Nested by field name, as JSON or TOML give them.
+    where
+        They come from, for errors.
+
+    Raises
+    ------
+    UsageError
+        An unknown key (the nearest known one is named), a wrong type, or a value out of bounds.
+    """
+    changed = values.from_mapping(config, changes, where)
+    changed.check()
+    return changed
+
+
+def plain(config: CampConfig) -> dict[str, Any]:
+    """Return all values as plain data, which `from_mapping` reads back."""
+    said: dict[str, Any] = values.plain(config)
+    return said
+
+
+def _paper() -> CampConfig:
+    return CampConfig(
+        network=NetworkConfig(300, "paper", hidden=512, shared_encoder=False),
+        ppo=PPOConfig(
+            environments=12, steps=30, epochs=1, minibatches=1, clip=0.1, clip_value=True
+        ),
+        stages=StagesConfig(steps=10_000_000, side_by_side=False, decay_over="all"),
+    )
+
+
+_PRESETS: Final[dict[str, Callable[[], CampConfig]]] = {"paper": _paper, "small": CampConfig}
+
+_MOST: Final = 10**12
+_LIMITS: Final[dict[str, tuple[float, float]]] = {
+    "seed": (0, 2**63 - 1),
+    "image_size": (16, 1024),
+    "hidden": (1, 8192),
+    "goal_embedding": (1, 8192),
+    "depth_limit_m": (0.1, 1000.0),
+    "goal_scale_m": (0.1, 1000.0),
+    "end_chance": (1e-6, 0.5),
+    "interact_chance": (1e-6, 0.49),
+    "nie_objects": (1, 64),
+    "environments": (1, 65536),
+    "steps": (1, _MOST),
+    "kl_limit": (0.0, _MOST),
+    "gamma": (0.0, 1.0),
+    "lam": (0.0, 1.0),
+    "auxiliary_share": (0.0, 1.0),
+    "single_room_share": (0.0, 1.0),
+    "critic_rollouts": (0, _MOST),
+}
+"""What values a field may have, by its name; whole numbers else from 1, others from 0."""
+
+
+def _bounds(config: Any, prefix: str = "") -> dict[str, tuple[float, float, float]]:  # noqa: ANN401
+    """Return value, least and most of every number of a config, by dotted key."""
+    found: dict[str, tuple[float, float, float]] = {}
+    for f in dataclasses.fields(config):
+        value = getattr(config, f.name)
+        if dataclasses.is_dataclass(value):
+            found |= _bounds(value, f"{prefix}{f.name}.")
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            default = (1, _MOST) if isinstance(value, int) else (0.0, _MOST)
+            found[prefix + f.name] = (value, *_LIMITS.get(f.name, default))
+    return found

@@ -1,0 +1,114 @@
+"""A small world of made-up pictures, and agents small enough for it."""
+
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture(autouse=True)
+def _one_thread():
+    if find_spec("torch") is None:
+        yield
+        return
+    import torch
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+class FakeEnvironments:
+    """Noise to look at; episodes of fixed lengths, ended by Done or cut off; it notes actions."""
+
+    def __init__(self, count=4, size=16, length=7, seed=0, done_ends=True):
+        self.num_envs, self._size, self._seed = count, size, seed
+        self._lengths = [length + 3 * k for k in range(count)]
+        self._ages = np.zeros(count, int)
+        self._rng = np.random.default_rng(seed)
+        self._done_ends = done_ends
+        self.actions = []
+
+    def _look(self):
+        n, s = self.num_envs, self._size
+        return {
+            "rgb": self._rng.integers(0, 256, (n, s, s, 3), np.uint8),
+            "depth": self._rng.random((n, s, s, 1), np.float32) * 5,
+            "goal": self._rng.random((n, 2), np.float32),
+            "held": self._rng.integers(0, 2, n),
+            "horizon": self._rng.integers(0, 4, n),
+            "ids": self._rng.integers(-3, 6, (n, s, s)).astype(np.int32),
+        }
+
+    def reset(self, *, seed=None, options=None):
+        mask = (options or {}).get("reset_mask", np.ones(self.num_envs, bool))
+        assert mask.any()
+        self.seed = seed
+        self._ages[mask] = 0
+        return self._look(), {}
+
+    def step(self, actions):
+        assert actions.shape == (self.num_envs,)
+        assert ((actions >= -1) & (actions < 12)).all()
+        self.actions.append(actions.copy())
+        self._ages += 1
+        ended = (actions == 11) & self._done_ends
+        cut = (self._ages >= self._lengths) & ~ended
+        infos = {}
+        if (ended | cut).any():
+            infos["metrics"] = {"success": ended.copy(), "_success": ended | cut}
+        return self._look(), self._rng.random(self.num_envs), ended, cut, infos
+
+
+@pytest.fixture
+def fake():
+    return FakeEnvironments
+
+
+@pytest.fixture
+def config():
+    """Make a tiny config: `config(agent={"intent": "none"}, ppo=…)`."""
+    from internav_data.camp.config import from_mapping, preset
+
+    def make(**changes):
+        sizes = {
+            "network": {"image_size": 16, "hidden": 12},
+            "ppo": {"environments": 4, "minibatches": 2, "steps": 8},
+        }
+        tiny = from_mapping(preset("small"), sizes, "test")
+        return from_mapping(tiny, changes, "test")
+
+    return make
+
+
+def lively(agent):
+    """Blow weights up, so that intents and values differ visibly from step to step."""
+    import torch
+
+    with torch.no_grad():
+        for name, parameter in agent.named_parameters():
+            if "actor.weight" in name or "embed.weight" in name:
+                parameter.mul_(30.0)
+    agent.synchronise()
+    return agent
+
+
+@pytest.fixture
+def collected(fake, config):
+    """Return agent, collector and some successive rollouts."""
+    from internav_data.camp.agents import make_agent
+    from internav_data.camp.collect import Collector, uniforms_of
+
+    def make(method, rollouts=2, env=None, steps=8, changes=None, agent=None):
+        agent = agent or lively(make_agent(method, config(**(changes or {}))))
+        env = env or fake()
+        collector = Collector(env, agent)
+        collector.begin(env.reset(seed=0)[0])
+        lived = [
+            collector.collect(uniforms_of(0, r, range(env.num_envs), steps))
+            for r in range(rollouts)
+        ]
+        return agent, collector, lived
+
+    return make

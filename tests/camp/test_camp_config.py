@@ -1,0 +1,71 @@
+"""Presets, and configs read from plain data."""
+
+import dataclasses
+import json
+
+import pytest
+
+from internav_data.camp.config import CampConfig, from_mapping, plain, preset
+from internav_data.dataset.jsonschemas import descriptions
+from internav_data.records.errors import UsageError
+
+
+def test_the_paper_preset_is_the_papers():
+    paper = preset("paper")
+    paper.check()
+    assert (paper.network.image_size, paper.network.hidden) == (300, 512)
+    assert not paper.network.shared_encoder
+    assert (paper.ppo.clip, paper.ppo.clip_value, paper.ppo.epochs) == (0.1, True, 1)
+    assert (paper.agent.sync_every, paper.ppo.minibatches, paper.ppo.steps) == (3, 1, 30)
+    stages = paper.stages
+    assert (stages.learning_rate, stages.joint_learning_rate) == (3e-4, 1e-4)
+    assert stages.steps * stages.auxiliary_share == stages.steps * stages.single_room_share == 1e6
+
+
+def test_the_small_preset_is_the_sheets():
+    small = preset("small")
+    small.check()
+    assert (small.network.image_size, small.network.hidden) == (64, 128)
+    assert small.network.shared_encoder
+    ppo = small.ppo
+    assert (ppo.environments, ppo.steps, ppo.epochs, ppo.minibatches) == (16, 64, 3, 4)
+    assert (ppo.clip, ppo.clip_value) == (0.2, False)
+
+
+def test_plain_data_is_read_back():
+    for name in ("paper", "small"):
+        config = preset(name)
+        assert from_mapping(CampConfig(), json.loads(json.dumps(plain(config))), "file") == config
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"ppo": {"clp": 0.1}}, "did you mean 'ppo.clip'"),
+        ({"ppo": {"clip": "much"}}, "expected a number"),
+        ({"ppo": {"environments": 0}}, "ppo.environments is 0"),
+        ({"ppo": {"minibatches": 5}}, "must divide"),
+        ({"ppo": {"gamma": 1.5}}, "expected 0.0 … 1.0"),
+        ({"network": {"encoder": "paper", "image_size": 32}}, "needs 36 pixels"),
+        ({"agent": {"intent": "some"}}, "expected one of"),
+        ({"agent": {"forbidden": ["navigate"]}}, "expected one of"),
+        ({"stages": {"auxiliary_share": 0.95}}, "add up"),
+        ({"seed": -1}, "seed is -1"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(changes, said):
+    with pytest.raises(UsageError, match=said.replace(".", r"\.")):
+        from_mapping(preset("small"), changes, "file")
+
+
+def test_unknown_presets_are_refused():
+    with pytest.raises(UsageError, match="paper, small"):
+        preset("large")
+
+
+def test_every_field_is_documented():
+    config = CampConfig()
+    for part in (config, *(getattr(config, f.name) for f in dataclasses.fields(config)[1:])):
+        notes = descriptions(type(part))
+        for field in dataclasses.fields(part):
+            assert notes.get(field.name), f"{type(part).__name__}.{field.name}"

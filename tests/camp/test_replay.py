@@ -1,0 +1,115 @@
+"""What an agent did is told again, to the last probability, by every learner."""
+
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from internav_data.camp.agents import Auxiliary, make_agent  # noqa: E402
+from internav_data.camp.agents.options import NAVIGATE, PICK, PUSH  # noqa: E402
+from internav_data.camp.networks import Course  # noqa: E402
+
+LEARNERS = [
+    ("ppo", {}),
+    ("nie", {}),
+    ("ppo-intent", {}),
+    ("ppo-intent", {"intent": "recursive"}),
+    ("ppo-intent", {"intent": "none"}),
+    ("hrl", {}),
+    ("camp", {}),
+    ("camp", {"intent": "policy"}),
+    ("camp", {"intent": "recursive"}),
+    ("camp", {"intent": "none"}),
+    ("random", {}),
+]
+
+
+@pytest.fixture
+def curious(config):
+    """Let interactions be likely, so that rollouts begin and end within them."""
+    return {"agent": {"interact_chance": 0.3}}
+
+
+@pytest.mark.parametrize(("method", "told"), LEARNERS)
+@pytest.mark.parametrize("shared", [True, False])
+def test_log_probabilities_and_values_are_those_of_the_rollout(
+    collected, curious, method, told, shared
+):
+    """Across ends of episodes, and ends of rollouts in mid-interaction."""
+    changes = {"agent": {**curious["agent"], **told}, "network": {"shared_encoder": shared}}
+    agent, _, lived = collected(method, rollouts=4, changes=changes)
+    for rollout in lived:
+        now = agent.evaluate(rollout.batch)
+        torch.testing.assert_close(now.log_prob, rollout.log_probs, atol=1e-5, rtol=0)
+        torch.testing.assert_close(now.value, rollout.values, atol=1e-5, rtol=0)
+        parts = rollout.batch.of(torch.tensor([2, 0]))
+        mine = agent.evaluate(parts).log_prob
+        torch.testing.assert_close(mine, rollout.log_probs[:, [2, 0]], atol=1e-5, rtol=0)
+    assert any(rollout.batch.starts[1:].any() for rollout in lived)
+    if method == "camp":
+        assert any(rollout.batch.state["open"].any() for rollout in lived[1:])
+
+
+@pytest.mark.parametrize("shared", [True, False])
+def test_auxiliary_tasks_are_replayed_too(collected, config, shared):
+    hierarchy = make_agent("camp", config(network={"shared_encoder": shared}))
+    agent, _, lived = collected(
+        "", rollouts=3, agent=Auxiliary(hierarchy, [NAVIGATE, PUSH, PICK, PUSH]), steps=16
+    )
+    for rollout in lived:
+        now = agent.evaluate(rollout.batch)
+        torch.testing.assert_close(now.log_prob, rollout.log_probs, atol=1e-5, rtol=0)
+        torch.testing.assert_close(now.value, rollout.values, atol=1e-5, rtol=0)
+    assert lived[0].batch.record["used"].max() > 1
+
+
+@pytest.mark.parametrize("method", ["ppo-intent", "camp"])
+@pytest.mark.parametrize("intent", ["integrated", "recursive"])
+def test_intents_worked_out_again_are_those_recorded(collected, curious, method, intent):
+    agent, _, lived = collected(
+        method, rollouts=3, changes={"agent": {**curious["agent"], "intent": intent}}
+    )
+    for rollout in lived:
+        batch = rollout.batch
+        recorded = batch.record.pop("intent")
+        again = agent.evaluate(batch)
+        torch.testing.assert_close(again.intent, recorded, atol=1e-5, rtol=0)
+        torch.testing.assert_close(again.log_prob, rollout.log_probs, atol=1e-5, rtol=0)
+        assert recorded.std(0).max() > 1e-3  # intents differ from step to step
+
+
+def test_chunks_of_a_gru_are_its_steps():
+    torch.manual_seed(0)
+    gru = torch.nn.GRU(5, 7)
+    inputs, hidden = torch.randn(13, 4, 5), torch.randn(4, 7)
+    starts = torch.rand(13, 4) < 0.15
+    assert starts.any()
+    out, after = Course(starts).run(gru, inputs, hidden)
+    h = hidden
+    for t in range(13):
+        h = h * (~starts[t]).unsqueeze(-1)
+        row, h = gru(inputs[t : t + 1], h.unsqueeze(0))
+        h = h.squeeze(0)
+        torch.testing.assert_close(out[t], row[0], atol=1e-5, rtol=0)
+    torch.testing.assert_close(after, h, atol=1e-5, rtol=0)
+
+
+def test_a_chunk_is_one_call():
+    """Boundaries are only where an episode begins."""
+    starts = torch.zeros(10, 3, dtype=torch.bool)
+    starts[4, 1] = starts[4, 2] = starts[7, 0] = True
+    assert Course(starts).bounds == [0, 4, 7, 10]
+    assert Course(torch.zeros(10, 3, dtype=torch.bool)).bounds == [0, 10]
+
+
+def test_a_rollout_goes_on_where_the_last_one_stopped(collected):
+    """Two rollouts of 8 are one of 16."""
+    from internav_data.camp.collect import uniforms_of
+
+    agent, collector, short = collected("camp", rollouts=2, steps=8)
+    env = type(collector.env)()
+    uniforms = torch.cat([uniforms_of(0, r, range(4), 8) for r in range(2)])
+    whole = type(collector)(env, agent)
+    whole.begin(env.reset()[0])
+    long = whole.collect(uniforms)
+    torch.testing.assert_close(long.log_probs, torch.cat([r.log_probs for r in short]))
+    torch.testing.assert_close(long.last_value, short[1].last_value)
