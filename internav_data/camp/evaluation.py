@@ -161,7 +161,8 @@ class _Round:
         self._episodes: list[Episode | None] = [None] * env.num_envs
         self._ids: list[str] = [""] * env.num_envs
         self._actions: list[list[int]] = [[] for _ in range(env.num_envs)]
-        self._found: dict[str, EpisodeResult] = {}
+        self._playing = [0] * env.num_envs
+        self._found: dict[int, EpisodeResult] = {}
 
     def played(self, tell: Tell | None) -> list[EpisodeResult]:
         env, count = self._env, self._env.num_envs
@@ -184,7 +185,7 @@ class _Round:
             seen, _ = env.reset(options={"reset_mask": over, "episode_id": self._ids})
             if tell is not None:
                 tell(len(self._found), len(self._numbers))
-        return list(self._in_order())
+        return [self._found[number] for number in self._numbers]
 
     def _seat(self, seat: int) -> None:
         """Give a seat the next episode; where there is none its last one stays, and is waited."""
@@ -192,7 +193,8 @@ class _Round:
         if self._next == len(self._numbers):
             self._episodes[seat] = None
             return
-        episode = self._dataset[self._numbers[self._next]]
+        self._playing[seat] = number = self._numbers[self._next]
+        episode = self._dataset[number]
         self._next += 1
         self._episodes[seat], self._ids[seat] = episode, episode.episode_id
         self._player.start(seat, episode)
@@ -202,7 +204,4 @@ class _Round:
         if episode is None:
             return
         said = {name: column[seat] for name, column in infos["metrics"].items() if name[0] != "_"}
-        self._found[episode.episode_id] = result_of(episode, said, self._actions[seat])
-
-    def _in_order(self) -> list[EpisodeResult]:
-        return sorted(self._found.values(), key=lambda result: result.episode_id)
+        self._found[self._playing[seat]] = result_of(episode, said, self._actions[seat])
