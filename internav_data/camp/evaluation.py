@@ -40,7 +40,7 @@ class Player(Protocol):
 
     name: str
     image_size: int
-    """Pixels a side that it wants to see."""
+    """Pixels a side that it wants to see. One that has `ids = True` sees instance masks too."""
 
     def begin(self, count: int, seed: int) -> None:
         """Take `count` seats; all that is random derives from `seed` and the episode."""
@@ -134,9 +134,10 @@ def evaluate(
         )
     numbers = chosen(len(dataset), settings.limit)
     count = min(settings.batch, len(numbers))
+    masks = {"ids": True} if getattr(player, "ids", False) else {}
     env = make_vector(
         count, dataset, min(settings.workers, count), image_size=player.image_size,
-        autoreset=False, copy=False, max_steps=settings.max_steps,
+        autoreset=False, copy=False, max_steps=settings.max_steps, **masks,
     )  # fmt: skip
     try:
         player.begin(count, settings.seed)

@@ -30,6 +30,7 @@ class _Noting:
 
     def __init__(self, player: Player) -> None:
         self.name, self.image_size = player.name, player.image_size
+        self.ids = getattr(player, "ids", False)
         self._player = player
         self.steps: list[list[Note]] = []
 

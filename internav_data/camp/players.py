@@ -29,8 +29,14 @@ ACTIONS: Final = (
 )  # fmt: skip
 _CHECKPOINT: Final = "internav_data.camp.checkpoint"
 
-Note = tuple[str, tuple[str, ...], tuple[float, ...]]
-"""A title, names, and a share for each."""
+Note = tuple[str, tuple[str, ...], tuple[float, ...], int]
+"""A title, names, a share for each, and which of them was taken (-1: none)."""
+_NOTED: Final = {
+    "plan": ("option", "option"),
+    "intent": ("intent", ""),
+    "action_probs": ("action", "choice"),
+}
+"""What agents record that can be shown: its title, and where they record what was taken."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +60,8 @@ class AgentPlayer:
         That it was trained with.
     greedy
         The most probable option and action, rather than drawn ones.
+    ids
+        It wants instance masks too: privileged input (`nie`).
     """
 
     def __init__(
@@ -63,8 +71,9 @@ class AgentPlayer:
         image_size: int,
         *,
         greedy: bool,
+        ids: bool = False,
     ) -> None:
-        self.name, self.image_size = name, image_size
+        self.name, self.image_size, self.ids = name, image_size, ids
         self._agent, self._greedy = agent, greedy
         self._seed = 0
         self._state: dict[str, Any] = {}
@@ -107,15 +116,15 @@ class AgentPlayer:
     def notes(self, seat: int) -> list[Note]:
         """Return what led to a seat's last action: chances of options, intent, of actions."""
         told: list[Note] = []
-        titles = {"option_probs": "option", "intent": "intent", "action_probs": "action"}
-        for name, title in titles.items():
+        for name, (title, taken) in _NOTED.items():
             noted = self._record.get(name)
             if noted is None:
                 continue
             shares = tuple(float(share) for share in noted[seat].reshape(-1).tolist())
             names = {len(OPTIONS): OPTIONS, len(ACTIONS): ACTIONS}.get(len(shares))
+            chosen = self._record.get(taken)
             if names is not None:
-                told.append((title, names, shares))
+                told.append((title, names, shares, -1 if chosen is None else int(chosen[seat])))
         return told
 
 
@@ -146,15 +155,14 @@ def candidate(
             f"some of {', '.join(ORACLES)} with commas between them"
         )
     agent = _loaded(Path(who))
-    if without_intent:
-        cut = getattr(agent, "without_intent", None)
-        if cut is None:
-            raise UsageError(f"{who}: its agent has no intent to leave out (--without-intent)")
-        agent = cut()
     about = replace(_facts(agent, about), greedy=greedy, without_intent=without_intent)
     about = replace(about, name=row_name(about))
-    size = agent_config(agent, "network", "image_size", 64)
-    return Candidate(AgentPlayer(about.name, agent, size, greedy=greedy), about)
+    size, ids = agent_config(agent, "network", "image_size", 64), about.method == "nie"
+    if without_intent:
+        from internav_data.camp.agents import without_intent as cut  # noqa: PLC0415 - torch
+
+        agent = cut(agent)
+    return Candidate(AgentPlayer(about.name, agent, size, greedy=greedy, ids=ids), about)
 
 
 def oracles_beside(dataset: Dataset[Episode]) -> list[str]:
@@ -185,7 +193,7 @@ def _loaded(run: Path) -> Any:  # noqa: ANN401 - an Agent, with what its checkpo
     try:
         module = import_module(_CHECKPOINT)
     except ModuleNotFoundError as error:
-        if error.name not in {_CHECKPOINT, "internav_data.camp.agents"}:
+        if error.name != _CHECKPOINT:
             raise
         raise UsageError(
             f"{run}: this version cannot read trained runs; evaluate {', '.join(ORACLES)}"
