@@ -102,8 +102,8 @@ def draw_trajectory(
     paint_start(canvas, episode)
     paint_goal(canvas, episode)
     _paint_way(canvas, story)
-    _paint_interactions(canvas, story)
     _paint_end(canvas, story)
+    _paint_interactions(canvas, story)
     for number, (obstacle, parts) in enumerate(zip(episode.obstacles, shapes, strict=True), 1):
         paint_number(canvas, number, COLOURS[obstacle_kind(obstacle)], parts)
     return with_caption(canvas.finished(), list(lines), _legend(episode))

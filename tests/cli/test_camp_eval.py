@@ -1,0 +1,174 @@
+"""`camp-eval` from the outside: exit codes, one line for what goes wrong, nothing overwritten."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from internav_cli.camp_eval import main
+
+EVAL = Path(sys.executable).with_name("camp-eval")
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    """Three scenes of one room: val, test and train."""
+    from internav_data.generation import generate, load_config
+
+    out = tmp_path_factory.mktemp("camp-eval") / "data"
+    generate(out, load_config(overrides=["episodes_per_scene=4", "house.rooms=1"]), 3, workers=1)
+    return out
+
+
+@pytest.fixture
+def call(capsys, monkeypatch, tmp_path):
+    """Run it in an empty folder; returns code, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words):
+        with pytest.raises(SystemExit) as ended:
+            main([str(word) for word in words])
+        told = capsys.readouterr()
+        assert "Traceback" not in told.err
+        return ended.value.code, told.out, told.err
+
+    return run
+
+
+def test_oracles_are_measured_and_compared(call, dataset, tmp_path):
+    code, out, err = call("expert,planner,random", dataset, "--split", "val", "--out", "a")
+    assert code == 0, err
+    assert "| expert | 100.0 |" in out
+    assert "No episode is N >= 4 rooms: n = 0." in out
+    names = ["expert", "planner", "random", "report.html", "tables.json", "tables.md"]
+    assert sorted(p.name for p in (tmp_path / "a").iterdir()) == names
+    assert (tmp_path / "a" / "tables.md").read_text().strip() == out.strip()
+    code, out, err = call("compare", "a", "--json")
+    assert code == 0, err
+    rows = json.loads(out)["tables"][0]["rows"]
+    assert [row["name"] for row in rows if row["source"] == "oracle"] == names[:3]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a"], "compare writes where told alone"
+    code, out, err = call("compare", "a", "--dataset", dataset, "--out", "b")
+    assert code == 0, err
+    assert "<figure" in (tmp_path / "b" / "report.html").read_text()
+
+
+def test_nothing_is_overwritten_unless_told(call, dataset, tmp_path):
+    words = ("random", dataset, "--split", "val", "--max-steps", 5)
+    assert call(*words)[0] == 0
+    before = (tmp_path / "evaluation-val" / "tables.json").read_bytes()
+    code, out, err = call(*words, "--seed", 3)
+    assert (code, out) == (2, "")
+    assert "--force" in err
+    assert (tmp_path / "evaluation-val" / "tables.json").read_bytes() == before
+    assert call("planner", dataset, "--split", "val", "--force")[0] == 0
+    kept = [p.parent.name for p in (tmp_path / "evaluation-val").glob("*/evaluation.json")]
+    assert kept == ["planner"], "what was there before is no part of what is there now"
+
+
+def test_the_same_call_gives_the_same_files(call, dataset, tmp_path):
+    for out, batch in (("a", 1), ("b", 7)):
+        words = ("random,planner", dataset, "--split", "val", "--out", out, "--batch", batch)
+        assert call(*words)[0] == 0
+    files = sorted(p.relative_to(tmp_path / "a") for p in (tmp_path / "a").rglob("*.*"))
+    assert len(files) == 7
+    for file in files:
+        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes(), file
+
+
+def test_episodes_can_be_chosen(call, dataset, tmp_path):
+    def count(*words):
+        code, out, err = call("planner", dataset, "--split", "val", "--json", "--force", *words)
+        assert code == 0, err
+        return json.loads(out)["tables"][0]["episodes"]
+
+    assert count()["all"] == 4
+    assert count("--limit", 3)["all"] == 3
+    assert count("--episodes-per-scene", 2) == {
+        "all": 2, "N >= 4 rooms": 0, "non-interactive": 1, "blocked": 1,
+    }  # fmt: skip
+    assert count("--where", "mode=blocked", "--where", "room_count<=3")["non-interactive"] == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (("best", "DATA"), 2, ["best", "expert, planner, random"]),
+        (("random,best", "DATA"), 2, ["random,best"]),
+        (("random", "nowhere"), 5, ["nowhere"]),
+        (("random", "DATA", "--split", "dev"), 2, ["--split"]),
+        (("random", "DATA", "--where", "room_count>7"), 2, ["room_count", "stats"]),
+        (("random", "DATA", "--where", "rooms=1"), 2, ["rooms"]),
+        (("random", "DATA", "--where", "rooms"), 2, ["COLUMN=VALUE"]),
+        (("random", "DATA", "--limit", "0"), 2, ["1 or more"]),
+        (("random", "DATA", "--batch", "0"), 2, ["batch"]),
+        (("random", "DATA", "--max-steps", "-1"), 2, ["max_steps"]),
+        (("random", "DATA", "--seed", "-1"), 2, ["seed"]),
+        (("random", "DATA", "--unknown"), 2, ["--unknown"]),
+        (("random",), 2, ["DATASET"]),
+        (("compare",), 2, ["RUNS"]),
+        (("compare", "nowhere"), 2, ["nowhere", "camp-eval RUN DATASET"]),
+        (("DATA", "DATA"), None, ["data"]),
+    ],
+)
+def test_what_cannot_be_meant_is_one_line(call, dataset, tmp_path, words, code, said):
+    got, out, err = call(*[dataset if word == "DATA" else word for word in words])
+    assert got == code or (code is None and got in {2, 5})
+    assert out == ""
+    (line,) = err.strip().splitlines()
+    assert line.startswith("camp-eval: ")
+    for word in said:
+        assert word in line
+    assert not list(tmp_path.iterdir()), "nothing is written"
+
+
+def test_evaluations_of_other_episodes_are_not_compared(call, dataset):
+    assert call("random", dataset, "--split", "val", "--out", "a")[0] == 0
+    assert call("planner", dataset, "--split", "test", "--out", "b")[0] == 0
+    code, out, err = call("compare", "a", "b")
+    assert (code, out) == (2, "")
+    assert "dataset" in err or "split" in err
+    code, _, err = call("compare", "a", "--dataset", dataset.parent / "none")
+    assert code == 5
+
+
+def test_damaged_evaluations_exit_with_5(call, dataset, tmp_path):
+    assert call("random", dataset, "--split", "val", "--out", "a")[0] == 0
+    path = tmp_path / "a" / "random" / "episodes.parquet"
+    path.write_bytes(path.read_bytes()[:100])
+    code, out, err = call("compare", "a")
+    assert (code, out) == (5, "")
+    assert len(err.strip().splitlines()) == 1
+
+
+def test_a_dataset_without_experts_says_so(call, tmp_path_factory, dataset):
+    from dataclasses import replace
+
+    from internav_data.dataset import Identity, assemble, load_dataset, open_work, write_scene_work
+
+    whole = load_dataset(dataset)
+    out = tmp_path_factory.mktemp("bare") / "data"
+    identity = Identity("test", "1", 0, 4, "0", {})
+    for scene in range(3):
+        scene_id = f"scene-{scene:06d}"
+        episodes = [replace(e, expert=None) for e in whole if e.scene_id == scene_id]
+        write_scene_work(open_work(out, identity), scene, whole.scene(scene_id), episodes)
+    assemble(out, identity, tuple(whole.assets.values()), 3)
+    code, text, err = call("expert", out, "--split", "val")
+    assert (code, text) == (2, "")
+    (line,) = err.strip().splitlines()
+    assert "no episode has an expert" in line
+    assert call("planner", out, "--split", "val")[0] == 0
+
+
+def test_help_is_fast_and_has_examples():
+    for words in ((), ("evaluate",), ("compare",)):
+        done = subprocess.run(
+            [EVAL, *words, "--help"], capture_output=True, text=True, check=False, timeout=60
+        )
+        assert done.returncode == 0
+        assert "Examples:" in done.stdout
+    heavy = "import sys, internav_cli.camp_eval as c; c.cli.commands; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", heavy], capture_output=True, text=True, check=True)
+    assert not {"numpy", "torch", "numba", "cv2", "pyarrow"} & set(done.stdout.split())
