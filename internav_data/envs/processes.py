@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from internav_data.records import Episode
 
 
-def _arrays(memory: dict[str, Any], count: int, size: int) -> Observations:
+def _arrays(memory: dict[str, Any], count: int, size: int, *, ids: bool) -> Observations:
     """See shared memory as the buffers of a batch."""
     return {
         name: np.frombuffer(memory[name], dtype).reshape(shape)
-        for name, (shape, dtype) in layout(count, size).items()
+        for name, (shape, dtype) in layout(count, size, ids=ids).items()
     }
 
 
@@ -44,7 +44,7 @@ def _serve(
 ) -> None:
     """Do what the pipe says until it says no more: one of the processes."""
     try:
-        whole = _arrays(memory, count, arguments["image_size"])
+        whole = _arrays(memory, count, arguments["image_size"], ids=arguments["ids"])
         own = {name: array[rows[0] : rows[1]] for name, array in whole.items()}
         env = InterNavVectorEnv(rows[1] - rows[0], copy=False, buffers=own, **arguments)
         pipe.send((True, None))
@@ -91,7 +91,7 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
 
     Parameters
     ----------
-    num_envs, dataset, image_size, autoreset, copy, **arguments
+    num_envs, dataset, image_size, autoreset, copy, ids, **arguments
         As `InterNavVectorEnv` has them; a loaded dataset is opened again in each process.
     workers
         Processes; at most one for each environment.
@@ -109,20 +109,22 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
         *,
         autoreset: bool = True,
         copy: bool = True,
+        ids: bool = False,
         context: str = "spawn",
         **arguments: Any,  # noqa: ANN401 - Arguments, checked where they are used
     ) -> None:
         if not 1 <= workers <= num_envs:
             raise UsageError(f"workers: expected 1 … {num_envs} (num_envs), got {workers}")
-        set_spaces(self, num_envs, image_size, autoreset=autoreset)
+        set_spaces(self, num_envs, image_size, autoreset=autoreset, ids=ids)
         self._copy = copy
         start = multiprocessing.get_context(context)
         memory = {
             name: start.RawArray("B", math.prod(shape) * np.dtype(dtype).itemsize)
-            for name, (shape, dtype) in layout(num_envs, image_size).items()
+            for name, (shape, dtype) in layout(num_envs, image_size, ids=ids).items()
         }
-        self._buffers = _arrays(memory, num_envs, image_size)
+        self._buffers = _arrays(memory, num_envs, image_size, ids=ids)
         given = dict(arguments, dataset=dataset, image_size=image_size, autoreset=autoreset)
+        given["ids"] = ids
         bounds = [num_envs * k // workers for k in range(workers + 1)]
         self._rows = list(itertools.pairwise(bounds))
         self._counts = [high - low for low, high in self._rows]

@@ -39,6 +39,8 @@ class InterNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
         Pixels a side of `rgb` and `depth`.
     render_mode
         None or "rgb_array".
+    ids
+        Observe which instance each pixel shows, too: privileged input.
     **arguments
         See `Arguments`.
 
@@ -57,15 +59,17 @@ class InterNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
         dataset: str | Path | Dataset[Episode],
         image_size: int = 64,
         render_mode: str | None = None,
+        *,
+        ids: bool = False,
         **arguments: Unpack[Arguments],
     ) -> None:
         if render_mode not in {None, "rgb_array"}:
             raise UsageError(f"render_mode: expected None or 'rgb_array', got {render_mode!r}")
         self.render_mode = render_mode
-        self.observation_space = observation_space(image_size)
+        self.observation_space = observation_space(image_size, ids=ids)
         self.action_space = gymnasium.spaces.Discrete(ACTION_COUNT)
         (self._player,) = Player.several(1, dataset, arguments)
-        self._board = Board.of(Camera(image_size), 1)
+        self._board = Board.of(Camera(image_size), 1, ids=ids)
         self._large: Camera | None = None
 
     def reset(

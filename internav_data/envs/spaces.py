@@ -21,12 +21,18 @@ FAR_M: Final = 1000.0
 """Bound of distances and depths; no house is larger (the camera says 100 where nothing is)."""
 
 
-def observation_space(size: int) -> spaces.Dict:
-    """Return the space of one environment's observations."""
+IDS: Final = (-5, 2**31 - 1)
+"""Least and most of instance ids: see `internav_data.world.camera`."""
+
+
+def observation_space(size: int, *, ids: bool = False) -> spaces.Dict:
+    """Return the space of one environment's observations, with instance ids where asked for."""
     if size < 1:
         raise UsageError(f"image_size: expected at least 1 pixel a side, got {size}")
+    more = {"ids": spaces.Box(*IDS, (size, size), np.int32)} if ids else {}
     return spaces.Dict(
         {
+            **more,
             "rgb": spaces.Box(0, 255, (size, size, 3), np.uint8),
             "depth": spaces.Box(0.0, FAR_M, (size, size, 1), np.float32),
             "goal": spaces.Box(
@@ -38,9 +44,11 @@ def observation_space(size: int) -> spaces.Dict:
     )
 
 
-def layout(count: int, size: int) -> dict[str, tuple[tuple[int, ...], Any]]:
+def layout(count: int, size: int, *, ids: bool = False) -> dict[str, tuple[tuple[int, ...], Any]]:
     """Return shape and dtype of each buffer of a batch."""
+    more = {"ids": ((count, size, size), np.int32)} if ids else {}
     return {
+        **more,
         "rgb": ((count, size, size, 3), np.uint8),
         "depth": ((count, size, size, 1), np.float32),
         "goal": ((count, 2), np.float32),
@@ -65,12 +73,13 @@ class Board:
         self._camera = camera
         count, size = len(buffers["rgb"]), camera.size
         depth = buffers["depth"].reshape(count, size, size)
-        self._frames = Frames(buffers["rgb"], depth, np.zeros((count, size, size), np.int32))
+        ids = buffers.get("ids", np.zeros((count, size, size), np.int32))
+        self._frames = Frames(buffers["rgb"], depth, ids)
 
     @staticmethod
-    def of(camera: Camera, count: int) -> Board:
+    def of(camera: Camera, count: int, *, ids: bool = False) -> Board:
         """Make a board in ordinary memory."""
-        sizes = layout(count, camera.size)
+        sizes = layout(count, camera.size, ids=ids)
         return Board(camera, {name: np.zeros(*described) for name, described in sizes.items()})
 
     def write(self, row: int, play: Play) -> None:
@@ -93,7 +102,9 @@ class Board:
     def one(self) -> dict[str, Any]:
         """Return the first row as one environment's observation."""
         buffers = self.buffers
+        more = {"ids": buffers["ids"][0].copy()} if "ids" in buffers else {}
         return {
+            **more,
             "rgb": buffers["rgb"][0].copy(),
             "depth": buffers["depth"][0].copy(),
             "goal": buffers["goal"][0].copy(),

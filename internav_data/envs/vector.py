@@ -44,12 +44,14 @@ def make_vector(
     return InterNavVectorEnv(num_envs, dataset, **arguments)
 
 
-def set_spaces(env: VectorEnv[Any, Any, Any], count: int, size: int, *, autoreset: bool) -> None:
+def set_spaces(
+    env: VectorEnv[Any, Any, Any], count: int, size: int, *, autoreset: bool, ids: bool = False
+) -> None:
     """Give a vector environment its spaces and say how it resets."""
     from gymnasium import spaces  # noqa: PLC0415 - a short name in a short place
 
     env.num_envs = count
-    env.single_observation_space = observation_space(size)
+    env.single_observation_space = observation_space(size, ids=ids)
     env.single_action_space = spaces.Discrete(ACTION_COUNT)
     env.observation_space = batch_space(env.single_observation_space, count)
     env.action_space = batch_space(env.single_action_space, count)
@@ -78,7 +80,7 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
     ----------
     num_envs
         How many.
-    dataset, image_size, **arguments
+    dataset, image_size, ids, **arguments
         As `InterNavEnv` has them.
     autoreset
         False: whoever is done is to be reset by `reset(options={"reset_mask": …})`.
@@ -96,13 +98,17 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         *,
         autoreset: bool = True,
         copy: bool = True,
+        ids: bool = False,
         buffers: Observations | None = None,
         **arguments: Unpack[Arguments],
     ) -> None:
         self.players = Player.several(num_envs, dataset, arguments)
-        set_spaces(self, num_envs, image_size, autoreset=autoreset)
+        set_spaces(self, num_envs, image_size, autoreset=autoreset, ids=ids)
         camera = Camera(image_size)
-        self._board = Board.of(camera, num_envs) if buffers is None else Board(camera, buffers)
+        if buffers is None:
+            self._board = Board.of(camera, num_envs, ids=ids)
+        else:
+            self._board = Board(camera, buffers)
         self._autoreset, self._copy = autoreset, copy
         self._over = np.zeros(num_envs, np.bool_)
 

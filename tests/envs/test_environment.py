@@ -270,6 +270,25 @@ def test_many_are_the_same_as_each_alone(small):
     assert ended > 3, "episodes ended and began again"
 
 
+def test_instance_ids_are_seen_by_who_asks_for_them(small):
+    plain, told = many(small, 2), many(small, 2, ids=True)
+    (seen, _), (more, _) = plain.reset(seed=3), told.reset(seed=3)
+    assert "ids" not in seen
+    assert told.single_observation_space.contains({name: v[0] for name, v in more.items()})
+    ids = more.pop("ids")
+    same(seen, more)
+    assert ids.shape == (2, 16, 16)
+    assert {-1, -3} <= set(ids.ravel().tolist()), "floor and walls"
+    assert ids.max() > 0, "and things"
+    alone = make(small, ids=True, image_size=16)
+    same(alone.reset(seed=3)[0]["ids"], ids[0])
+    processes = many(small, 2, ids=True, workers=2)
+    try:
+        same(processes.reset(seed=3)[0]["ids"], ids)
+    finally:
+        processes.close()
+
+
 def test_processes_are_the_same_as_one(small):
     options = {"episode_id": [None, load_dataset(small)[2].episode_id, None]}
     one, two = many(small, 3), many(small, 3, workers=2)

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from internav_data.camp.agents.intent import Deciding, IntentPolicy, plane
+from internav_data.camp.agents.options import DONE
 from internav_data.camp.agents.protocol import Agent, Batch, Evaluated, Step, begun, one_step
 from internav_data.camp.networks import Encoder, Policy, drawn, entropy_of
 from internav_data.records.errors import UsageError
@@ -66,12 +67,14 @@ class PPOAgent(Agent):
         out, state, record = self.run(*one_step(seen), state, {})
         log_probs = torch.log_softmax(self.policy.actor(out[0]), -1)
         choice = drawn(log_probs, None if uniforms is None else uniforms[:, 1])
+        probs = log_probs.exp()
         record = {name: noted[0] for name, noted in record.items()}
+        record |= {"choice": choice, "action_probs": probs, "end_chance": probs[:, DONE]}
         return Step(
             choice,
             log_probs.gather(-1, choice.unsqueeze(-1)).squeeze(-1),
             self.policy.value(out[0]),
-            {**record, "choice": choice, "action_probs": log_probs.exp()},
+            record,
             state,
         )
 

@@ -72,9 +72,11 @@ class NIEAgent(PPOAgent):
 
     def evaluate(self, batch: Batch) -> Evaluated:
         """See `Agent`; the loss is that of the keypoints foreseen."""
-        sighted = {name: batch.record[name] for name in ("objects", "corners")}
-        said = super().evaluate(batch)
-        objects, corners = sighted["objects"], sighted["corners"]
+        record = batch.record
+        if "objects" not in record:
+            record = {**record, **self.sighted(batch.observations)}
+        said = super().evaluate(replace(batch, record=record))
+        objects, corners = record["objects"], record["corners"]
         index = batch.record["choice"][..., None, None, None, None]
         ahead = self.foreseen(self.object(corners.flatten(-2)), corners)
         ahead = ahead.take_along_dim(index, -3).squeeze(-3)

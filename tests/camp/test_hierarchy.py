@@ -1,0 +1,326 @@
+"""CaMP's model, point by point of CAMP.md's list."""
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from internav_data.camp.agents import Auxiliary, make_agent, without_intent  # noqa: E402
+from internav_data.camp.agents.options import (  # noqa: E402
+    ACTIONS_OF,
+    DONE,
+    NAVIGATE,
+    PICK,
+    PUSH,
+    STOP,
+    WAIT,
+)
+from internav_data.camp.collect import Collector, uniforms_of  # noqa: E402
+from internav_data.records.errors import UsageError  # noqa: E402
+
+ALLOWED = torch.zeros(4, 12, dtype=torch.bool)
+for _option, _actions in enumerate((*ACTIONS_OF, (DONE,))):
+    ALLOWED[_option, list(_actions)] = True
+VARIANTS = ["integrated", "policy", "recursive", "none"]
+
+
+def ran_of(agent, batch):
+    record = {name: batch.record[name] for name in ("open", "used")}
+    return agent.run(batch.observations, batch.course, batch.state, record)
+
+
+def insist(agent, option, choice=None):
+    """Let global always open an option, and its policy always take one of its actions."""
+    with torch.no_grad():
+        for layer, wanted in ((agent.plan.actor, option), (agent.policies[option].actor, choice)):
+            if wanted is not None:
+                layer.weight.zero_()
+                layer.bias.fill_(-40.0)
+                layer.bias[wanted] = 40.0
+    return agent
+
+
+@pytest.mark.parametrize("intent", VARIANTS)
+@pytest.mark.parametrize("method", ["camp", "hrl"])
+def test_mixtures_sum_to_one_and_masked_actions_have_no_chance(collected, method, intent):
+    agent, _, (_, rollout) = collected(method, changes={"agent": {"intent": intent}})
+    ran = ran_of(agent, rollout.batch)
+    torch.testing.assert_close(ran.intent.sum(-1), torch.ones(8, 4))
+    chances = ran.acts.exp()
+    torch.testing.assert_close(chances.sum(-1), torch.ones(8, 4, 4))
+    assert (chances[..., ~ALLOWED] == 0).all()
+    assert method == "hrl" or (chances[..., ALLOWED] > 0).all()
+    record = rollout.batch.record
+    assert ALLOWED[record["option"], record["choice"]].all()
+
+
+def test_the_mixture_is_equation_7_by_hand(collected):
+    """Navigate's and Pick's rotations add; all four Dones are one entry."""
+    agent, _, (_, rollout) = collected("camp", changes={"agent": {"interact_chance": 0.3}})
+    batch = rollout.batch
+    record = batch.record
+    ran = ran_of(agent, batch)
+    meant, acts = record["meant"].double().numpy(), ran.acts.exp().detach().double().numpy()
+    right = np.zeros((8, 4, 12))
+    for t in range(8):
+        for k in range(4):
+            for option, actions in enumerate((*ACTIONS_OF, (DONE,))):
+                for action in actions:
+                    right[t, k, action] += meant[t, k, option] * acts[t, k, option, action]
+    assert record["intent"].numpy() == pytest.approx(right, abs=1e-5)
+    assert (meant[..., PICK] * acts[..., PICK, 1]).max() > 1e-3
+
+
+@pytest.mark.parametrize("method", ["camp", "ppo-intent"])
+def test_the_intent_policy_is_a_copy_made_at_synchronisation_only(collected, method):
+    agent, _, (rollout, _) = collected(method)
+    deciding = agent.plan if method == "camp" else agent.policy
+
+    def pairs():
+        for part in ("embed", "gru", "actor"):
+            mine = dict(getattr(agent.intent, part).named_parameters())
+            theirs = dict(getattr(deciding, part).named_parameters())
+            assert mine.keys() == theirs.keys()
+            yield from ((mine[name], theirs[name]) for name in sorted(mine))
+
+    def as_bytes(parameters):
+        return [parameter.detach().numpy().tobytes() for parameter in parameters]
+
+    agent.synchronise()
+    copied = as_bytes(mine for mine, _ in pairs())
+    assert copied == as_bytes(theirs for _, theirs in pairs())
+    optimiser = torch.optim.Adam(agent.optimised(), 0.01)
+    agent.evaluate(rollout.batch).log_prob.sum().backward()
+    optimiser.step()
+    assert as_bytes(mine for mine, _ in pairs()) == copied
+    now = as_bytes(theirs for _, theirs in pairs())
+    assert all(one != other for one, other in zip(now, copied, strict=True))
+    agent.synchronise()
+    assert as_bytes(mine for mine, _ in pairs()) == now
+
+
+def test_who_is_optimised():
+    from internav_data.camp.config import preset
+
+    agent = make_agent("camp", preset("small"))
+    mine = {id(parameter) for parameter in agent.optimised()}
+    named = {name for name, parameter in agent.named_parameters() if id(parameter) in mine}
+    left = {name for name, _ in agent.named_parameters()} - named
+    assert {name.split(".")[0] for name in named} == {
+        "encoders", "plan", "navigate", "push", "pick"
+    }  # fmt: skip
+    critics = {f"{p}.critic.{w}" for p in ("navigate", "push", "pick") for w in ("weight", "bias")}
+    assert {name for name in left if not name.startswith("intent.")} == critics
+
+
+def test_no_gradient_flows_from_intents_to_action_policies(collected):
+    """Through what global decides nothing is learnt by those whose intents it was told."""
+    agent, _, (rollout, _) = collected("camp")
+    for again in (False, True):
+        if again:
+            del rollout.batch.record["intent"]
+        agent.zero_grad()
+        agent.evaluate(rollout.batch).value.sum().backward()
+        for policy in agent.policies:
+            for parameter in (*policy.gru.parameters(), *policy.actor.parameters()):
+                assert parameter.grad is None or not parameter.grad.any()
+        assert agent.plan.embed.weight.grad.any()
+
+
+@pytest.mark.parametrize("method", ["camp", "hrl"])
+def test_who_does_not_execute_gets_no_gradient(collected, method):
+    """Other advantages for Push's actions change no gradient of Navigate's or Pick's actor."""
+    agent, _, (_, rollout) = collected(method, changes={"agent": {"interact_chance": 0.3}})
+    option = rollout.batch.record["option"]
+    assert set(option.unique().tolist()) >= {NAVIGATE, PUSH, PICK}
+
+    def gradients(weights):
+        agent.zero_grad()
+        (agent.evaluate(rollout.batch).log_prob * weights).sum().backward()
+        return [policy.actor.weight.grad.clone() for policy in agent.policies]
+
+    torch.manual_seed(1)
+    weights = torch.randn(8, 4)
+    before = gradients(weights)
+    for changed in (NAVIGATE, PUSH, PICK):
+        after = gradients(torch.where(option == changed, weights * 5, weights))
+        for policy in (NAVIGATE, PUSH, PICK):
+            assert torch.equal(before[policy], after[policy]) == (policy != changed)
+
+
+def acted(agent, count=1, steps=14, starts_at=()):
+    """Act on noise; return (option, choice, action, decide, open before, used before) a step."""
+    torch.manual_seed(3)
+    state, rows = agent.initial_state(count), []
+    for t in range(steps):
+        seen = {
+            "rgb": torch.randint(0, 256, (count, 16, 16, 3), dtype=torch.uint8),
+            "depth": torch.rand(count, 16, 16, 1),
+            "goal": torch.rand(count, 2),
+            "held": torch.zeros(count, dtype=torch.int64),
+            "horizon": torch.ones(count, dtype=torch.int64),
+        }
+        starts = torch.full((count,), t == 0 or t in starts_at)
+        step = agent.act(seen, state, starts, torch.rand(count, 2))
+        state, record = step.state, step.record
+        names = ("option", "choice", "decide", "open", "used", "forced")
+        rows.append({name: record[name][0].item() for name in names})
+        rows[-1]["action"] = step.action[0].item()
+    return rows
+
+
+@pytest.mark.parametrize("option", [PUSH, PICK])
+def test_an_interaction_that_never_hands_back_has_eleven_actions_then_global_decides(
+    config, option
+):
+    rows = acted(insist(make_agent("camp", config()), option, 1), steps=25)
+    assert [row["decide"] for row in rows] == [t % 11 == 0 for t in range(25)]
+    assert [row["used"] for row in rows] == [t % 11 for t in range(25)]
+    assert [row["forced"] for row in rows] == [t % 11 == 10 for t in range(25)]
+    assert [row["action"] for row in rows] == [ACTIONS_OF[option][1]] * 25  # none is replaced
+
+
+@pytest.mark.parametrize("option", [PUSH, PICK])
+def test_a_hand_back_is_one_step_of_waiting_and_ends_nothing(config, option, fake):
+    agent = insist(make_agent("camp", config()), option, len(ACTIONS_OF[option]) - 1)
+    rows = acted(agent, steps=5)
+    assert all(row["action"] == WAIT and row["choice"] == DONE for row in rows)
+    assert all(row["decide"] and not row["forced"] for row in rows)
+    env = fake(length=50)
+    collector = Collector(env, agent)
+    collector.begin(env.reset()[0])
+    rollout = collector.collect(uniforms_of(0, 0, range(4), 6))
+    assert not rollout.terminated.any()
+    assert (np.stack(env.actions) == WAIT).all()
+
+
+def test_navigate_takes_one_step_and_done_ends(config):
+    rows = acted(insist(make_agent("camp", config()), NAVIGATE, 0), steps=4)
+    assert all(row["decide"] and row["action"] == 0 for row in rows)
+    by_navigate = acted(insist(make_agent("camp", config()), NAVIGATE, 5), steps=1)[0]
+    assert by_navigate["action"] == DONE
+    agent = make_agent("camp", config())
+    with torch.no_grad():
+        agent.plan.actor.bias[STOP] = 60.0
+    by_global = acted(agent, steps=1)[0]
+    assert (by_global["option"], by_global["action"]) == (STOP, DONE)
+
+
+def test_a_time_out_in_an_interaction_clears_the_option(config):
+    rows = acted(insist(make_agent("camp", config()), PUSH, 1), steps=9, starts_at=(4,))
+    assert [row["used"] for row in rows] == [0, 1, 2, 3, 0, 1, 2, 3, 4]
+    assert [row["open"] for row in rows] == [0, PUSH, PUSH, PUSH, 0, PUSH, PUSH, PUSH, PUSH]
+    assert rows[4]["decide"]
+
+
+def test_with_push_and_pick_forbidden_it_is_navigate(config, fake):
+    """The same actions as Navigate alone, by the same numbers."""
+    camp = make_agent("camp", config(agent={"forbidden": ["push", "pick"]}))
+    with torch.no_grad():
+        camp.plan.actor.bias[STOP] = -60.0
+    actions = []
+    for agent in (camp, Auxiliary(camp, [NAVIGATE] * 4)):
+        env = fake()
+        collector = Collector(env, agent)
+        collector.begin(env.reset()[0])
+        for rollout in range(3):
+            collector.collect(uniforms_of(5, rollout, range(4), 20))
+        actions.append(np.stack(env.actions))
+    assert (actions[0] == actions[1]).all()
+    assert len(np.unique(actions[0])) > 4
+
+
+def test_forbidden_options_are_never_opened_nor_meant(collected):
+    _, _, lived = collected("camp", changes={"agent": {"forbidden": ["push"]}}, rollouts=3)
+    for rollout in lived:
+        assert (rollout.batch.record["option"] != PUSH).all()
+        assert (rollout.batch.record["plan"][..., PUSH] == 0).all()
+        assert (rollout.batch.record["meant"][..., PUSH] == 0).all()
+
+
+def test_hrl_decides_at_every_step_and_its_interactions_never_hand_back(collected):
+    agent, _, lived = collected("hrl", rollouts=4, changes={"agent": {"interact_chance": 0.3}})
+    assert not hasattr(agent, "intent")
+    options = torch.cat([rollout.batch.record["option"] for rollout in lived])
+    assert {PUSH, PICK} <= set(options.unique().tolist())
+    for rollout in lived:
+        record = rollout.batch.record
+        assert record["decide"].all()
+        assert not record["open"].any()
+        assert not record["used"].any()
+        acting = (record["option"] == PUSH) | (record["option"] == PICK)
+        assert (record["choice"][acting] != DONE).all()
+
+
+@pytest.mark.parametrize("method", ["ppo", "ppo-intent", "nie", "hrl", "camp"])
+@pytest.mark.parametrize("chance", [0.01, 0.05])
+def test_every_learner_ends_an_episode_with_the_same_chance(fake, config, method, chance):
+    env = fake()
+    agent = make_agent(method, config(agent={"end_chance": chance, "interact_chance": 0.045}))
+    collector = Collector(env, agent)
+    collector.begin(env.reset()[0])
+    record = collector.collect(uniforms_of(0, 0, range(4), 1)).batch.record
+    assert record["end_chance"].numpy() == pytest.approx(chance, rel=0.03)
+    if method in {"hrl", "camp"} and chance == 0.01:
+        plan = record["plan"][0, 0].tolist()
+        assert plan[:3] == pytest.approx([0.9, 0.045, 0.045], rel=0.03)
+
+
+@pytest.mark.parametrize("method", ["camp", "ppo-intent"])
+def test_without_intent_the_trained_model_is_fed_the_plane(collected, method):
+    agent, _, (rollout, _) = collected(method)
+    plain = without_intent(agent)
+    assert agent.told
+    assert {id(p) for p in plain.parameters()} == {id(p) for p in agent.parameters()}
+    batch = rollout.batch
+    batch.record["intent"] = torch.full((8, 4, 12), 1.0 / 12)
+    right = agent.evaluate(batch).value
+    torch.testing.assert_close(plain.evaluate(batch).value, right)
+    batch.record["intent"] = torch.eye(12)[torch.zeros(8, 4, dtype=torch.int64)]
+    torch.testing.assert_close(plain.evaluate(batch).value, right)
+    assert not torch.allclose(agent.evaluate(batch).value, right)
+
+
+def test_agents_without_intent_are_not_to_be_evaluated_without(config):
+    for method in ("ppo", "hrl"):
+        with pytest.raises(UsageError, match="no intent"):
+            without_intent(make_agent(method, config()))
+
+
+def test_recursive_intent_is_the_intent_policy_run_on_its_own_first_intent(collected):
+    agent, _, (rollout, _) = collected("camp", changes={"agent": {"intent": "recursive"}})
+    record, batch = rollout.batch.record, rollout.batch
+    at = {name: what[:1] for name, what in batch.observations.items()}
+    inputs = torch.cat([agent.encoders[0](at), torch.zeros(1, 4, 3)], -1)
+    mind, intent = agent.intent, torch.full((1, 4, 12), 1.0 / 12)
+    acts = ran_of(agent, batch).acts[:1].exp()
+    for _ in range(2):
+        out, _ = mind.gru(torch.cat([inputs, mind.embed(intent)], -1))  # from zeros, twice
+        meant = torch.softmax(mind.actor(out), -1)
+        intent = (meant.unsqueeze(-1) * acts).sum(-2)
+    torch.testing.assert_close(intent[0], record["intent"][0], atol=1e-5, rtol=0)
+
+
+def test_unknown_methods_and_unfit_variants_are_refused(config):
+    with pytest.raises(UsageError, match="random, ppo, ppo-intent, nie, hrl, camp"):
+        make_agent("dqn", config())
+    with pytest.raises(UsageError, match="'policy'"):
+        make_agent("ppo-intent", config(agent={"intent": "policy"}))
+
+
+def test_ones_own_agent_joins_by_entry_point(config, monkeypatch):
+    from importlib.metadata import EntryPoint
+
+    from internav_data.camp import agents
+
+    point = EntryPoint("mine", "internav_data.camp.agents.flat:RandomAgent", agents.GROUP)
+    monkeypatch.setattr(agents, "entry_points", lambda **_: [point])
+    assert isinstance(make_agent("mine", config()), agents.Agent)
+    assert agents.agent_names()[-1] == "mine"
+
+
+def test_parameters_are_a_function_of_name_and_config(config):
+    one, two = (make_agent("camp", config()).state_dict() for _ in range(2))
+    assert all(torch.equal(one[name], two[name]) for name in one)
+    other = make_agent("camp", config(seed=1)).state_dict()
+    assert not torch.equal(one["plan.gru.weight_ih_l0"], other["plan.gru.weight_ih_l0"])
