@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 from internav_data.camp.compare import by_method, check_comparable
 from internav_data.camp.logs import shown_first
-from internav_data.camp.tables import as_json, heading, markdown, table_3, table_4, table_5
+from internav_data.camp.metrics import GROUPS, MEASURES
+from internav_data.camp.tables import (
+    as_json,
+    cell,
+    heading,
+    markdown,
+    table_3,
+    table_4,
+    table_5,
+)
 from internav_data.camp.verdict import as_json as differences_json
 from internav_data.camp.verdict import fairness, sentences
 from internav_data.dataset.files import write_atomically
@@ -79,9 +88,22 @@ def data_of(methods: Methods) -> dict[str, Any]:
     return {
         "format": 1,
         "tables": [as_json(table) for table in tables_of(methods)],
+        "figures": {name: _all_figures(found) for name, found in methods.items()},
         "differences": differences_json(methods),
         "sentences": sentences(methods),
     }
+
+
+def _all_figures(found: Sequence[Evaluation]) -> dict[str, Any]:
+    """Return every figure of every group, in no table or in one: value, half interval, seeds."""
+    figures: dict[str, Any] = {}
+    for group in GROUPS:
+        cells = {name: cell(found, group, name) for name in MEASURES}
+        figures[group] = {
+            name: {"value": each.value, "half": each.half, "seeds": each.seeds}
+            for name, each in cells.items()
+        }
+    return figures
 
 
 def write_texts(folder: Path, methods: Methods) -> None:

@@ -172,3 +172,24 @@ def test_help_is_fast_and_has_examples():
     heavy = "import sys, internav_cli.camp_eval as c; c.cli.commands; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", heavy], capture_output=True, text=True, check=True)
     assert not {"numpy", "torch", "numba", "cv2", "pyarrow"} & set(done.stdout.split())
+
+
+def test_commands_in_the_docs_exist_with_their_options(capsys):
+    """`internav-gen`'s are held by tests/test_docs.py."""
+    import re
+
+    from internav_cli.camp_eval import cli
+
+    root = Path(__file__).resolve().parents[2]
+    pages = [root / "README.md", *sorted((root / "docs").glob("*.md"))]
+    lines = [
+        line
+        for page in pages
+        for line in re.findall(r"^camp-eval .*$", page.read_text(), re.MULTILINE)
+    ]
+    assert len(lines) > 4
+    for line in lines:
+        words = line.split("#")[0].split()[1:]
+        command = cli.commands["compare" if words[0] == "compare" else "evaluate"]
+        known = {name for parameter in command.params for name in parameter.opts}
+        assert {word for word in words if word.startswith("--")} <= known, line
