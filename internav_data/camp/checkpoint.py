@@ -1,0 +1,277 @@
+"""Checkpoints: tensors in safetensors, all else in JSON, whole or not there at all.
+
+Nothing is unpickled. A checkpoint is a folder: `weights.safetensors` (of the agent, enough to
+play), `training.safetensors` (moments of the optimiser, hidden states, random numbers) and
+`checkpoint.json`, which knows the sizes and digests of both. A run keeps its last and its best;
+`checkpoints.json` says which these are, and is replaced only when a new one is on the disk.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import shutil
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import safetensors
+import torch
+from safetensors.torch import load_file, save_file
+
+from internav_data.camp.agents import make_agent
+from internav_data.camp.config import from_mapping, plain, preset
+from internav_data.dataset.files import file_sha256, sync, write_atomically
+from internav_data.records.errors import CorruptDataError, InternavError, UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from torch import Tensor
+
+    from internav_data.camp.agents import Agent
+    from internav_data.camp.config import CampConfig
+
+FORMAT: Final = 1
+FOLDER: Final = "checkpoints"
+POINTER: Final = "checkpoints.json"
+ABOUT, WEIGHTS, TRAINING = "checkpoint.json", "weights.safetensors", "training.safetensors"
+_JSON_AT_MOST: Final = 256_000_000
+"""Bytes. The actions so far of 65,536 environments stay below."""
+_TENSORS_AT_MOST: Final = 16_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Checkpoint:
+    """All that a run is between two updates."""
+
+    method: str
+    config: CampConfig
+    weights: Mapping[str, Tensor]
+    """Of the agent, by name."""
+    progress: Mapping[str, Any] = field(default_factory=dict)
+    """Plain JSON: counters, the stage, what each environment is, the log's length."""
+    training: Mapping[str, Tensor] = field(default_factory=dict)
+    """The rest; empty where only the agent was read or kept."""
+
+
+def save(run: Path, checkpoint: Checkpoint, *, best: float | None = None) -> Path:
+    """Write a checkpoint and make it the run's last one; return its folder.
+
+    Parameters
+    ----------
+    run
+        The run's folder.
+    checkpoint
+        What to write.
+    best
+        If given, it is the best one too, and this is how good: a number.
+    """
+    known = _pointer(run)
+    serial = int(known.get("serial", 0)) + 1
+    folder = run / FOLDER / f"{serial:06d}"
+    shutil.rmtree(folder, ignore_errors=True)  # put in place just before a run was killed
+    _write_folder(folder, checkpoint)
+    said = {**known, "format": FORMAT, "serial": serial, "last": folder.name}
+    if best is not None:
+        said |= {"best": folder.name, "best_score": best}
+    write_atomically(run / POINTER, (json.dumps(said, indent=1) + "\n").encode())
+    for other in (run / FOLDER).iterdir():
+        if other.name not in {said["last"], said.get("best")}:
+            shutil.rmtree(other, ignore_errors=True)
+    return folder
+
+
+def best_score(run: Path) -> float | None:
+    """Return how good the best checkpoint of a run is."""
+    score = _pointer(run).get("best_score")
+    return float(score) if isinstance(score, int | float) else None
+
+
+def has_checkpoint(run: Path) -> bool:
+    """Whether a run, or this very folder, has one."""
+    return (run / POINTER).is_file() or (run / ABOUT).is_file()
+
+
+def find(path: Path, which: str = "last") -> Path:
+    """Return the folder of a run's checkpoint, `last` or `best`; a checkpoint is its own.
+
+    Raises
+    ------
+    UsageError
+        There is none.
+    CorruptDataError
+        The run's list of them is damaged.
+    """
+    if (path / ABOUT).is_file():
+        return path
+    name = _pointer(path).get(which)
+    if name is None:
+        raise UsageError(
+            f"{path}: no {which} checkpoint here; expected the folder of a run of `camp-train` "
+            f"(with {POINTER}) or of a checkpoint (with {ABOUT})"
+        )
+    if not isinstance(name, str) or name != Path(name).name or name.startswith("."):
+        raise CorruptDataError(f"{path / POINTER}: {which}: expected a folder's name, got {name!r}")
+    return path / FOLDER / name
+
+
+def read(path: Path, which: str = "last", *, training: bool = True) -> Checkpoint:
+    """Read a checkpoint.
+
+    Parameters
+    ----------
+    path
+        A run's folder, or a checkpoint's.
+    which
+        `last` or `best`.
+    training
+        Read what training needs, too.
+
+    Raises
+    ------
+    UsageError
+        There is none.
+    CorruptDataError
+        It is damaged, of another version, or its weights do not fit its config.
+    """
+    folder = find(path, which)
+    said = _json(folder / ABOUT)
+    if said.get("format") != FORMAT:
+        raise CorruptDataError(
+            f"{folder / ABOUT}: format {said.get('format')!r}: this release reads {FORMAT}; "
+            "read it with the release that wrote it"
+        )
+    method, files, progress = said.get("method"), said.get("files"), said.get("progress")
+    if not isinstance(method, str) or not isinstance(files, dict) or not isinstance(progress, dict):
+        raise CorruptDataError(f"{folder / ABOUT}: expected a method, files and progress")
+    try:
+        config = from_mapping(preset("small"), _table(said.get("config")), "config")
+    except InternavError as error:
+        raise CorruptDataError(f"{folder / ABOUT}: {error}") from error
+    weights = _tensors(folder / WEIGHTS, files, _shapes(method, config))
+    rest = _tensors(folder / TRAINING, files) if training else {}
+    return Checkpoint(method, config, weights, progress, rest)
+
+
+def load_agent(path: str | Path, which: str = "last") -> Agent:
+    """Return the trained agent of a run or checkpoint, on the processor.
+
+    It knows its `method`, `config` and `progress`.
+
+    Raises
+    ------
+    UsageError, CorruptDataError
+        See `read`.
+    """
+    checkpoint = read(Path(path), which, training=False)
+    agent = make_agent(checkpoint.method, checkpoint.config)
+    agent.load_state_dict(dict(checkpoint.weights))
+    agent.eval()
+    vars(agent).update(
+        method=checkpoint.method, config=checkpoint.config, progress=dict(checkpoint.progress)
+    )
+    return agent
+
+
+def _write_folder(folder: Path, checkpoint: Checkpoint) -> None:
+    temporary = folder.with_name(f".{folder.name}.{os.getpid()}.tmp")
+    shutil.rmtree(temporary, ignore_errors=True)
+    temporary.mkdir(parents=True)
+    try:
+        files = {}
+        for name, tensors in ((WEIGHTS, checkpoint.weights), (TRAINING, checkpoint.training)):
+            kept = {key: value.detach().cpu().contiguous() for key, value in tensors.items()}
+            save_file(kept, temporary / name)
+            size = (temporary / name).stat().st_size
+            files[name] = {"bytes": size, "sha256": file_sha256(temporary / name)}
+            sync(temporary / name)
+        said = {
+            "format": FORMAT,
+            "method": checkpoint.method,
+            "config": plain(checkpoint.config),
+            "progress": checkpoint.progress,
+            "files": files,
+            "versions": {
+                "python": platform.python_version(),
+                **{name: version(name) for name in ("internav-data", "torch", "numpy")},
+            },
+        }
+        text = json.dumps(said, indent=1, allow_nan=False)
+        write_atomically(temporary / ABOUT, (text + "\n").encode())
+        sync(temporary)
+        temporary.rename(folder)
+    except BaseException:
+        shutil.rmtree(temporary, ignore_errors=True)
+        raise
+    sync(folder.parent)
+
+
+def _pointer(run: Path) -> dict[str, Any]:
+    path = run / POINTER
+    return _json(path) if path.is_file() else {}
+
+
+def _json(path: Path) -> dict[str, Any]:
+    try:
+        if path.stat().st_size > _JSON_AT_MOST:
+            raise CorruptDataError(
+                f"{path}: more than {_JSON_AT_MOST} bytes: this is no checkpoint"
+            )
+        return _table(json.loads(path.read_bytes()), path)
+    except OSError as error:
+        raise CorruptDataError(f"{path}: {error.strerror or error}") from error
+    except (ValueError, RecursionError) as error:
+        raise CorruptDataError(f"{path}: this is not JSON: {error}") from error
+
+
+def _table(said: object, path: Path | str = "config") -> dict[str, Any]:
+    if not isinstance(said, dict):
+        raise CorruptDataError(f"{path}: expected a JSON object, got {type(said).__name__}")
+    return said
+
+
+def _shapes(method: str, config: CampConfig) -> dict[str, tuple[int, ...]]:
+    """Return the shapes that an agent's weights have, without taking their memory."""
+    with torch.device("meta"):
+        agent = make_agent(method, config)
+    return {name: tuple(value.shape) for name, value in agent.state_dict().items()}
+
+
+def _tensors(
+    path: Path, files: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...]] | None = None
+) -> dict[str, Tensor]:
+    """Read tensors; their names and shapes are compared before any memory is taken."""
+    known = files.get(path.name)
+    if not isinstance(known, dict):
+        raise CorruptDataError(f"{path.parent / ABOUT}: files: {path.name} is missing")
+    try:
+        size = path.stat().st_size
+        if size != known.get("bytes") or size > _TENSORS_AT_MOST:
+            raise CorruptDataError(
+                f"{path}: {size} bytes, expected {known.get('bytes')}: copy the checkpoint again"
+            )
+        with safetensors.safe_open(path, "pt") as opened:
+            found = {name: tuple(opened.get_slice(name).get_shape()) for name in opened.keys()}  # noqa: SIM118 - no mapping
+        if shapes is not None:
+            _compare(path, found, shapes)
+        if file_sha256(path) != known.get("sha256"):
+            raise CorruptDataError(f"{path}: its bytes have changed: copy the checkpoint again")
+        return load_file(path)
+    except OSError as error:
+        raise CorruptDataError(f"{path}: {error.strerror or error}") from error
+    except safetensors.SafetensorError as error:
+        raise CorruptDataError(f"{path}: this is no safetensors file: {error}") from error
+
+
+def _compare(
+    path: Path, found: Mapping[str, tuple[int, ...]], wanted: Mapping[str, tuple[int, ...]]
+) -> None:
+    for name in sorted({*found, *wanted}):
+        if found.get(name) != wanted.get(name):
+            raise CorruptDataError(
+                f"{path}: {name} has shape {found.get(name)}, the method and sizes of {ABOUT} "
+                f"want {wanted.get(name)}: these are another agent's weights"
+            )

@@ -1,0 +1,198 @@
+"""Checkpoints are whole or not there, and reading one can neither run code nor eat the memory."""
+
+import json
+import pickle
+import struct
+
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from internav_data.camp import checkpoint as checkpoints  # noqa: E402
+from internav_data.camp.agents import make_agent  # noqa: E402
+from internav_data.camp.checkpoint import Checkpoint, find, load_agent, read, save  # noqa: E402
+from internav_data.records.errors import CorruptDataError, UsageError  # noqa: E402
+
+
+@pytest.fixture
+def made(config):
+    def make(method="camp", number=1):
+        agent = make_agent(method, config(seed=number))
+        training = {"state/hidden": torch.full((2, 3), float(number))}
+        progress = {"updates": number, "environment_steps": 32 * number}
+        return Checkpoint(method, config(seed=number), agent.state_dict(), progress, training)
+
+    return make
+
+
+@pytest.fixture
+def kept(tmp_path, made):
+    """A run with one checkpoint, and the folder of that."""
+    return tmp_path, save(tmp_path, made())
+
+
+def edit(folder, **changes):
+    path = folder / checkpoints.ABOUT
+    said = json.loads(path.read_bytes())
+    path.write_text(json.dumps(said | changes))
+
+
+def test_what_is_read_is_what_was_written(kept, made):
+    run, folder = kept
+    again, written = read(run), made()
+    assert (again.method, again.config) == (written.method, written.config)
+    assert again.progress == written.progress
+    assert again.weights.keys() == written.weights.keys()
+    assert all(torch.equal(again.weights[name], value) for name, value in written.weights.items())
+    assert torch.equal(again.training["state/hidden"], written.training["state/hidden"])
+    assert not read(folder, training=False).training
+
+
+@pytest.mark.parametrize("method", ["ppo", "ppo-intent", "nie", "hrl", "camp"])
+def test_an_agent_comes_back_knowing_what_it_is(tmp_path, made, method):
+    written = made(method)
+    save(tmp_path, written)
+    agent = load_agent(tmp_path)
+    assert agent.method == method
+    assert agent.config == written.config
+    assert agent.progress["environment_steps"] == 32
+    for name, value in agent.state_dict().items():
+        assert torch.equal(value, written.weights[name])
+
+
+def test_last_and_best_are_kept_and_no_other(tmp_path, made):
+    for number, score in ((1, 0.2), (2, 0.5), (3, None), (4, None)):
+        save(tmp_path, made(number=number), best=score)
+    assert read(tmp_path).progress["updates"] == 4
+    assert read(tmp_path, "best").progress["updates"] == 2
+    assert checkpoints.best_score(tmp_path) == 0.5
+    assert len(list((tmp_path / checkpoints.FOLDER).iterdir())) == 2
+
+
+@pytest.mark.parametrize("victim", ["save_file", "file_sha256", "write_atomically", "sync"])
+@pytest.mark.parametrize("after", range(3))
+def test_killed_between_files_the_last_one_stands(kept, made, monkeypatch, victim, after):
+    """Whatever comes last before a kill, reading finds the old checkpoint, and saving goes on."""
+    run, _ = kept
+    true, left = getattr(checkpoints, victim), [after]
+
+    def dies(*given):
+        if not left[0]:
+            raise KeyboardInterrupt
+        left[0] -= 1
+        return true(*given)
+
+    monkeypatch.setattr(checkpoints, victim, dies)
+    try:
+        save(run, made(number=2))
+        died = False
+    except KeyboardInterrupt:
+        died = True
+    monkeypatch.setattr(checkpoints, victim, true)
+    assert read(run).progress["updates"] == (1 if died else 2)
+    save(run, made(number=3))
+    assert read(run).progress["updates"] == 3
+    assert [path.name for path in (run / checkpoints.FOLDER).iterdir()] == [find(run).name]
+
+
+def test_no_temporary_folder_is_taken_for_a_checkpoint(kept, made):
+    run, folder = kept
+    left = folder.with_name(".000002.1.tmp")
+    left.mkdir()
+    (left / checkpoints.ABOUT).write_text("{")
+    assert read(run).progress["updates"] == 1
+    save(run, made(number=2))
+    assert not left.exists()
+
+
+@pytest.mark.parametrize("name", [checkpoints.WEIGHTS, checkpoints.TRAINING, checkpoints.ABOUT])
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.99])
+def test_truncated_files_are_refused_in_a_line(kept, name, share):
+    run, folder = kept
+    data = (folder / name).read_bytes()
+    (folder / name).write_bytes(data[: int(len(data) * share)])
+    with pytest.raises(CorruptDataError, match=name):
+        read(run)
+
+
+def test_a_changed_byte_is_noticed(kept):
+    run, folder = kept
+    path = folder / checkpoints.WEIGHTS
+    data = bytearray(path.read_bytes())
+    data[-5] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(CorruptDataError, match="have changed"):
+        read(run)
+
+
+class Bomb:
+    def __reduce__(self):
+        return (pytest.fail, ("unpickled",))
+
+
+def test_a_pickle_is_not_opened(kept):
+    run, folder = kept
+    path = folder / checkpoints.WEIGHTS
+    path.write_bytes(pickle.dumps(Bomb()))
+    edit(folder, files={checkpoints.WEIGHTS: {"bytes": path.stat().st_size}})
+    with pytest.raises(CorruptDataError, match="no safetensors file"):
+        read(run)
+
+
+def test_a_header_that_asks_for_the_moon_is_refused(kept):
+    run, folder = kept
+    path = folder / checkpoints.WEIGHTS
+    header = json.dumps({"x": {"dtype": "F32", "shape": [10**6] * 3, "data_offsets": [0, 4]}})
+    path.write_bytes(struct.pack("<Q", len(header)) + header.encode() + b"\0" * 4)
+    edit(folder, files={checkpoints.WEIGHTS: {"bytes": path.stat().st_size}})
+    with pytest.raises(CorruptDataError, match="no safetensors file"):
+        read(run)
+
+
+def test_a_config_larger_than_its_weights_takes_no_memory(kept):
+    """hidden 8192 on 1024 pixels would take 64 GB."""
+    run, folder = kept
+    said = json.loads((folder / checkpoints.ABOUT).read_bytes())["config"]
+    said["network"] |= {"hidden": 8192, "image_size": 1024}
+    edit(folder, config=said)
+    with pytest.raises(CorruptDataError, match="another agent's weights"):
+        read(run)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"format": 2}, "format 2: this release reads 1"),
+        ({"method": "ppo"}, "another agent's weights"),
+        ({"method": 3}, "expected a method"),
+        ({"config": []}, "expected a JSON object"),
+        ({"config": {"speed": 1}}, "no key 'speed'"),
+        ({"config": {"ppo": {"steps": 0}}}, "ppo.steps is 0"),
+        ({"files": {}}, "weights.safetensors is missing"),
+        ({"progress": None}, "expected a method, files and progress"),
+    ],
+)
+def test_what_does_not_fit_is_told(kept, changes, words):
+    run, folder = kept
+    edit(folder, **changes)
+    with pytest.raises(CorruptDataError, match=words):
+        read(run)
+
+
+def test_deep_json_is_refused(kept):
+    run, folder = kept
+    (folder / checkpoints.ABOUT).write_text("[" * 100_000)
+    with pytest.raises(CorruptDataError, match="not JSON"):
+        read(run)
+
+
+def test_a_pointer_leads_nowhere_else(kept):
+    run, _ = kept
+    (run / checkpoints.POINTER).write_text(json.dumps({"last": "../../etc"}))
+    with pytest.raises(CorruptDataError, match="expected a folder's name"):
+        read(run)
+
+
+def test_a_folder_without_one_says_what_is_expected(tmp_path):
+    with pytest.raises(UsageError, match="expected the folder of a run"):
+        read(tmp_path)
