@@ -61,6 +61,16 @@ class FakeEnvironments:
         return self._look(), self._rng.random(self.num_envs), ended, cut, infos
 
 
+@pytest.fixture(scope="session")
+def houses(tmp_path_factory):
+    """A generated dataset: two houses, two episodes each."""
+    from internav_data.generation import generate, load_config
+
+    out = tmp_path_factory.mktemp("camp") / "d"
+    generate(out, load_config(overrides=["episodes_per_scene=2", "house.rooms=1-2"]), 2, workers=1)
+    return out
+
+
 @pytest.fixture
 def fake():
     return FakeEnvironments
