@@ -137,6 +137,28 @@ class StagesConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class RunConfig:
+    """How a run goes about it."""
+
+    max_steps: int = 500
+    """Of an episode; then it is cut off. In validation too."""
+    threads: int = 1
+    """Of torch on a processor; with one, equal runs are equal to the last bit."""
+    workers: int = 0
+    """Processes that step the main task's environments; 0: none but this one."""
+    checkpoint_every: int = 10
+    """Updates between checkpoints."""
+    validate_every: int = 50
+    """Updates of a stage between validations; each stage of the main task ends with one."""
+    validation_episodes: int = 64
+    """Of the dataset's validation split, the same ones every time; 0: no validation."""
+    window: int = 100
+    """Episodes that a logged mean is over: the last ones that ended."""
+    tensorboard: bool = True
+    """Write TensorBoard's files too, where `tensorboard` is installed."""
+
+
+@dataclass(frozen=True, slots=True)
 class CampConfig:
     """All of it: equal configs, seeds and datasets give equal runs on one thread."""
 
@@ -152,6 +174,8 @@ class CampConfig:
     """Cloning the expert."""
     stages: StagesConfig = field(default_factory=StagesConfig)
     """How many steps, where."""
+    run: RunConfig = field(default_factory=RunConfig)
+    """How a run goes about it."""
 
     def check(self) -> None:
         """Raise UsageError for values that cannot be meant."""
@@ -246,6 +270,11 @@ _LIMITS: Final[dict[str, tuple[float, float]]] = {
     "auxiliary_share": (0.0, 1.0),
     "single_room_share": (0.0, 1.0),
     "critic_rollouts": (0, _MOST),
+    "max_steps": (1, 10_000),
+    "workers": (0, 1024),
+    "threads": (1, 1024),
+    "validation_episodes": (0, _MOST),
+    "window": (1, 10_000),
 }
 """What values a field may have, by its name; whole numbers else from 1, others from 0."""
 

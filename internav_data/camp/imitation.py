@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from torch.optim import Optimizer
 
     from internav_data.camp.agents import Agent, State
-    from internav_data.camp.collect import Environments
+    from internav_data.camp.collect import Environments, Observations
     from internav_data.camp.config import CloningConfig
     from internav_data.camp.ppo import Reduce
     from internav_data.dataset import Dataset
@@ -73,6 +73,12 @@ class Demonstrations:
         self._starts = np.ones(self.env.num_envs, np.bool_)
         self._learn(infos)
 
+    def resume(self, seen: Observations, ids: Sequence[str], places: Sequence[int]) -> None:
+        """Go on in the middle: episodes `ids` are under way, `places` steps of each are taken."""
+        self._seen, self._starts = seen, np.ones(self.env.num_envs, np.bool_)
+        self._learn({"episode_id": np.array(ids, dtype=object)})
+        self._places, self._starts = list(places), np.array(places) == 0
+
     def collect(self, steps: int, state: State) -> Batch:
         """Play so many steps, to be lived through after `state`."""
         device = self._agent.device
@@ -111,6 +117,10 @@ def clone(
     config: CloningConfig,
     seed: int,
     reduce: Reduce = alone,
+    *,
+    first: int = 0,
+    state: State | None = None,
+    keep: Callable[[State], object] | None = None,
 ) -> Iterator[dict[str, float]]:
     """Make what experts do likely; yields after each update.
 
@@ -129,6 +139,11 @@ def clone(
         Of the order of episodes.
     reduce
         Adds a tensor over all ranks.
+    first, state
+        Updates that were done before, and the hidden states after them; `demonstrations` stand
+        where they stood.
+    keep
+        Told the hidden states after each update.
 
     Yields
     ------
@@ -138,8 +153,8 @@ def clone(
     count = demonstrations.env.num_envs
     an_epoch = max(1, round(config.frames / (config.environments * config.steps)))
     updates = an_epoch * config.epochs
-    state = agent.initial_state(count)
-    for update in range(updates):
+    state = agent.initial_state(count) if state is None else state
+    for update in range(first, updates):
         if update % an_epoch == 0:
             demonstrations.begin(seed)
         rate = config.learning_rate * (1.0 - update / updates)
@@ -155,6 +170,8 @@ def clone(
         if (update + 1) % config.sync_every == 0:
             agent.synchronise()
         said = float(reduce(loss.detach().clone()))
+        if keep is not None:
+            keep(state)
         yield {
             "loss": said, "gradient_norm": norm, "learning_rate": rate,
             "update": float(update + 1), "updates": float(updates),

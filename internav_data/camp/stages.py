@@ -1,0 +1,133 @@
+"""Which tasks are trained in which order, for how many steps (section 5.2 and CAMP.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from internav_data.camp.agents.options import NAVIGATE, PICK, PUSH
+from internav_data.records import Purpose, generator
+from internav_data.records.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from internav_data.camp.config import CampConfig
+
+PARTS: Final = ("auxiliary", "single", "all")
+"""What `--stages` can name, in order."""
+TASKS: Final = {NAVIGATE: "navigate", PUSH: "push", PICK: "pick"}
+_ENVIRONMENTS: Final = 3
+"""Where the seeds table has attempts: orders of episodes in training."""
+_NUMBERS: Final = ("cloning", *PARTS, *(f"auxiliary-{name}" for name in TASKS.values()))
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """A run of updates with an optimiser of its own."""
+
+    name: str
+    part: str
+    """Of `PARTS`."""
+    tasks: tuple[int, ...]
+    """The option that each environment is about; empty for the main task."""
+    single_room: bool
+    """Only scenes of a single room."""
+    rate: float
+    """Of Adam at the beginning."""
+    updates: int
+    critic: str
+    """Whose values are learnt: critics are new once each."""
+    decay_from: float
+    """How much of the decay is over when it begins; 1 is all."""
+    decay_to: float
+    """… and when it ends."""
+
+
+def plan(config: CampConfig, parts: Sequence[str], *, hierarchical: bool) -> list[Stage]:
+    """Return the stages of a run.
+
+    Every method gets the same environment steps: flat ones spend those of the auxiliary tasks on
+    the main task in single rooms.
+
+    Parameters
+    ----------
+    config
+        Of the run.
+    parts
+        Some of `PARTS`.
+    hierarchical
+        Whether there are action policies to be trained in auxiliary tasks.
+
+    Raises
+    ------
+    UsageError
+        An unknown part, or more tasks side by side than environments.
+    """
+    check_parts(parts)
+    given, count = config.stages, config.ppo.environments
+    names = list(TASKS) if hierarchical and not given.side_by_side else []
+    if hierarchical and given.side_by_side and given.auxiliary_share and count < len(TASKS):
+        raise UsageError(
+            f"ppo.environments is {count}: three auxiliary tasks side by side need 3 at least; "
+            "or set stages.side_by_side=false"
+        )
+    shares = [
+        *((("auxiliary", task), given.auxiliary_share / len(names)) for task in names),
+        *([] if names else [(("auxiliary", -1), given.auxiliary_share)]),
+        (("single", -1), given.single_room_share),
+        (("all", -1), 1.0 - given.auxiliary_share - given.single_room_share),
+    ]
+    whole = max(1, round(given.steps / (count * config.ppo.steps)))
+    stages, share_before = [], 0.0
+    for (part, task), share in shares:
+        first, last = round(whole * share_before), round(whole * (share_before + share))
+        share_before += share
+        if part not in parts or last == first:
+            continue
+        over = (first / whole, last / whole) if given.decay_over == "all" else (0.0, 1.0)
+        stages.append(_stage(config, part, task, last - first, over, hierarchical=hierarchical))
+    if not stages:
+        raise UsageError(
+            f"stages.steps is {given.steps}: less than one update of {count * config.ppo.steps} "
+            f"steps is left for {', '.join(parts)}"
+        )
+    return stages
+
+
+def check_parts(parts: Sequence[str]) -> None:
+    """Refuse what is no run of stages."""
+    first = PARTS.index(parts[0]) if parts and parts[0] in PARTS else -1
+    if first < 0 or tuple(parts) != PARTS[first : first + len(parts)]:
+        raise UsageError(
+            f"--stages {','.join(parts)!r}: expected some of {','.join(PARTS)} that follow each "
+            "other, in this order"
+        )
+
+
+def order_seed(seed: int, stage: str) -> int:
+    """Return the seed of environment 0 in a stage; environment k has the k-th after it."""
+    rng = generator(seed, Purpose.TRAINING, attempt=_ENVIRONMENTS, draw=_NUMBERS.index(stage))
+    return int(rng.integers(2**31))
+
+
+def _stage(
+    config: CampConfig,
+    part: str,
+    task: int,
+    updates: int,
+    over: tuple[float, float],
+    *,
+    hierarchical: bool,
+) -> Stage:
+    auxiliary = part == "auxiliary" and hierarchical
+    count, given = config.ppo.environments, config.stages
+    tasks: tuple[int, ...] = ()
+    if auxiliary:
+        side_by_side = tuple(sorted(TASKS)[k * len(TASKS) // count] for k in range(count))
+        tasks = side_by_side if task < 0 else (task,) * count
+    name = f"{part}-{TASKS[task]}" if task >= 0 else part
+    rate = given.joint_learning_rate if hierarchical and not auxiliary else given.learning_rate
+    return Stage(
+        name, part, tasks, part != "all", rate, updates, name if auxiliary else "main", *over
+    )
