@@ -68,7 +68,7 @@ CASES = {
     "a crate, not far to go": (CORRIDOR, [(CRATE, 2.2, 0.75)], (4, 3, 0), (10, 3)),
     "turned away at first": (CORRIDOR, [(CRATE, 2.5, 0.75)], (5, 3, 2), (12, 3)),
     "two crates in a row": (CORRIDOR, [(CRATE, 2.2, 0.75), (CRATE, 3.6, 0.75)], (4, 3, 0), (12, 3)),
-    "a crate and a parcel": (CORRIDOR, [(PARCEL, 2.2, 0.75), (CRATE, 3.6, 0.75)], (4, 3, 0), (12, 3)),
+    "a parcel, a crate": (CORRIDOR, [(PARCEL, 2.2, 0.75), (CRATE, 3.6, 0.75)], (4, 3, 0), (12, 3)),
     "a bench across": (WIDE, [(LONG, 2.4, 0.62), (LONG, 2.4, 1.73)], (4, 4, 0), (14, 4)),
     "a crate in a door": (DOOR, [(CRATE, 2.5, 1.5)], (5, 6, 0), (15, 6)),
     "beside a door": (DOOR, [(CRATE, 2.0, 1.5)], (3, 6, 0), (14, 6)),
