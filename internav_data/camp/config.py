@@ -34,6 +34,8 @@ class NetworkConfig:
     shared_encoder: bool = True
     """One encoder for all policies; False: one for Navigate, intent and global, one for Push, one
     for Pick."""
+    bf16: bool = True
+    """On a GPU encoders work in bfloat16; GRUs, heads and losses always in float32."""
     depth_limit_m: float = 10.0
     """Depth is cut here and divided by it."""
     goal_scale_m: float = 10.0

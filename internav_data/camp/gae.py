@@ -32,10 +32,9 @@ def advantages_of(
     gamma, lam
         Discount and decay.
     """
-    cut = truncated & ~terminated
     over = truncated | terminated
     following = torch.cat([values[1:], last_value.unsqueeze(0)])
-    following = torch.where(cut, final_values, following).masked_fill(terminated, 0.0)
+    following = torch.where(truncated, final_values, following).masked_fill(terminated, 0.0)
     surprises = rewards + gamma * following - values
     carries = (gamma * lam) * (~over).to(values.dtype)
     advantages, ahead = torch.empty_like(values), torch.zeros_like(last_value)

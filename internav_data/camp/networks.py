@@ -46,6 +46,7 @@ class Encoder(nn.Module):
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
         self._depth_limit_m, self._goal_scale_m = config.depth_limit_m, config.goal_scale_m
+        self._bf16 = config.bf16
         separate = config.encoder == "paper"
         channels = (_RGB, _DEPTH) if separate else (_RGB + _DEPTH,)
         self.eyes = nn.ModuleList(_convolutions(count, config) for count in channels)
@@ -67,8 +68,10 @@ class Encoder(nn.Module):
         depth = seen["depth"].reshape(-1, height, width, _DEPTH).permute(0, 3, 1, 2)
         depth = depth.clamp(max=self._depth_limit_m) / self._depth_limit_m
         pictures = (rgb, depth) if len(self.eyes) > 1 else (torch.cat([rgb, depth], 1),)
-        views = [eye(picture) for eye, picture in zip(self.eyes, pictures, strict=True)]
-        features = views[0] if len(views) == 1 else functional.relu(self.fuse(torch.cat(views, 1)))
+        with torch.autocast("cuda", torch.bfloat16, enabled=self._bf16 and rgb.is_cuda):
+            views = [eye(picture) for eye, picture in zip(self.eyes, pictures, strict=True)]
+            fused = views[0] if len(views) == 1 else self.fuse(torch.cat(views, 1)).relu()
+        features = fused.float()
         far, bearing = seen["goal"][..., 0] / self._goal_scale_m, seen["goal"][..., 1]
         goal = self.goal(torch.stack([far, bearing.cos(), bearing.sin()], -1))
         held = seen["held"].unsqueeze(-1).to(goal.dtype)

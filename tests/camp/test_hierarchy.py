@@ -71,6 +71,30 @@ def test_the_mixture_is_equation_7_by_hand(collected):
     assert (meant[..., PICK] * acts[..., PICK, 1]).max() > 1e-3
 
 
+@pytest.mark.parametrize("method", ["camp", "hrl"])
+def test_what_is_drawn_has_the_probability_of_its_parts(collected, method):
+    """An option counts where it was decided, an action always; Done by global has no action."""
+    agent, _, lived = collected(method, changes={"agent": {"interact_chance": 0.3}}, rollouts=4)
+    kinds = set()
+    for rollout in lived:
+        record, ran = rollout.batch.record, ran_of(agent, rollout.batch)
+        now = agent.evaluate(rollout.batch)
+        for t in range(8):
+            for k in range(4):
+                option, choice = record["option"][t, k], record["choice"][t, k]
+                decided = bool(record["open"][t, k] == 0)
+                right = ran.plan[t, k, option] if decided else torch.zeros(())
+                entropy = torch.distributions.Categorical(ran.plan[t, k].exp()).entropy() * decided
+                if option != STOP:
+                    right = right + ran.acts[t, k, option, choice]
+                    acts = ran.acts[t, k, option].exp()
+                    entropy = entropy + torch.distributions.Categorical(acts).entropy()
+                assert rollout.log_probs[t, k] == pytest.approx(right.item(), abs=1e-5)
+                assert now.entropy[t, k].item() == pytest.approx(entropy.item(), abs=1e-4)
+                kinds.add((option.item(), decided))
+    assert (PUSH, False) in kinds or method == "hrl"
+
+
 @pytest.mark.parametrize("method", ["camp", "ppo-intent"])
 def test_the_intent_policy_is_a_copy_made_at_synchronisation_only(collected, method):
     agent, _, (rollout, _) = collected(method)

@@ -1,6 +1,7 @@
 """Cloning: how experts' actions become options, and that they are learnt."""
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
@@ -164,6 +165,27 @@ def test_experts_are_learnt_by_every_learner(experts, config, method):
     assert told[0]["loss"] > 1.0
     assert told[-1]["loss"] < 0.35 * told[0]["loss"]
     assert all(torch.equal(a, b) for a, b in zip(critic, agent.critics(), strict=True))
+
+
+def test_each_update_goes_on_from_the_last_ones_hidden_states(experts, config, monkeypatch):
+    agent = make_agent("camp", config())
+    lived, evaluate = [], agent.evaluate
+
+    def watched(batch):
+        said = evaluate(batch)
+        lived.append((batch.state["hidden"], said.state["hidden"].detach()))
+        return said
+
+    monkeypatch.setattr(agent, "evaluate", watched)
+    cloning = dataclasses.replace(config().cloning, frames=96, epochs=1, environments=4, steps=8)
+    shown = Demonstrations(experts(), agent, EXPERTS.__getitem__)
+    list(clone(agent, torch.optim.Adam(agent.optimised()), shown, cloning, 0))
+    assert len(lived) == 3
+    assert not lived[0][0].any()
+    for (_, after), (before, _) in itertools.pairwise(lived):
+        assert torch.equal(after, before)
+        assert not before.requires_grad
+        assert before.any()
 
 
 def test_hidden_states_go_on_between_updates(experts, config):
