@@ -92,13 +92,15 @@ def update(
         losses, said = _losses(agent, rollout, columns, goals, config, reduce)
         told.append(said)
         # Stop before the step that would be taken on too distant a policy.
-        stopped = not critic_only and said["kl"] > (config.kl_limit or math.inf)
+        limit = math.inf if critic_only or config.kl_limit is None else config.kl_limit
+        stopped = said["kl"] > limit
         if stopped:
             break
         loss = losses["value"] if critic_only else sum(losses.values(), losses["value"] * 0.0)
         said["gradient_norm"] = step(optimiser, loss, parameters, config.gradient_norm, reduce)
     means = {name: _mean([said[name] for said in told if name in said]) for name in told[0]}
     return {
+        "gradient_norm": 0.0,  # where not a single step was taken
         **means,
         "ratio_error": told[0]["ratio_error"],
         "explained_variance": explained,
