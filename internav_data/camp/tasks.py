@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
@@ -12,7 +13,7 @@ from internav_data.records import Episode
 from internav_data.records.errors import CorruptDataError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     import numpy as np
     from numpy.typing import NDArray
@@ -115,6 +116,27 @@ class WithoutObstacles(Dataset[Episode]):
         if isinstance(found, Episode):
             return replace(found, obstacles=(), obstacle_count=0)
         return [replace(episode, obstacles=(), obstacle_count=0) for episode in found]
+
+
+class Timed:
+    """A task, and the seconds that its environments took."""
+
+    def __init__(self, task: Task) -> None:
+        self.task, self.num_envs, self.spent_s = task, task.num_envs, 0.0
+
+    def reset(self, **given: Any) -> Any:  # noqa: ANN401 - as `Task` has it
+        """See `Task`."""
+        return self._timed(self.task.reset, **given)
+
+    def step(self, actions: Any) -> Any:  # noqa: ANN401 - as `Task` has it
+        """See `Task`."""
+        return self._timed(self.task.step, actions)
+
+    def _timed(self, call: Callable[..., Any], *given: Any, **named: Any) -> Any:  # noqa: ANN401
+        began = time.perf_counter()
+        found = call(*given, **named)
+        self.spent_s += time.perf_counter() - began
+        return found
 
 
 def env_state(said: Mapping[str, Any]) -> EnvState:

@@ -34,6 +34,8 @@ _NOWHERE: Final = 1e6
 class NIEAgent(PPOAgent):
     """`ppo` with a neural interaction engine; environments are made with `ids=True`."""
 
+    wants_ids = True
+
     def __init__(self, config: CampConfig) -> None:
         super().__init__(config, extra=SUMMARY)
         self._objects, self._weight = config.agent.nie_objects, config.agent.nie_weight

@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import torch
 from torch import Tensor, nn
@@ -89,6 +89,9 @@ class Evaluated:
 
 class Agent(nn.Module, ABC):
     """A learner; see `internav_data.camp.agents` for how one's own joins."""
+
+    wants_ids: ClassVar[bool] = False
+    """Whether it is to see instances, too ("ids"): privileged input."""
 
     @property
     def device(self) -> torch.device:

@@ -1,0 +1,105 @@
+"""The episodes that a run is trained and validated on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from internav_data.camp.evaluation import Settings, evaluate
+from internav_data.camp.players import AgentPlayer
+from internav_data.dataset import load_dataset
+from internav_data.records.errors import UsageError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from internav_data.camp.agents import Agent
+    from internav_data.camp.config import CampConfig
+    from internav_data.camp.stages import Stage
+    from internav_data.camp.tasks import Task
+    from internav_data.dataset import Dataset
+    from internav_data.records import Episode
+
+_SINGLE = [("room_count", "==", 1)]
+_MEANS = ("success", "spl", "sts", "distance_m", "steps")
+
+
+class TrainingData:
+    """A dataset's training and validation splits.
+
+    Parameters
+    ----------
+    path
+        A folder that `internav-gen generate` wrote.
+
+    Raises
+    ------
+    CorruptDataError
+        There is none, or it is damaged or of another version.
+    UsageError
+        It has nothing to train on, or no outcomes.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        episodes = self.episodes()
+        if any(obstacle.outcomes is None for obstacle in episodes[0].obstacles):
+            raise UsageError(
+                f"{path}: its obstacles have no outcomes; generate it anew with this release"
+            )
+        self.fingerprint = episodes.fingerprint
+
+    def episodes(self, *, single_room: bool = False) -> Dataset[Episode]:
+        """Return the training split, or its scenes of a single room."""
+        found = load_dataset(self.path, "train", _SINGLE if single_room else None)
+        if not len(found):
+            what = "scenes of a single room" if single_room else "training episodes"
+            advice = (
+                "generate some (--rooms 1-3), or train --stages all"
+                if single_room
+                else "`internav-gen stats` tells what it holds"
+            )
+            raise UsageError(f"{self.path}: there are no {what}; {advice}")
+        return found
+
+    def task(self, stage: Stage, config: CampConfig, *, ids: bool) -> Task:
+        """Return the environments of a stage."""
+        if not stage.tasks:
+            count = config.ppo.environments
+            return self.main(config, count, ids=ids, single_room=stage.single_room)
+        from internav_data.camp.auxiliary_tasks import AuxiliaryTasks  # noqa: PLC0415 - the camera
+
+        episodes = self.episodes(single_room=stage.single_room)
+        return AuxiliaryTasks(episodes, stage.tasks, **_arguments(config, ids=ids))
+
+    def main(self, config: CampConfig, count: int, *, ids: bool, single_room: bool = False) -> Task:
+        """Return environments of the main task."""
+        from internav_data.camp.tasks import MainTask  # noqa: PLC0415 - the camera's kernels
+
+        episodes = self.episodes(single_room=single_room)
+        return MainTask(episodes, count, config.run.workers, **_arguments(config, ids=ids))
+
+    def validate(self, agent: Agent, method: str, config: CampConfig) -> dict[str, float] | None:
+        """Let an agent play the validation split: means over its episodes, None without any."""
+        limit = config.run.validation_episodes
+        episodes = load_dataset(self.path, "val")
+        if not limit or not len(episodes):
+            return None
+        size, ids = config.network.image_size, agent.wants_ids
+        player = AgentPlayer(method, agent, size, greedy=False, ids=ids)
+        settings = Settings(
+            batch=min(config.ppo.environments, limit),
+            workers=config.run.workers,
+            max_steps=config.run.max_steps,
+            limit=limit,
+        )
+        results = evaluate(player, episodes, settings)
+        means = {
+            name: sum(float(getattr(each, name)) for each in results) / len(results)
+            for name in _MEANS
+        }
+        return {**means, "episodes": float(len(results))}
+
+
+def _arguments(config: CampConfig, *, ids: bool) -> dict[str, Any]:
+    size, longest = config.network.image_size, config.run.max_steps
+    return {"image_size": size, "max_steps": longest, "ids": ids}

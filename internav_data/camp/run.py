@@ -1,0 +1,264 @@
+"""A run: begun, gone on with, or only predicted."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+import tomllib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import torch
+
+from internav_data.camp.agents import agent_names, make_agent
+from internav_data.camp.agents.hierarchy import Hierarchy
+from internav_data.camp.checkpoint import has_checkpoint, read
+from internav_data.camp.config import CampConfig, from_mapping, plain, preset
+from internav_data.camp.data import TrainingData
+from internav_data.camp.logbook import LOG
+from internav_data.camp.packing import Place
+from internav_data.camp.stages import PARTS, check_parts, plan
+from internav_data.camp.train import Trainer
+from internav_data.generation import values
+from internav_data.records.errors import CorruptDataError, UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
+
+    from internav_data.camp.checkpoint import Checkpoint
+    from internav_data.camp.stages import Stage
+    from internav_data.camp.train import Tell
+
+_MEASURED: Final = 2
+"""Updates that a prediction is made of, after one that warms up."""
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What is asked for."""
+
+    dataset: Path
+    out: Path
+    method: str = "camp"
+    config: CampConfig = dataclasses.field(default_factory=CampConfig)
+    parts: tuple[str, ...] = PARTS
+    clones: bool = False
+    """Clone the dataset's expert first."""
+    device: str = "auto"
+
+
+def config_of(
+    name: str,
+    file: Path | None = None,
+    overrides: Sequence[str] = (),
+    options: Mapping[str, Any] | None = None,
+) -> CampConfig:
+    """Return a checked config: a preset, a TOML file, options by dotted key, `a.b=c`.
+
+    Raises
+    ------
+    UsageError
+        Something in them cannot be meant; the place is named.
+    """
+    config = preset(name)
+    if file is not None:
+        config = values.from_mapping(config, _toml(file), str(file))
+    for key, value in (options or {}).items():
+        config = values.from_mapping(config, values.nested(key, value), "option")
+    for override in overrides:
+        config = values.updated(config, override)
+    return from_mapping(config, {}, "config")
+
+
+def device_of(name: str) -> torch.device:
+    """Return "cpu" or "cuda"; "auto" is a GPU where there is one.
+
+    Raises
+    ------
+    UsageError
+        There is no GPU.
+    """
+    there = torch.cuda.is_available()
+    if name == "cuda" and not there:
+        raise UsageError("--device cuda: torch finds no GPU here; choose --device cpu")
+    return torch.device("cuda" if name != "cpu" and there else "cpu")
+
+
+def begin(
+    request: Request, tell: Tell | None = None, interrupted: Callable[[], int] = lambda: 0
+) -> Trainer:
+    """Train a new run to its end.
+
+    Raises
+    ------
+    UsageError
+        There is a run already, or something cannot be meant.
+    """
+    out = request.out
+    if has_checkpoint(out) or (out / LOG).exists():
+        raise UsageError(
+            f"{out}: a run is there already: go on with it by --resume, or choose another --out"
+        )
+    if out.exists() and not out.is_dir():
+        raise UsageError(f"{out}: --out: expected a folder, this is a file")
+    trainer, stages = _prepared(request, tell, interrupted)
+    out.mkdir(parents=True, exist_ok=True)
+    trainer.fit(stages)
+    return trainer
+
+
+def resume(
+    request: Request,
+    asked: Mapping[str, Any],
+    tell: Tell | None = None,
+    interrupted: Callable[[], int] = lambda: 0,
+) -> Trainer:
+    """Go on with a run from its last checkpoint.
+
+    Parameters
+    ----------
+    request
+        Where, on which dataset and device; its config counts for nothing.
+    asked
+        What was asked for besides, to be compared: `method`, `config`; `parts` are gone through.
+    tell, interrupted
+        See `Trainer`.
+
+    Raises
+    ------
+    UsageError
+        The checkpoint is of another method, config or dataset.
+    CorruptDataError
+        It is damaged.
+    """
+    since = read(request.out)
+    if asked.get("method") not in {None, since.method}:
+        raise UsageError(
+            f"{request.out}: a run of method {since.method!r}, asked for {asked['method']!r}: "
+            "leave --method out, or choose another --out"
+        )
+    if asked.get("config") is not None:
+        _compare(request.out, plain(since.config), plain(asked["config"]))
+    place = _place(since)
+    if asked.get("parts"):
+        check_parts(asked["parts"])
+        place.parts = list(asked["parts"])
+    request = dataclasses.replace(
+        request, method=since.method, config=since.config, parts=tuple(place.parts)
+    )
+    trainer, stages = _prepared(request, tell, interrupted, since, place)
+    known = since.progress.get("dataset")
+    if known != trainer.data.fingerprint:
+        raise UsageError(
+            f"{request.dataset}: fingerprint {trainer.data.fingerprint}, the run was trained on "
+            f"{known}: give the same dataset"
+        )
+    _check_part(request.out, place, trainer, stages)
+    trainer.fit(stages)
+    return trainer
+
+
+def forecast(request: Request) -> list[tuple[str, int, float]]:
+    """Return (stage, environment steps, seconds) of a run, from a short measurement.
+
+    Nothing is written. Validation and checkpoints are not counted.
+    """
+    trainer, stages = _prepared(request, None, lambda: 0)
+    given = request.config.ppo
+    found = []
+    for stage in stages:
+        now = trainer.open(stage)
+        try:
+            trainer.update(now)
+            began = time.perf_counter()
+            for _ in range(_MEASURED):
+                trainer.update(now)
+            each = (time.perf_counter() - began) / _MEASURED
+        finally:
+            now.task.task.close()
+        steps = stage.updates * given.environments * given.steps
+        found.append((stage.name, steps, each * stage.updates))
+    if request.clones:
+        cloning = request.config.cloning
+        frames = cloning.frames * cloning.epochs
+        # An update of cloning is one pass; one of PPO a rollout and several passes.
+        _, steps, seconds = found[-1]
+        found.insert(0, ("cloning", 0, seconds / steps * frames / (1 + given.epochs) * 2))
+    return found
+
+
+def _prepared(
+    request: Request,
+    tell: Tell | None,
+    interrupted: Callable[[], int],
+    since: Checkpoint | None = None,
+    place: Place | None = None,
+) -> tuple[Trainer, list[Stage]]:
+    config = request.config
+    torch.set_num_threads(config.run.threads)
+    data = TrainingData(request.dataset)
+    with torch.device("meta"):
+        agent = make_agent(request.method, config)
+    if not agent.optimised():
+        names = ", ".join(name for name in agent_names() if name != request.method)
+        raise UsageError(f"method {request.method!r} has nothing to learn; expected one of {names}")
+    stages = plan(config, request.parts, hierarchical=isinstance(agent, Hierarchy))
+    for single in {stage.single_room for stage in stages}:
+        data.episodes(single_room=single)
+    place = place or Place(list(request.parts), request.clones)
+    trainer = Trainer(
+        request.out, data, request.method, config, device_of(request.device), place,
+        since=since, tell=tell, interrupted=interrupted,
+    )  # fmt: skip
+    return trainer, stages
+
+
+def _place(since: Checkpoint) -> Place:
+    """Return where a run was.
+
+    Raises
+    ------
+    CorruptDataError
+        The checkpoint does not say.
+    """
+    blank = dataclasses.asdict(Place([], clones=False))
+    said: dict[str, Any] = {name: since.progress.get(name) for name in blank}
+    for name, value in blank.items():
+        kinds = (int, float) if isinstance(value, float) else type(value)
+        if not isinstance(said[name], kinds):
+            raise CorruptDataError(f"checkpoint: progress: {name}: got {said[name]!r}")
+    place = Place(**said)
+    check_parts(place.parts)
+    return place
+
+
+def _check_part(out: Path, place: Place, trainer: Trainer, stages: Sequence[Stage]) -> None:
+    """Refuse to leave a stage unfinished."""
+    known = plan(trainer.config, PARTS, hierarchical=isinstance(trainer.agent, Hierarchy))
+    unfinished = {stage.name for stage in known if place.done < stage.updates}
+    if place.stage in unfinished and place.stage not in {stage.name for stage in stages}:
+        part = place.stage.split("-")[0]
+        raise UsageError(
+            f"{out}: stage {place.stage} is not finished: go on with it first (--stages {part},…)"
+        )
+
+
+def _compare(out: Path, known: Any, asked: Any, key: str = "") -> None:  # noqa: ANN401 - plain values
+    if isinstance(known, dict):
+        for name, value in known.items():
+            _compare(out, value, asked[name], f"{key}.{name}".lstrip("."))
+    elif known != asked:
+        raise UsageError(
+            f"{out}: {key} is {known!r} in this run, asked for {asked!r}: leave settings out "
+            "with --resume, or choose another --out"
+        )
+
+
+def _toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UsageError(f"cannot read config {path}: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UsageError(f"config {path} is not TOML: {error}") from error
