@@ -103,7 +103,7 @@ def stages_of(camera: Camera, view: View) -> dict[str, float]:
     """Microseconds one picture takes in Python, in culling and drawing, and in shading."""
     out = camera.frames(1)
     camera.render([view], out)
-    scratch = camera._scratch  # noqa: SLF001 - what is inside is what is measured
+    scratch = camera._scratch
     assert scratch is not None
     axes = camera_axes(view.yaw_deg, view.horizon_deg)
     eye = np.array((view.x, view.y, view.z))

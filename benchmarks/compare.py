@@ -112,7 +112,7 @@ def _theirs_on(site: naive.Site, episode: Episode) -> tuple[bool, bool]:
     steps, way = naive.judge(site, start, goal, shapes)
     clear = naive.steps_between(site.grid, start, goal)
     ways = _near(way, episode.way_m) and _near(
-        naive.length(site.sight.path(naive._metres(start), naive._metres(goal)) or []),  # noqa: SLF001
+        naive.length(site.sight.path(naive._metres(start), naive._metres(goal)) or []),
         episode.clear_m,
     )
     return steps == episode.steps and clear == episode.clear_steps, ways
@@ -125,7 +125,7 @@ def _ours_on(site: Site, episode: naive.NaiveEpisode) -> tuple[bool, bool]:
     for shape in shapes:
         lattice.add(shape)
     steps = lattice.distance(episode.start, episode.goal)
-    ends = naive._metres(episode.start), naive._metres(episode.goal)  # noqa: SLF001
+    ends = naive._metres(episode.start), naive._metres(episode.goal)
     way = site.ways.distance(*ends, Polygons.joined(shapes))
     clear = site.lattice.distance(episode.start, episode.goal)
     ways = _near(way, episode.way_m) and _near(site.ways.distance(*ends), episode.clear_m)

@@ -75,7 +75,7 @@ def measure(ds: Dataset[Any], records: int) -> dict[str, Any]:
     ds[0]  # opens the first file
 
     def cold(row: int) -> None:
-        ds.shelf._groups.clear()  # noqa: SLF001 - what a random access to another group finds
+        ds.shelf._groups.clear()
         _ = ds[row]
 
     for row in rows:
