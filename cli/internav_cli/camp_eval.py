@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,8 +19,6 @@ if TYPE_CHECKING:
     from internav_data.camp.verdict import Methods
     from internav_data.dataset import Dataset
 
-_CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=|!=|==|=|<|>)\s*(.+?)\s*")
-_WORDS = {"true": True, "false": False}
 _REPORT = "report.html"
 
 
@@ -74,7 +71,7 @@ tables.md, tables.json, report.html.""",
 @DATASET
 @click.option(
     "--split",
-    type=click.Choice(["train", "val", "test"]),
+    type=click.Choice(["train", "val", "test", "all"]),
     default="test",
     show_default=True,
     help="Which episodes.",
@@ -197,11 +194,13 @@ def _who(run: str) -> tuple[list[str], Path | None]:
 
 def _dataset(given: dict[str, Any]) -> Dataset[Any]:
     from internav_data.dataset import load_dataset
+    from internav_data.dataset.select import condition
 
-    filters = [_condition(text) for text in given["conditions"]]
+    filters = [condition(text) for text in given["conditions"]]
     if given["episodes_per_scene"] is not None:
         filters.append(("index", "<", given["episodes_per_scene"]))
-    return load_dataset(given["dataset"], given["split"], filters or None)
+    split = None if given["split"] == "all" else given["split"]
+    return load_dataset(given["dataset"], split, filters or None)
 
 
 def _settings(given: dict[str, Any]) -> Settings:
@@ -209,20 +208,6 @@ def _settings(given: dict[str, Any]) -> Settings:
 
     names = ("seed", "batch", "workers", "max_steps", "limit")
     return Settings(**{name: given[name] for name in names})
-
-
-def _condition(text: str) -> tuple[str, str, object]:
-    found = _CONDITION.fullmatch(text)
-    if found is None:
-        raise click.UsageError(f"--where {text!r}: expected COLUMN=VALUE, as in room_count<=3")
-    name, operator, word = found.groups()
-    value: object = _WORDS.get(word.lower(), word)
-    for kind in (float, int):
-        try:
-            value = kind(word)
-        except ValueError:
-            continue
-    return name, operator, value
 
 
 def _same_dataset(path: Path, evaluation: Evaluation) -> Dataset[Any]:

@@ -136,8 +136,8 @@ class AuxiliaryTasks:
         """See `Task`."""
         states = [state for _, _, env in self._parts for state in env.state()]
         return [
-            {**asdict(state), **note, "order": self._seed}
-            for state, note in zip(states, self._notes, strict=True)
+            {**asdict(state), **note, "order": self._seed + k}
+            for k, (state, note) in enumerate(zip(states, self._notes, strict=True))
         ]
 
     def restore(self, states: Sequence[Mapping[str, Any]]) -> Observations:

@@ -139,6 +139,14 @@ class StagesConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class DataConfig:
+    """Which episodes of the dataset."""
+
+    where: tuple[str, ...] = ()
+    """Conditions on columns that all hold, as in "clear_m<=6"; in training and validation."""
+
+
+@dataclass(frozen=True, slots=True)
 class RunConfig:
     """How a run goes about it."""
 
@@ -176,6 +184,8 @@ class CampConfig:
     """Cloning the expert."""
     stages: StagesConfig = field(default_factory=StagesConfig)
     """How many steps, where."""
+    data: DataConfig = field(default_factory=DataConfig)
+    """Which episodes."""
     run: RunConfig = field(default_factory=RunConfig)
     """How a run goes about it."""
 

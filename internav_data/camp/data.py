@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 from internav_data.camp.evaluation import Settings, evaluate
 from internav_data.camp.players import AgentPlayer
 from internav_data.dataset import load_dataset
+from internav_data.dataset.select import condition
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from internav_data.camp.agents import Agent
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
     from internav_data.dataset import Dataset
     from internav_data.records import Episode
 
-_SINGLE = [("room_count", "==", 1)]
+_SINGLE = ("room_count", "==", 1)
 _MEANS = ("success", "spl", "sts", "distance_m", "steps")
 
 
@@ -30,6 +32,8 @@ class TrainingData:
     ----------
     path
         A folder that `internav-gen generate` wrote.
+    where
+        Conditions on columns, as in "clear_m<=6".
 
     Raises
     ------
@@ -39,8 +43,8 @@ class TrainingData:
         It has nothing to train on, or no outcomes.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: Path, where: Sequence[str] = ()) -> None:
+        self.path, self._where = path, [condition(text) for text in where]
         episodes = self.episodes()
         if any(obstacle.outcomes is None for obstacle in episodes[0].obstacles):
             raise UsageError(
@@ -50,9 +54,11 @@ class TrainingData:
 
     def episodes(self, *, single_room: bool = False) -> Dataset[Episode]:
         """Return the training split, or its scenes of a single room."""
-        found = load_dataset(self.path, "train", _SINGLE if single_room else None)
+        conditions = [*self._where, *([_SINGLE] if single_room else [])]
+        found = load_dataset(self.path, "train", conditions or None)
         if not len(found):
             what = "scenes of a single room" if single_room else "training episodes"
+            what += " for which --where holds" if self._where else ""
             advice = (
                 "generate some (--rooms 1-3), or train --stages all"
                 if single_room
@@ -61,15 +67,15 @@ class TrainingData:
             raise UsageError(f"{self.path}: there are no {what}; {advice}")
         return found
 
-    def task(self, stage: Stage, config: CampConfig, *, ids: bool) -> Task:
-        """Return the environments of a stage."""
+    def task(self, stage: Stage, config: CampConfig, own: range, *, ids: bool) -> Task:
+        """Return those environments of a stage whose numbers are in `own`."""
         if not stage.tasks:
-            count = config.ppo.environments
-            return self.main(config, count, ids=ids, single_room=stage.single_room)
+            return self.main(config, len(own), ids=ids, single_room=stage.single_room)
         from internav_data.camp.auxiliary_tasks import AuxiliaryTasks  # noqa: PLC0415 - the camera
 
         episodes = self.episodes(single_room=stage.single_room)
-        return AuxiliaryTasks(episodes, stage.tasks, **_arguments(config, ids=ids))
+        tasks = stage.tasks[own.start : own.stop]
+        return AuxiliaryTasks(episodes, tasks, **_arguments(config, ids=ids))
 
     def main(self, config: CampConfig, count: int, *, ids: bool, single_room: bool = False) -> Task:
         """Return environments of the main task."""
@@ -81,7 +87,7 @@ class TrainingData:
     def validate(self, agent: Agent, method: str, config: CampConfig) -> dict[str, float] | None:
         """Let an agent play the validation split: means over its episodes, None without any."""
         limit = config.run.validation_episodes
-        episodes = load_dataset(self.path, "val")
+        episodes = load_dataset(self.path, "val", self._where or None)
         if not limit or not len(episodes):
             return None
         size, ids = config.network.image_size, agent.wants_ids

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from torch import Tensor
 
-    from internav_data.camp.rollout import Rollout
-
     Row = dict[str, Any]
     """Plain JSON: numbers by name, one level of groups."""
 
@@ -116,11 +114,11 @@ class Window:
         self._episodes: deque[dict[str, float]] = deque((dict(each) for each in kept), size)
         self.ended = 0
 
-    def add(self, rollout: Rollout) -> None:
-        """Take in a rollout's episodes."""
-        self.ended = len(rollout.finished)
-        for each in rollout.finished:
-            self._episodes.append({name: float(value) for name, value in each.metrics.items()})
+    def add(self, ended: Sequence[Mapping[str, Any]]) -> None:
+        """Take in what was said of a rollout's episodes."""
+        self.ended = len(ended)
+        for metrics in ended:
+            self._episodes.append({name: float(value) for name, value in metrics.items()})
 
     def plain(self) -> list[dict[str, float]]:
         """Return what to keep in a checkpoint."""
@@ -158,15 +156,20 @@ def reward_parts(means: Mapping[str, float]) -> dict[str, float]:
     return {**parts, "moves": means.get("return", 0.0) - sum(parts.values())}
 
 
-def decisions(rollout: Rollout) -> Row:
-    """Return what an agent decided in a rollout.
+DECISIVE: Final[tuple[str, ...]] = (
+    "action_probs", "intent", "option", "decide", "end_chance", "forced", "plan", "meant",
+)  # fmt: skip
+"""What `decisions` reads of a record, where it is there."""
+
+
+def decisions(record: Mapping[str, Tensor], rewards: Tensor) -> Row:
+    """Return what an agent decided in a rollout, of what it recorded and was paid: (T, n, …).
 
     `end_chance` is P(Done), the chance of ending the episode; `intent_kl` is the divergence of the
     decision from what was meant, KL(P(omega) || P(omega')), where there is a decision; shares are
     of all steps, lengths in actions.
     """
-    record = rollout.batch.record
-    said: Row = {"reward": float(rollout.rewards.mean())}
+    said: Row = {"reward": float(rewards.mean())}
     if "action_probs" in record:
         said["end_chance"] = float(record["action_probs"][..., DONE].mean())
         if "intent" in record:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import torch
 
@@ -80,32 +80,49 @@ def unpack_optimiser(tensors: Mapping[str, Tensor], optimiser: Optimizer) -> Non
     )
 
 
-def unpack_state(tensors: Mapping[str, Tensor], like: State) -> State:
+def unpack_state(tensors: Mapping[str, Tensor], like: State, own: range, count: int) -> State:
     """Return what the agent remembered; `like` is what it does at a start.
+
+    Parameters
+    ----------
+    tensors
+        Of all `count` environments.
+    like
+        Of this rank's `own` ones.
+    own, count
+        Numbers of environments.
 
     Raises
     ------
     CorruptDataError
         It is another agent's, or of another number of environments.
     """
-    found: State = {}
-    for name, blank in like.items():
-        kept = tensors.get(f"{_STATE}/{name}")
-        if kept is None or kept.shape != blank.shape or kept.dtype != blank.dtype:
-            raise CorruptDataError(
-                f"checkpoint: {_STATE}/{name}: expected {blank.dtype} {tuple(blank.shape)}, got "
-                f"{None if kept is None else (kept.dtype, tuple(kept.shape))}"
-            )
-        found[name] = kept.to(blank.device)
-    return found
+    return {
+        name: _rows(tensors, f"{_STATE}/{name}", blank, own, count) for name, blank in like.items()
+    }
 
 
-def unpack_starts(tensors: Mapping[str, Tensor], like: Tensor) -> Tensor:
-    """Return where an episode begins at the next step, (n,) bool."""
-    starts = tensors.get(_STARTS)
-    if starts is None or starts.shape != like.shape or starts.dtype != like.dtype:
-        raise CorruptDataError(f"checkpoint: {_STARTS}: expected {tuple(like.shape)} booleans")
-    return starts.to(like.device)
+def unpack_starts(tensors: Mapping[str, Tensor], like: Tensor, own: range, count: int) -> Tensor:
+    """Return where an episode begins at the next step, (n,) bool; see `unpack_state`."""
+    return _rows(tensors, _STARTS, like, own, count)
+
+
+def _rows(tensors: Mapping[str, Tensor], name: str, like: Tensor, own: range, count: int) -> Tensor:
+    kept, shape = tensors.get(name), (count, *like.shape[1:])
+    if kept is None or tuple(kept.shape) != shape or kept.dtype != like.dtype:
+        raise CorruptDataError(
+            f"checkpoint: {name}: expected {like.dtype} {shape}, got "
+            f"{None if kept is None else (kept.dtype, tuple(kept.shape))}"
+        )
+    return kept[own.start : own.stop].to(like.device)
+
+
+def unpack_environments(progress: Mapping[str, Any], own: range) -> list[Any]:
+    """Return what the environments with these numbers were."""
+    states = progress.get("environments")
+    if not isinstance(states, list):
+        raise CorruptDataError("checkpoint: progress: environments: expected a list")
+    return states[own.start : own.stop]
 
 
 def unpack_random(tensors: Mapping[str, Tensor]) -> None:

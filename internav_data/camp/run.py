@@ -17,6 +17,7 @@ from internav_data.camp.config import CampConfig, from_mapping, plain, preset
 from internav_data.camp.data import TrainingData
 from internav_data.camp.logbook import LOG
 from internav_data.camp.packing import Place
+from internav_data.camp.ranks import ranks_of
 from internav_data.camp.stages import PARTS, check_parts, plan
 from internav_data.camp.train import Trainer
 from internav_data.generation import values
@@ -83,6 +84,11 @@ def device_of(name: str) -> torch.device:
     if name == "cuda" and not there:
         raise UsageError("--device cuda: torch finds no GPU here; choose --device cpu")
     return torch.device("cuda" if name != "cpu" and there else "cpu")
+
+
+def default_preset(device: str) -> str:
+    """Return the preset that suits this machine: `paper` where there is a GPU, else `small`."""
+    return "paper" if device != "cpu" and torch.cuda.is_available() else "small"
 
 
 def begin(
@@ -197,7 +203,7 @@ def _prepared(
 ) -> tuple[Trainer, list[Stage]]:
     config = request.config
     torch.set_num_threads(config.run.threads)
-    data = TrainingData(request.dataset)
+    data = TrainingData(request.dataset, config.data.where)
     with torch.device("meta"):
         agent = make_agent(request.method, config)
     if not agent.optimised():
@@ -208,7 +214,7 @@ def _prepared(
         data.episodes(single_room=single)
     place = place or Place(list(request.parts), request.clones)
     trainer = Trainer(
-        request.out, data, request.method, config, device_of(request.device), place,
+        request.out, data, request.method, config, ranks_of(device_of(request.device)), place,
         since=since, tell=tell, interrupted=interrupted,
     )  # fmt: skip
     return trainer, stages

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -11,11 +12,12 @@ import torch
 from internav_data.camp import ppo
 from internav_data.camp.agents import Auxiliary, make_agent
 from internav_data.camp.checkpoint import Checkpoint, best_score, save
+from internav_data.camp.cloning import CLONING, clone_expert
 from internav_data.camp.collect import Collector, orders_of, uniforms_of
-from internav_data.camp.imitation import Demonstrations, clone, experts_of
-from internav_data.camp.logbook import Logbook, Window, decisions, rates
+from internav_data.camp.logbook import DECISIVE, Logbook, Window, decisions, rates
 from internav_data.camp.packing import (
     packed,
+    unpack_environments,
     unpack_optimiser,
     unpack_random,
     unpack_starts,
@@ -37,12 +39,13 @@ if TYPE_CHECKING:
     from internav_data.camp.data import TrainingData
     from internav_data.camp.logbook import Row
     from internav_data.camp.packing import Place
+    from internav_data.camp.ranks import Ranks
+    from internav_data.camp.rollout import Rollout
     from internav_data.camp.stages import Stage
     from internav_data.camp.tasks import Task
 
     Tell = Callable[[Row], object]
 
-CLONING: Final = "cloning"
 INTERRUPTED: Final = "saved; go on with --resume"
 
 
@@ -66,8 +69,10 @@ class Trainer:
         The run's folder.
     data
         Episodes.
-    method, config, device
-        Who learns, how, where.
+    method, config
+        Who learns, and how.
+    ranks
+        Who learns beside this process; their device.
     place
         Where it is.
     since
@@ -84,7 +89,7 @@ class Trainer:
         data: TrainingData,
         method: str,
         config: CampConfig,
-        device: torch.device,
+        ranks: Ranks,
         place: Place,
         *,
         since: Checkpoint | None = None,
@@ -92,14 +97,17 @@ class Trainer:
         interrupted: Callable[[], int] = lambda: 0,
     ) -> None:
         self.run, self.data, self.method, self.config = run, data, method, config
-        self.place, self._since, self._tell, self._interrupted = place, since, tell, interrupted
+        self.place, self.since, self._tell, self._interrupted = place, since, tell, interrupted
+        self.ranks, self._count = ranks, config.ppo.environments
+        self.own = ranks.share(self._count, "ppo.environments")
         self.agent = make_agent(method, config)
         said = since.progress if since else {}
         if since:
             self.agent.load_state_dict(dict(since.weights))
-        self.agent.to(device)
+        self.agent.to(ranks.device)
         self._window = Window(config.run.window, said.get("window", ()))
         self._began = time.perf_counter()
+        self._updates = 0
         self.log: Logbook | None = None
 
     def fit(self, stages: list[Stage]) -> None:
@@ -112,17 +120,22 @@ class Trainer:
         NotFiniteError
             NaN or infinity turned up; the last checkpoint stands.
         """
-        said, place, config = (self._since.progress if self._since else {}), self.place, self.config
+        said, place, config = (self.since.progress if self.since else {}), self.place, self.config
         position, board = int(said.get("log", 0)), config.run.tensorboard
-        with Logbook(self.run, position, place.environment_steps, board=board) as self.log:
+        with ExitStack() as kept:
+            if self.ranks.first:
+                book = Logbook(self.run, position, place.environment_steps, board=board)
+                self.log = kept.enter_context(book)
             self._began = time.perf_counter()
             if place.clones and place.stage in {"", CLONING}:
-                self._clone()
+                clone_expert(self)
             names = [stage.name for stage in stages]
             first = names.index(place.stage) if place.stage in names else 0
+            left = sum(stage.updates for stage in stages[first:])
+            self._updates = place.updates + left - (place.done if place.stage in names else 0)
             for stage in stages[first:]:
                 if stage.name != place.stage:
-                    place.stage, place.done, self._since = stage.name, 0, None
+                    place.stage, place.done, self.since = stage.name, 0, None
                     self._window = Window(config.run.window)
                 if place.done < stage.updates:
                     self._learn(stage)
@@ -130,23 +143,25 @@ class Trainer:
     def open(self, stage: Stage) -> Running:
         """Make a stage's environments and optimiser, as they were in the checkpoint if there is
         one."""  # noqa: D205, D209 - one sentence
-        task = Timed(self.data.task(stage, self.config, ids=self.agent.wants_ids))
+        own = self.own
+        task = Timed(self.data.task(stage, self.config, own, ids=self.agent.wants_ids))
         learner: Agent = self.agent
         if stage.tasks:
-            learner = Auxiliary(self.agent, stage.tasks)  # type: ignore[arg-type] # a Hierarchy
+            tasks = stage.tasks[own.start : own.stop]
+            learner = Auxiliary(self.agent, tasks, stage.tasks)  # type: ignore[arg-type] # `plan`
         optimiser = torch.optim.Adam(learner.optimised(), stage.rate)
-        seed = order_seed(self.config.seed, stage.name)
+        seed = order_seed(self.config.seed, stage.name) + own.start
         collector = Collector(task, learner, seed)
-        if self._since is None or not self.place.done:
+        if self.since is None or not self.place.done:
             if not stage.tasks:
                 self.agent.synchronise()
             collector.begin(task.task.begin(seed))
         else:
-            tensors = self._since.training
+            tensors, count = self.since.training, self._count
             unpack_optimiser(tensors, optimiser)
-            collector.state = unpack_state(tensors, collector.state)
-            collector.starts = unpack_starts(tensors, collector.starts)
-            collector.begin(task.task.restore(self._since.progress.get("environments", ())))
+            collector.state = unpack_state(tensors, collector.state, own, count)
+            collector.starts = unpack_starts(tensors, collector.starts, own, count)
+            collector.begin(task.task.restore(unpack_environments(self.since.progress, own)))
             unpack_random(tensors)
         return Running(stage, learner, optimiser, collector, task)
 
@@ -157,55 +172,61 @@ class Trainer:
         over = place.done / stage.updates
         over = stage.decay_from + (stage.decay_to - stage.decay_from) * over
         ppo.set_rate(now.optimiser, stage.rate, over)
-        numbers = range(config.environments)
-        uniforms = uniforms_of(self.config.seed, place.updates, numbers, config.steps)
+        uniforms = uniforms_of(self.config.seed, place.updates, self.own, config.steps)
         rollout = now.collector.collect(uniforms)
         collected = time.perf_counter() - began
         learnt = place.critics.get(stage.critic, 0)
         new = learnt < config.critic_rollouts and bool(now.learner.critics())
-        orders = orders_of(self.config.seed, place.updates, config.epochs, config.environments)
-        said = ppo.update(now.learner, now.optimiser, rollout, config, orders, critic_only=new)
+        orders = orders_of(self.config.seed, place.updates, config.epochs, len(self.own))
+        said = ppo.update(
+            now.learner, now.optimiser, rollout, config, orders,
+            critic_only=new, reduce=self.ranks.reduce,
+        )  # fmt: skip
         steps = config.environments * config.steps
         place.done, place.updates = place.done + 1, place.updates + 1
         place.environment_steps += steps
         place.critics[stage.critic] = learnt + 1
         if not stage.tasks and place.done % self.config.agent.sync_every == 0:
             self.agent.synchronise()
-        self._window.add(rollout)
-        spent = self._lap()
+        decided = self._noted(rollout)
+        spent = self.lap()
         return {
-            "step": place.environment_steps, "update": place.updates, "stage": stage.name,
-            "stage_update": place.done, "learning_rate": stage.rate * (1.0 - over),
-            "critic_only": int(new), "episode": self._window.row(), "decision": decisions(rollout),
-            "ppo": said, "time": rates(steps, (now.task.spent_s, collected, spent)),
+            "step": place.environment_steps, "update": place.updates, "updates": self._updates,
+            "stage": stage.name, "stage_update": place.done,
+            "learning_rate": stage.rate * (1.0 - over), "critic_only": int(new),
+            "episode": self._window.row(), "decision": decided, "ppo": said,
+            "time": rates(steps, (now.task.spent_s, collected, spent)),
         }  # fmt: skip
 
     def validate(self) -> float | None:
-        """Play the validation split; return the share of successes, None without episodes."""
+        """Play the validation split; return the share of successes, None without episodes.
+
+        The first rank does; the others wait for it at the next sum.
+        """
+        if not self.ranks.first:
+            return None
         found = self.data.validate(self.agent, self.method, self.config)
         if found is None:
             return None
         self.agent.train()
         row = {"step": self.place.environment_steps, "stage": self.place.stage}
-        self._write({**row, "validation": found})
+        self.write({**row, "validation": found})
         return found["success"]
 
     def _learn(self, stage: Stage) -> None:
         now, place, every = self.open(stage), self.place, self.config.run
         try:
             if not place.updates:
-                self._save(now.optimiser, now.task, now.collector)
+                self.save(now.optimiser, now.task, now.collector)
             while place.done < stage.updates:
-                self._write(self._finite(now))
+                self.write(self._finite(now))
                 last = place.done == stage.updates
-                score = None
-                if not stage.tasks and (last or place.done % every.validate_every == 0):
-                    score = self.validate()
-                stop = self._interrupted()
-                due = last or stop or place.done % every.checkpoint_every == 0
-                if due or score is not None:
-                    self._save(now.optimiser, now.task, now.collector, score)
-                self._stop(stop)
+                judged = not stage.tasks and (last or place.done % every.validate_every == 0)
+                score = self.validate() if judged else None
+                stop = self.asked()
+                if last or stop or judged or place.done % every.checkpoint_every == 0:
+                    self.save(now.optimiser, now.task, now.collector, score)
+                self.stop(stop)
         finally:
             now.task.task.close()
 
@@ -213,76 +234,69 @@ class Trainer:
         try:
             return self.update(now)
         except NotFiniteError as error:
-            seed = order_seed(self.config.seed, now.stage.name)
+            seed = order_seed(self.config.seed, now.stage.name) + self.own.start
             raise NotFiniteError(
                 f"{error} (stage {now.stage.name}, update {self.place.updates}; environment k has "
                 f"seed {seed} + k; {self.run} keeps its last checkpoint)"
             ) from error
 
-    def _clone(self) -> None:
-        place, given = self.place, self.config.cloning
-        task = self.data.main(self.config, given.environments, ids=self.agent.wants_ids)
-        optimiser = torch.optim.Adam(self.agent.optimised(), given.learning_rate)
-        seen = Demonstrations(task, self.agent, experts_of(self.data.episodes()))
-        kept: State = self.agent.initial_state(given.environments)
-        if place.stage == CLONING and self._since is not None:
-            unpack_optimiser(self._since.training, optimiser)
-            kept = unpack_state(self._since.training, kept)
-            states = self._since.progress.get("environments", ())
-            ids = [str(state["episode_id"]) for state in states]
-            seen.resume(task.restore(states), ids, [len(state["actions"]) for state in states])
-        place.stage = CLONING
-        held = [kept]
-        try:
-            for said in clone(
-                self.agent, optimiser, seen, given, order_seed(self.config.seed, CLONING),
-                first=place.cloned_updates, state=kept, keep=lambda state: held.insert(0, state),
-            ):  # fmt: skip
-                del held[1:]
-                place.cloned_updates += 1
-                place.cloned_frames += given.environments * given.steps
-                rate = rates(given.environments * given.steps, [self._lap()] * 3)["steps_per_s"]
-                self._write(
-                    {"step": place.cloned_frames, "cloning": {**said, "frames_per_s": rate}}
-                )
-                stop = self._interrupted()
-                last = said["update"] == said["updates"]
-                if stop or last or place.cloned_updates % self.config.run.checkpoint_every == 0:
-                    self._save(optimiser, task, held[0])
-                self._stop(stop)
-        finally:
-            task.close()
-
-    def _save(
+    def save(
         self,
         optimiser: Optimizer,
         task: Timed | Task,
         of: Collector | State,
         score: float | None = None,
     ) -> None:
+        """Write a checkpoint: of a stage under way, or of cloning (`of` are its hidden states).
+
+        `score` says how good a validation has found it.
+        """
         task = task.task if isinstance(task, Timed) else task
-        more = (of.state, of.starts) if isinstance(of, Collector) else (of, None)
+        ranks = self.ranks
+        state, starts = (of.state, of.starts) if isinstance(of, Collector) else (of, None)
+        state = {name: ranks.joined(kept) for name, kept in state.items()}
+        starts = None if starts is None else ranks.joined(starts)
         progress = {
-            **asdict(self.place), "environments": task.state(), "window": self._window.plain(),
-            "log": self.log.position if self.log else 0, "dataset": self.data.fingerprint,
+            **asdict(self.place), "environments": ranks.listed(task.state()),
+            "window": self._window.plain(), "log": self.log.position if self.log else 0,
+            "dataset": self.data.fingerprint,
         }  # fmt: skip
+        if not ranks.first:
+            return
         best = best_score(self.run)
         better = score if score is not None and (best is None or score >= best) else None
-        weights = self.agent.state_dict()
-        said = Checkpoint(self.method, self.config, weights, progress, packed(optimiser, *more))
-        save(self.run, said, best=better)
+        tensors, weights = packed(optimiser, state, starts), self.agent.state_dict()
+        save(
+            self.run, Checkpoint(self.method, self.config, weights, progress, tensors), best=better
+        )
 
-    def _stop(self, signum: int) -> None:
+    def _noted(self, rollout: Rollout) -> Row:
+        """Take in the episodes that ended on all ranks; return what was decided on them."""
+        ended = self.ranks.listed(
+            [[each.step, self.own[each.environment], each.metrics] for each in rollout.finished]
+        )
+        self._window.add([metrics for _, _, metrics in sorted(ended, key=lambda e: e[:2])])
+        noted = rollout.batch.record
+        record = {n: self.ranks.joined(noted[n], 1) for n in DECISIVE if n in noted}
+        return decisions(record, self.ranks.joined(rollout.rewards, 1))
+
+    def asked(self) -> int:
+        """Return the signal that asked any rank to stop, 0 for none."""
+        return self.ranks.most(self._interrupted())
+
+    def stop(self, signum: int) -> None:
+        """End the run if it was asked to by a signal, 0 for none; all is saved."""
         if signum:
             raise InterruptedRunError(f"{self.run}: {INTERRUPTED}", signum)
 
-    def _write(self, row: Row) -> None:
+    def write(self, row: Row) -> None:
+        """Append to the log, and tell."""
         if self.log is not None:
             self.log.write(row)
-        if self._tell is not None:
+        if self._tell is not None and self.ranks.first:
             self._tell(row)
 
-    def _lap(self) -> float:
+    def lap(self) -> float:
         """Return the seconds since the last time this was asked."""
         now = time.perf_counter()
         spent, self._began = now - self._began, now

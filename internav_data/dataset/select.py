@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,30 @@ if TYPE_CHECKING:
 
 Condition = tuple[str, str, Any]
 Filters = Sequence[Condition] | Sequence[Sequence[Condition]]
+_CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=|!=|==|=|<|>)\s*(.+?)\s*")
+_WORDS = {"true": True, "false": False}
+
+
+def condition(text: str) -> Condition:
+    """Return what a person means by `room_count<=3` or `mode=blocked`.
+
+    Raises
+    ------
+    UsageError
+        It is no condition.
+
+    """
+    found = _CONDITION.fullmatch(text)
+    if found is None:
+        raise UsageError(f"--where {text!r}: expected COLUMN=VALUE, as in room_count<=3")
+    name, operator, word = found.groups()
+    value: object = _WORDS.get(word.lower(), word)
+    for kind in (float, int):
+        try:
+            value = kind(word)
+        except ValueError:
+            continue
+    return name, operator, value
 
 
 def check_columns(names: Sequence[str], spec: TableSpec[Any]) -> None:

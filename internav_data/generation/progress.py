@@ -23,14 +23,58 @@ def clock(seconds: float) -> str:
     return f"{whole} s"
 
 
-class Progress:
-    """Counts what ends and tells it on a stream; silent without one."""
+class Ticker:
+    """Tells a state in one line: on a terminal it renews itself, elsewhere it comes now and then.
+
+    Parameters
+    ----------
+    stream
+        Where; None: nowhere.
+    """
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self._stream = stream
         self._terminal = stream is not None and stream.isatty()
-        self._began = self._told = time.monotonic()
+        self._told = time.monotonic()
         self._width = 0
+
+    def due(self) -> bool:
+        """Return whether it is time to tell again."""
+        every = REDRAW_S if self._terminal else LOG_EVERY_S
+        return self._stream is not None and time.monotonic() - self._told >= every
+
+    def tell(self, line: str) -> None:
+        """Tell the state."""
+        self._told = time.monotonic()
+        if not self._terminal:
+            self.say(line)
+        elif self._stream is not None:
+            self._stream.write("\r" + line.ljust(self._width))
+            self._stream.flush()
+            self._width = len(line)
+
+    def say(self, text: str) -> None:
+        """Tell something that stays on the screen."""
+        if self._stream is None:
+            return
+        self.end()
+        self._stream.write(f"{text}\n")
+        self._stream.flush()
+
+    def end(self) -> None:
+        """Remove the line that renews itself."""
+        if self._stream is not None and self._terminal and self._width:
+            self._stream.write("\r" + " " * self._width + "\r")
+            self._stream.flush()
+            self._width = 0
+
+
+class Progress(Ticker):
+    """Counts what ends and tells it on a stream; silent without one."""
+
+    def __init__(self, stream: TextIO | None = None) -> None:
+        super().__init__(stream)
+        self._began = self._told
         self.scenes = self.scenes_before = self.scenes_total = 0
         self.episodes = self.episodes_left = 0
         self.quarantined = 0
@@ -69,37 +113,8 @@ class Progress:
 
     def tick(self) -> None:
         """Tell the state if it is time to."""
-        every = REDRAW_S if self._terminal else LOG_EVERY_S
-        if self._stream is not None and time.monotonic() - self._told >= every:
-            self._told = time.monotonic()
-            self._show(self.line())
-
-    def say(self, text: str) -> None:
-        """Tell something that stays on the screen."""
-        if self._stream is None:
-            return
-        self._clear()
-        self._stream.write(f"{text}\n")
-        self._stream.flush()
-
-    def end(self) -> None:
-        """Remove the line that renews itself."""
-        self._clear()
-
-    def _show(self, text: str) -> None:
-        if not self._terminal:
-            self.say(text)
-            return
-        if self._stream is not None:
-            self._stream.write("\r" + text.ljust(self._width))
-            self._stream.flush()
-            self._width = len(text)
-
-    def _clear(self) -> None:
-        if self._stream is not None and self._terminal and self._width:
-            self._stream.write("\r" + " " * self._width + "\r")
-            self._stream.flush()
-            self._width = 0
+        if self.due():
+            self.tell(self.line())
 
 
 def to_stderr() -> Progress:

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 from internav_data.dataset.jsonschemas import descriptions
 
 if TYPE_CHECKING:
-    from internav_data.generation.config import GenerationConfig
+    from _typeshed import DataclassInstance
 
 WIDTH = 96
 
 
-def config_toml(config: GenerationConfig) -> str:
-    """Return all settings of a config with what they mean; `load_config` reads it back."""
-    head = "Settings of internav-gen: --config FILE reads them, --set KEY=VALUE overrides one."
+def config_toml(config: DataclassInstance, program: str = "internav-gen") -> str:
+    """Return all settings of a config with what they mean; its program reads it back."""
+    head = f"Settings of {program}: --config FILE reads them, --set KEY=VALUE overrides one."
     return "\n".join([f"# {head}", *_table(config, "")]) + "\n"
 
 

@@ -34,12 +34,17 @@ class Auxiliary(Agent):
         Whose policies are trained.
     tasks
         The option of each environment: NAVIGATE, PUSH or PICK.
+    trained
+        Options that are trained, here or on other ranks; those of the environments if not given.
     """
 
-    def __init__(self, hierarchy: Hierarchy, tasks: Sequence[int]) -> None:
+    def __init__(
+        self, hierarchy: Hierarchy, tasks: Sequence[int], trained: Sequence[int] | None = None
+    ) -> None:
         super().__init__()
         self.hierarchy = hierarchy
         self._tasks = torch.tensor(tasks, dtype=torch.int64)
+        self._trained = sorted(set(tasks if trained is None else trained))
 
     def initial_state(self, count: int) -> State:
         """See `Agent`."""
@@ -110,17 +115,15 @@ class Auxiliary(Agent):
         raise NotImplementedError("auxiliary tasks have no expert: clone into the hierarchy")
 
     def optimised(self) -> list[Parameter]:
-        """See `Agent`: encoders and policies that have environments here, critics too."""
-        tasks = sorted(set(self._tasks.tolist()))
+        """See `Agent`: encoders and policies that have environments, critics too."""
         encoders = self.hierarchy.encoders
-        used = [encoders[k] for k in sorted({task % len(encoders) for task in tasks})]
-        parts = [*used, *(self.hierarchy.policies[task] for task in tasks)]
+        used = [encoders[k] for k in sorted({task % len(encoders) for task in self._trained})]
+        parts = [*used, *(self.hierarchy.policies[task] for task in self._trained)]
         return [parameter for part in parts for parameter in part.parameters()]
 
     def critics(self) -> list[Parameter]:
         """See `Agent`."""
-        tasks = sorted(set(self._tasks.tolist()))
-        return [p for k in tasks for p in self.hierarchy.policies[k].critic.parameters()]
+        return [p for k in self._trained for p in self.hierarchy.policies[k].critic.parameters()]
 
 
 def _row(known: dict[str, Tensor]) -> dict[str, Tensor]:

@@ -1,0 +1,214 @@
+"""`camp-train`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from internav_cli.main import launch
+from internav_cli.options import JSON
+
+if TYPE_CHECKING:
+    from internav_data.camp.config import CampConfig
+    from internav_data.camp.run import Request
+
+_SETTINGS = {
+    "seed": "seed",
+    "conditions": "data.where",
+    "intent": "agent.intent",
+    "sync_every": "agent.sync_every",
+    "steps": "stages.steps",
+    "workers": "run.workers",
+}
+"""Options that are settings, and their keys."""
+
+
+@click.command(
+    "camp-train",
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="""\b
+Examples:
+  camp-train data/mine                                    CaMP from scratch, into runs/camp-0
+  camp-train data/mine --init-from expert --steps 100000  clone the dataset's expert first
+  camp-train data/mine --method ppo --seed 1 --out runs/ppo-1
+  camp-train data/mine --where "clear_m<=6" --set run.max_steps=200
+  camp-train data/mine --dry-run                          how long it would take
+  camp-train data/mine --out runs/camp-0 --resume         go on after Ctrl-C
+  camp-train --print-config > mine.toml                   all settings, to be changed
+  torchrun --nproc-per-node 2 -m internav_cli.camp_train data/mine   several GPUs
+
+\b
+Ctrl-C finishes the update, saves and exits with 130; a second one leaves the
+last checkpoint as it is. Measure what was trained by camp-eval RUN DATASET.
+Exit codes: 0 good, 1 error, 2 usage, 5 corrupt data, 6 NaN or infinity, 130/143
+interrupted.""",
+)
+@click.argument("dataset", type=click.Path(path_type=Path), required=False)
+@click.option(
+    "--method",
+    help="camp, ppo, ppo-intent, hrl, nie, or one of your own.  [default: camp]",
+)
+@click.option(
+    "--out", type=click.Path(path_type=Path), help="The run's folder.  [default: runs/METHOD-SEED]"
+)
+@click.option(
+    "--preset",
+    type=click.Choice(["small", "paper"]),
+    help="Sizes and schedule.  [default: paper with a GPU, else small]",
+)
+@click.option(
+    "--config",
+    "config_file",
+    type=click.Path(path_type=Path),
+    help="TOML file with any of the settings that --print-config lists.",
+)
+@click.option(
+    "--set",
+    "overrides",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="One setting, as in --set ppo.steps=32; wins over the file.  [repeatable]",
+)
+@click.option("--seed", type=int, help="Every random number derives from it.  [default: 0]")
+@click.option("--steps", type=int, help="Environment steps of all stages together.")
+@click.option(
+    "--where",
+    "conditions",
+    multiple=True,
+    metavar="COLUMN=VALUE",
+    help="Only these episodes, as in room_count<=3; also != < > >=.  [repeatable]",
+)
+@click.option(
+    "--stages",
+    metavar="PARTS",
+    help="Some of auxiliary,single,all, in order.  [default: all three]",
+)
+@click.option(
+    "--init-from", type=click.Choice(["expert"]), help="Clone the dataset's expert first."
+)
+@click.option(
+    "--intent",
+    type=click.Choice(["integrated", "policy", "recursive", "none"]),
+    help="What global is told (Table 4).  [default: integrated]",
+)
+@click.option("--sync-every", type=int, help="Rollouts between copies of global.  [default: 3]")
+@click.option("--workers", type=int, help="Processes that step environments.  [default: none]")
+@click.option(
+    "--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto", show_default=True
+)
+@click.option("--resume", is_flag=True, help="Go on from the last checkpoint of --out.")
+@click.option("--dry-run", is_flag=True, help="Tell how long it would take; write nothing.")
+@click.option("--print-config", is_flag=True, help="Print all settings as TOML and stop.")
+@JSON
+def command(**given: Any) -> int:  # noqa: ANN401 - the options above
+    """Train an agent on DATASET: CaMP, one of its baselines, or your own."""
+    if given["print_config"]:
+        from internav_data.generation.toml import config_toml
+
+        click.echo(config_toml(_config(given), "camp-train"), nl=False)
+        return 0
+    if given["dataset"] is None:
+        raise click.UsageError("say what to train on: camp-train DATASET")
+    request = _request(given)
+    if given["dry_run"]:
+        return _forecast(request, as_json=given["as_json"])
+    return _train(request, given)
+
+
+def _settings(given: dict[str, Any]) -> dict[str, Any]:
+    """Return the options that are settings, by dotted key."""
+    chosen = {key: given[name] for name, key in _SETTINGS.items()}
+    return {key: value for key, value in chosen.items() if value not in (None, ())}
+
+
+def _config(given: dict[str, Any]) -> CampConfig:
+    from internav_data.camp.run import config_of, default_preset
+
+    name = given["preset"] or default_preset(given["device"])
+    return config_of(name, given["config_file"], given["overrides"], _settings(given))
+
+
+def _request(given: dict[str, Any]) -> Request:
+    from internav_data.camp.run import Request
+    from internav_data.camp.stages import PARTS
+
+    config, method = _config(given), given["method"] or "camp"
+    parts = tuple((given["stages"] or ",".join(PARTS)).replace(" ", "").split(","))
+    return Request(
+        dataset=given["dataset"],
+        out=given["out"] or Path("runs") / f"{method}-{config.seed}",
+        method=method,
+        config=config,
+        parts=parts,
+        clones=given["init_from"] is not None,
+        device=given["device"],
+    )
+
+
+def _forecast(request: Request, *, as_json: bool) -> int:
+    from internav_data.camp.run import forecast
+    from internav_data.generation.progress import clock
+
+    told = forecast(request)
+    if as_json:
+        names = ("stage", "steps", "seconds")
+        click.echo(json.dumps([dict(zip(names, row, strict=True)) for row in told]))
+        return 0
+    for name, steps, seconds in told:
+        click.echo(f"{name:<20} {steps:>12,} steps  {clock(seconds):>12}")
+    whole = sum(seconds for _, _, seconds in told)
+    click.echo(f"{'all':<20} {sum(steps for _, steps, _ in told):>12,} steps  {clock(whole):>12}")
+    click.echo("measured over a few updates; validation is not in it", err=True)
+    return 0
+
+
+def _train(request: Request, given: dict[str, Any]) -> int:
+    from internav_data.camp.run import begin, resume
+    from internav_data.camp.telling import Teller
+    from internav_data.generation.interrupts import Interrupts
+
+    teller = Teller(sys.stderr)
+    with Interrupts() as interrupts:
+
+        def interrupted() -> int:
+            return interrupts.signum
+
+        try:
+            if given["resume"]:
+                trainer = resume(request, _asked(given, request), teller, interrupted)
+            else:
+                trainer = begin(request, teller, interrupted)
+        finally:
+            teller.end()
+    if not trainer.ranks.first:
+        return 0
+    click.echo(teller.summary(request.out), err=True)
+    click.echo(f"measure it: camp-eval {request.out} {request.dataset}", err=True)
+    if given["as_json"]:
+        click.echo(json.dumps(teller.plain(request.out)))
+    return 0
+
+
+def _asked(given: dict[str, Any], request: Request) -> dict[str, Any]:
+    """Return what was asked for besides --resume, to be compared with the run."""
+    names = ("preset", "config_file", "overrides")
+    asked = any(given[name] for name in names) or bool(_settings(given))
+    return {
+        "method": given["method"],
+        "config": request.config if asked else None,
+        "parts": request.parts if given["stages"] else None,
+        "clones": request.clones or None,
+    }
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run `camp-train` and exit with its code."""
+    launch(command, "camp-train", arguments)
+
+
+if __name__ == "__main__":  # for torchrun, which starts modules
+    main()
