@@ -113,6 +113,8 @@ def command(**given: Any) -> int:  # noqa: ANN401 - the options above
         return 0
     if given["dataset"] is None:
         raise click.UsageError("say what to train on: camp-train DATASET")
+    if given["dry_run"] and given["resume"]:
+        raise click.UsageError("--dry-run tells of a new run: leave --resume out")
     request = _request(given)
     if given["dry_run"]:
         return _forecast(request, as_json=given["as_json"])
@@ -201,7 +203,6 @@ def _asked(given: dict[str, Any], request: Request) -> dict[str, Any]:
         "method": given["method"],
         "config": request.config if asked else None,
         "parts": request.parts if given["stages"] else None,
-        "clones": request.clones or None,
     }
 
 

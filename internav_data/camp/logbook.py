@@ -25,7 +25,13 @@ LOG: Final = "log.jsonl"
 BOARD: Final = "tensorboard"
 OPTION_NAMES: Final = ("navigate", "push", "pick", "done")
 _LEAST: Final = 1e-12
-_TRIED: Final = ("pushes", "picks", "drops")
+_SUCCESSES: Final = {
+    "interaction": ("pushes", "picks", "drops"),
+    "push": ("pushes",),
+    "pick": ("picks",),
+    "drop": ("drops",),
+}
+"""Shares of successes that are logged, and what is counted for each."""
 
 
 class Logbook:
@@ -135,7 +141,7 @@ class Window:
         means = {name: value / len(self._episodes) for name, value in sums.items()}
         said = {"ended": self.ended, **means}
         said |= {f"reward_{name}": value for name, value in reward_parts(means).items()}
-        for names, told in ((_TRIED, "interaction"), *(((name,), name[:-1]) for name in _TRIED)):
+        for told, names in _SUCCESSES.items():
             tried = sum(sums.get(f"{name}_tried", 0.0) for name in names)
             if tried:
                 done = sum(sums.get(f"{name}_done", 0.0) for name in names)

@@ -20,7 +20,9 @@ from internav_data.camp.packing import Place
 from internav_data.camp.ranks import ranks_of
 from internav_data.camp.stages import PARTS, check_parts, plan
 from internav_data.camp.train import Trainer
+from internav_data.dataset.files import write_atomically
 from internav_data.generation import values
+from internav_data.generation.toml import config_toml
 from internav_data.records.errors import CorruptDataError, UsageError
 
 if TYPE_CHECKING:
@@ -31,6 +33,8 @@ if TYPE_CHECKING:
     from internav_data.camp.stages import Stage
     from internav_data.camp.train import Tell
 
+CONFIG: Final = "config.toml"
+"""The resolved settings of a run, for people and for `--config`."""
 _MEASURED: Final = 2
 """Updates that a prediction is made of, after one that warms up."""
 
@@ -109,7 +113,9 @@ def begin(
     if out.exists() and not out.is_dir():
         raise UsageError(f"{out}: --out: expected a folder, this is a file")
     trainer, stages = _prepared(request, tell, interrupted)
-    out.mkdir(parents=True, exist_ok=True)
+    if trainer.ranks.first:
+        out.mkdir(parents=True, exist_ok=True)
+        write_atomically(out / CONFIG, config_toml(request.config, "camp-train").encode())
     trainer.fit(stages)
     return trainer
 

@@ -1,0 +1,158 @@
+"""`camp-train` from the outside: exit codes, one line for what goes wrong, nothing lost."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("torch")
+
+from internav_cli.camp_train import main
+
+TRAIN = Path(sys.executable).with_name("camp-train")
+TINY = (
+    "--device", "cpu", "--method", "ppo", "--set", "network.image_size=16",
+    "--set", "network.hidden=8", "--set", "ppo.environments=4", "--set", "ppo.minibatches=1",
+    "--set", "ppo.steps=8", "--set", "run.validation_episodes=1", "--set", "run.max_steps=10",
+    "--set", "run.tensorboard=false", "--set", "run.checkpoint_every=1",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    """Three scenes of one room: val, test and train."""
+    from internav_data.generation import generate, load_config
+
+    out = tmp_path_factory.mktemp("camp-train") / "data"
+    generate(out, load_config(overrides=["episodes_per_scene=4", "house.rooms=1"]), 3, workers=1)
+    return out
+
+
+@pytest.fixture
+def call(capsys, monkeypatch, tmp_path):
+    """Run it in an empty folder; returns code, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words):
+        with pytest.raises(SystemExit) as ended:
+            main([str(word) for word in words])
+        told = capsys.readouterr()
+        assert "Traceback" not in told.err
+        return ended.value.code, told.out, told.err
+
+    return run
+
+
+def test_help_is_fast_and_has_examples():
+    script = (
+        "import sys\nfrom internav_cli.camp_train import main\n"
+        "try:\n    main(['--help'])\nexcept SystemExit as e:\n    assert not e.code\n"
+        "print(sorted({'torch', 'numpy', 'numba', 'pyarrow'} & set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert "Examples:" in done.stdout
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_a_run_is_trained_and_measured(call, dataset, tmp_path):
+    code, out, err = call(dataset, *TINY, "--steps", 96, "--json")
+    assert code == 0, err
+    assert json.loads(out)["step"] == 96
+    assert "camp-eval runs/ppo-0" in err
+    run = tmp_path / "runs" / "ppo-0"
+    assert sorted(p.name for p in run.iterdir()) == [
+        "checkpoints", "checkpoints.json", "config.toml", "log.jsonl",
+    ]  # fmt: skip
+    code, out, err = call(dataset, "--config", run / "config.toml", "--print-config")
+    assert code == 0, err
+    assert out == (run / "config.toml").read_text()
+    before = (run / "checkpoints.json").read_bytes()
+    assert call(dataset, *TINY)[0] == 2
+    assert (run / "checkpoints.json").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "told"),
+    [
+        (("DATA", "--nonsense"), 2, ["--nonsense"]),
+        ((), 2, ["camp-train DATASET"]),
+        (("DATA", "--method", "sarsa"), 2, ["sarsa", "ppo-intent"]),
+        (("DATA", "--method", "random"), 2, ["nothing to learn"]),
+        (("DATA", "--set", "ppo.step=3"), 2, ["ppo.step", "ppo.steps"]),
+        (("DATA", "--set", "ppo.steps=zero"), 2, ["ppo.steps", "whole number"]),
+        (("DATA", "--set", "ppo.minibatches=5"), 2, ["minibatches", "divide"]),
+        (("DATA", "--config", "nowhere.toml"), 2, ["nowhere.toml"]),
+        (("DATA", "--stages", "all,single"), 2, ["--stages", "order"]),
+        (("DATA", "--where", "clear_m<=0"), 2, ["no training episodes", "--where"]),
+        (("DATA", "--where", "room=1"), 2, ["room"]),
+        (("DATA", "--device", "cuda"), 2, ["no GPU"]),
+        (("DATA", "--resume", "--out", "nothing"), 2, ["nothing", "no last checkpoint"]),
+        (("NOTHING",), 5, ["NOTHING", "manifest.json"]),
+    ],
+)
+def test_what_cannot_be_meant_is_told_in_a_line(call, dataset, tmp_path, words, code, told):
+    given = [dataset if word == "DATA" else word for word in words]
+    found, out, err = call(*given)
+    assert (found, out) == (code, ""), err
+    assert len(err.strip().splitlines()) == 1
+    for word in told:
+        assert word in err
+    assert not list(tmp_path.iterdir()), "nothing is written"
+
+
+def test_a_checkpoint_that_is_no_checkpoint_is_refused(call, dataset, tmp_path):
+    assert call(dataset, *TINY, "--steps", 96)[0] == 0
+    (about,) = (tmp_path / "runs" / "ppo-0" / "checkpoints").glob("*/checkpoint.json")
+    said = json.loads(about.read_text())
+    for change, words in (
+        ({"format": 99}, "format 99"),
+        ({"config": said["config"] | {"network": said["config"]["network"] | {"hidden": 16}}},
+         "another agent's weights"),
+        ({"method": "camp"}, "another agent's weights"),
+        ({"config": {"nothing": 1}}, "nothing"),
+    ):  # fmt: skip
+        about.write_text(json.dumps(said | change))
+        code, _, err = call(dataset, "--out", "runs/ppo-0", "--resume")
+        assert code == 5, err
+        assert words in err
+
+
+def test_ctrl_c_saves_and_a_second_one_leaves_the_last_checkpoint(dataset, tmp_path):
+    run = tmp_path / "run"
+    words = [TRAIN, dataset, *TINY, "--out", run, "--steps", 320_000]
+    environment = os.environ | {"OMP_NUM_THREADS": "1"}
+    for signals, extra in ((1, []), (2, ["--resume"])):
+        process = subprocess.Popen(
+            [str(word) for word in [*words, *extra]], stderr=subprocess.PIPE, text=True,
+            env=environment,
+        )  # fmt: skip
+        lines = _rows(run)
+        deadline = time.monotonic() + 120
+        while _rows(run) < lines + 2 and time.monotonic() < deadline:
+            time.sleep(0.05)
+        for _ in range(signals):
+            process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=60)
+        assert process.returncode == 130, err
+        if signals == 1:
+            assert "--resume" in err
+    done = subprocess.run(
+        [str(word) for word in [TRAIN, dataset, "--out", run, "--resume", "--dry-run"]],
+        check=False, capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 2, "a run is gone on with, not predicted"
+    from internav_data.camp.checkpoint import read
+
+    assert read(run).progress["environment_steps"] >= 32
+
+
+def _rows(run):
+    log = run / "log.jsonl"
+    return log.read_bytes().count(b"\n") if log.exists() else 0
