@@ -64,10 +64,12 @@ class Encoder(nn.Module):
         (T, n, S, S, 1) metres, `goal` (T, n, 2), `held` and `horizon` (T, n).
         """  # noqa: D205 - one sentence
         steps, count, height, width, _ = seen["rgb"].shape
-        rgb = seen["rgb"].reshape(-1, height, width, _RGB).permute(0, 3, 1, 2) / 255.0
-        depth = seen["depth"].reshape(-1, height, width, _DEPTH).permute(0, 3, 1, 2)
+        rgb = seen["rgb"].reshape(-1, height, width, _RGB) / 255.0
+        depth = seen["depth"].reshape(-1, height, width, _DEPTH)
         depth = depth.clamp(max=self._depth_limit_m) / self._depth_limit_m
-        pictures = (rgb, depth) if len(self.eyes) > 1 else (torch.cat([rgb, depth], 1),)
+        pictures = [rgb, depth] if len(self.eyes) > 1 else [torch.cat([rgb, depth], -1)]
+        # Channels stay last in memory, as cameras write them: convolutions are twice as fast.
+        pictures = [picture.permute(0, 3, 1, 2) for picture in pictures]
         with torch.autocast("cuda", torch.bfloat16, enabled=self._bf16 and rgb.is_cuda):
             views = [eye(picture) for eye, picture in zip(self.eyes, pictures, strict=True)]
             fused = views[0] if len(views) == 1 else self.fuse(torch.cat(views, 1)).relu()
@@ -198,7 +200,8 @@ def _convolutions(channels: int, config: NetworkConfig) -> nn.Sequential:
         layers += [layer, nn.ReLU()]
         channels, size = out, (size + 2 * padding - kernel) // stride + 1
     full = _linear(channels * size * size, config.hidden, nn.init.calculate_gain("relu"))
-    return nn.Sequential(*layers, nn.Flatten(), full, nn.ReLU())
+    whole = nn.Sequential(*layers, nn.Flatten(), full, nn.ReLU())
+    return whole.to(memory_format=torch.channels_last)  # type: ignore[call-overload, no-any-return] # torch's hints lack it
 
 
 def _linear(inputs: int, outputs: int, gain: float = 2**0.5) -> nn.Linear:

@@ -1,0 +1,276 @@
+"""Runs: gone on with to the last bit, over ranks, and what stops them."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from safetensors.torch import load_file  # noqa: E402
+
+from internav_data.camp import data as data_module  # noqa: E402
+from internav_data.camp import train as train_module  # noqa: E402
+from internav_data.camp.checkpoint import find, load_agent  # noqa: E402
+from internav_data.camp.config import from_mapping, preset  # noqa: E402
+from internav_data.camp.data import TrainingData  # noqa: E402
+from internav_data.camp.run import Request, begin, config_of, forecast, resume  # noqa: E402
+from internav_data.generation.interrupts import InterruptedRunError  # noqa: E402
+from internav_data.records.errors import (  # noqa: E402
+    CorruptDataError,
+    NotFiniteError,
+    UsageError,
+)
+
+SMALL = {
+    "network": {"image_size": 16, "hidden": 12},
+    "ppo": {"environments": 4, "minibatches": 2, "steps": 8, "epochs": 2, "critic_rollouts": 1},
+    "cloning": {"frames": 64, "epochs": 2, "environments": 4, "steps": 8, "sync_every": 2},
+    "stages": {"steps": 320, "auxiliary_share": 0.3, "single_room_share": 0.3},
+    "run": {
+        "max_steps": 12, "checkpoint_every": 3, "validate_every": 2, "validation_episodes": 2,
+        "tensorboard": False,
+    },
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def scenes(tmp_path_factory):
+    """Six houses of a single room, four of them to train on."""
+    from internav_data.generation import generate, load_config
+
+    out = tmp_path_factory.mktemp("train") / "d"
+    generate(out, load_config(overrides=["episodes_per_scene=4", "house.rooms=1"]), 6, workers=1)
+    return out
+
+
+@pytest.fixture
+def request_for(scenes, tmp_path):
+    def make(name, method="camp", **changes):
+        config = from_mapping(from_mapping(preset("small"), SMALL, "test"), changes, "test")
+        return Request(scenes, tmp_path / name, method, config, clones=True)
+
+    return make
+
+
+def written(run):
+    """What a run has left, without what the clock says."""
+    folder = find(run)
+    rows = [json.loads(line) for line in (run / "log.jsonl").read_text().splitlines()]
+    for row in rows:
+        row.pop("time", None)
+        row.get("cloning", {}).pop("frames_per_s", None)
+    about = json.loads((folder / "checkpoint.json").read_text())
+    about["progress"].pop("training_s")
+    about["progress"].pop("log")  # bytes: rates have more or fewer digits
+    about.pop("files")
+    names = ("weights.safetensors", "training.safetensors")
+    return rows, about, *((folder / name).read_bytes() for name in names)
+
+
+def after(count):
+    """Ask to stop after so many updates, cloning included."""
+    left = [count]
+
+    def asked():
+        left[0] -= 1
+        return 2 if left[0] == 0 else 0
+
+    return asked
+
+
+@pytest.mark.parametrize(
+    ("method", "stops"), [("camp", (2, 3, 2, 3)), ("ppo", (5, 3)), ("nie", (6,))]
+)
+def test_resumed_runs_are_unbroken_ones_to_the_last_byte(request_for, method, stops):
+    """Stopped in cloning, in auxiliary tasks, in single rooms and at the end of a stage."""
+    begin(request_for("whole", method))
+    broken = request_for("broken", method)
+    with pytest.raises(InterruptedRunError):
+        begin(broken, interrupted=after(stops[0]))
+    for stop in stops[1:]:
+        with pytest.raises(InterruptedRunError):
+            resume(broken, {}, interrupted=after(stop))
+    resume(broken, {})
+    whole, again = written(request_for("whole").out), written(broken.out)
+    assert whole[0] == again[0]
+    assert whole[1] == again[1]
+    assert whole[2:] == again[2:]
+    assert len({row.get("stage") for row in whole[0]}) == 4  # cloning has none
+
+
+def test_a_finished_run_is_left_as_it_is(request_for):
+    asked = request_for("done", "ppo")
+    begin(asked)
+    before = written(asked.out)
+    resume(asked, {})
+    assert written(asked.out) == before
+
+
+def test_parts_follow_from_the_last_ones_checkpoint(request_for):
+    """`--stages` one after another is the run in one go."""
+    begin(request_for("whole"))
+    parts = request_for("parts")
+    begin(Request(parts.dataset, parts.out, "camp", parts.config, ("auxiliary",), clones=True))
+    with pytest.raises(UsageError, match="follow each other"):
+        resume(parts, {"parts": ("all", "single")})
+    resume(parts, {"parts": ("single", "all")})
+    whole, again = (load_file(find(run) / "weights.safetensors")
+                    for run in (request_for("whole").out, parts.out))  # fmt: skip
+    for name, value in whole.items():
+        torch.testing.assert_close(again[name], value, atol=0, rtol=0)
+
+
+def test_last_and_best_are_kept_and_play(request_for):
+    asked = request_for("kept")
+    begin(asked)
+    pointer = json.loads((asked.out / "checkpoints.json").read_text())
+    assert {path.name for path in (asked.out / "checkpoints").iterdir()} == {
+        pointer["last"], pointer["best"],
+    }  # fmt: skip
+    assert load_agent(asked.out, "best").method == "camp"
+    with pytest.raises(UsageError, match="--resume"):
+        begin(asked)
+
+
+def test_a_dry_run_tells_the_stages_and_writes_nothing(request_for):
+    asked = request_for("dry")
+    told = forecast(asked)
+    assert [name for name, _, _ in told] == ["cloning", "auxiliary", "single", "all"]
+    assert sum(steps for _, steps, _ in told) == 320
+    assert all(seconds > 0.0 for _, _, seconds in told)
+    assert not asked.out.exists()
+
+
+def test_what_is_not_finite_stops_and_leaves_the_last_checkpoint(request_for, monkeypatch):
+    asked = request_for("nan", "ppo")
+    real, calls = train_module.ppo.update, []
+
+    def poisoned(agent, *given, **named):
+        calls.append(1)
+        if len(calls) == 5:
+            with torch.no_grad():
+                next(agent.parameters()).fill_(torch.nan)
+        return real(agent, *given, **named)
+
+    monkeypatch.setattr(train_module.ppo, "update", poisoned)
+    with pytest.raises(NotFiniteError, match=r"environment \d.*seed \d+.*last checkpoint"):
+        begin(asked)
+    for value in load_agent(asked.out).state_dict().values():
+        assert value.isfinite().all()
+    monkeypatch.undo()
+    resume(asked, {})
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"method": "ppo"}, "run of method 'camp', asked for 'ppo'"),
+        ({"config": {"ppo": {"steps": 9}}}, "ppo.steps is 8 in this run, asked for 9"),
+        ({"parts": ("all",)}, "stage auxiliary is not finished"),
+    ],
+)
+def test_resume_refuses_another_run(request_for, asked, words):
+    given = request_for("other")
+    with pytest.raises(InterruptedRunError):
+        begin(given, interrupted=after(6))
+    if "config" in asked:
+        asked = {"config": from_mapping(given.config, asked["config"], "test")}
+    with pytest.raises(UsageError, match=words):
+        resume(given, asked)
+
+
+def test_resume_refuses_another_dataset_and_damage(request_for, scenes, houses):
+    given = request_for("moved", "ppo")
+    with pytest.raises(InterruptedRunError):
+        begin(given, interrupted=after(6))
+    with pytest.raises(UsageError, match="no training episodes"):
+        resume(Request(houses, given.out, "ppo", given.config), {})
+    log = given.out / "log.jsonl"
+    kept = log.read_bytes()
+    log.write_bytes(kept[:10])
+    with pytest.raises(CorruptDataError, match="the checkpoint knows of"):
+        resume(given, {})
+    log.write_bytes(kept)
+    training = find(given.out) / "training.safetensors"
+    training.write_bytes(training.read_bytes()[:-1])
+    with pytest.raises(CorruptDataError, match="copy the checkpoint again"):
+        resume(given, {})
+
+
+def test_episodes_are_those_that_are_asked_for(scenes):
+    near = TrainingData(scenes, ["clear_m<=3"]).episodes()
+    assert 0 < len(near) < len(TrainingData(scenes).episodes())
+    assert all(episode.clear_m <= 3.0 for episode in near)
+    with pytest.raises(UsageError, match="for which --where holds"):
+        TrainingData(scenes, ["clear_m<=0"])
+    with pytest.raises(UsageError, match="COLUMN=VALUE"):
+        TrainingData(scenes, ["near"])
+
+
+def test_a_dataset_without_outcomes_is_refused(scenes, monkeypatch):
+    from dataclasses import replace
+
+    class Bare:
+        def __init__(self, dataset):
+            self._dataset, self.fingerprint = dataset, dataset.fingerprint
+
+        def __len__(self):
+            return len(self._dataset)
+
+        def __getitem__(self, number):
+            episode = self._dataset[number]
+            bare = tuple(replace(obstacle, outcomes=None) for obstacle in episode.obstacles)
+            return replace(episode, obstacles=bare)
+
+    load = data_module.load_dataset
+    monkeypatch.setattr(data_module, "load_dataset", lambda *given: Bare(load(*given)))
+    with pytest.raises(UsageError, match="no outcomes"):
+        TrainingData(scenes)
+
+
+def test_settings_come_from_preset_file_options_and_overrides(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text("[ppo]\nsteps = 32\nepochs = 2\n")
+    config = config_of(
+        "small", file, ["ppo.epochs=5"], {"seed": 3, "data.where": ("mode=blocked",)}
+    )
+    assert (config.ppo.steps, config.ppo.epochs, config.seed) == (32, 5, 3)
+    assert config.data.where == ("mode=blocked",)
+    with pytest.raises(UsageError, match=r"ppo\.stepz.*ppo\.steps"):
+        config_of("small", None, ["ppo.stepz=1"])
+    with pytest.raises(UsageError, match="expected 0"):
+        config_of("small", None, [], {"seed": -1})
+
+
+def test_two_ranks_train_what_one_does(request_for, scenes, tmp_path):
+    """Half of the environments each, over gloo; every update, every log row, every checkpoint."""
+    file = tmp_path / "small.toml"
+    file.write_text(
+        "[network]\nimage_size = 16\nhidden = 12\n"
+        "[ppo]\nenvironments = 6\nminibatches = 1\nsteps = 8\nepochs = 2\ncritic_rollouts = 1\n"
+        "[cloning]\nframes = 48\nepochs = 1\nenvironments = 6\nsteps = 8\n"
+        "[stages]\nsteps = 288\nauxiliary_share = 0.3\nsingle_room_share = 0.3\n"
+        "[run]\nmax_steps = 12\nvalidation_episodes = 0\ntensorboard = false\n"
+    )
+    words = ["internav_cli.camp_train", scenes, "--config", file, "--init-from", "expert"]
+    words += ["--device", "cpu", "--preset", "small", "--out"]
+    torchrun = ["torch.distributed.run", "--standalone", "--nproc-per-node", "2", "-m"]
+    for out, start in (("one", []), ("two", torchrun)):
+        command = [sys.executable, "-m", *start, *words, tmp_path / out]
+        done = subprocess.run(
+            [str(word) for word in command], capture_output=True, text=True, check=False,
+            timeout=300, env=os.environ | {"OMP_NUM_THREADS": "1"},
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+    one, two = written(tmp_path / "one"), written(tmp_path / "two")
+    for mine, other in zip(one[0], two[0], strict=True):
+        assert mine.keys() == other.keys()
+        for name in ("episode", "decision"):
+            assert mine.get(name) == pytest.approx(other.get(name), abs=1e-5)
+    assert one[1]["progress"]["environments"] == two[1]["progress"]["environments"]
+    weights = [load_file(find(tmp_path / out) / "weights.safetensors") for out in ("one", "two")]
+    for name, value in weights[0].items():
+        torch.testing.assert_close(weights[1][name], value, atol=1e-5, rtol=0)
