@@ -9,9 +9,15 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
+import json
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from internav_cli.main import COMMANDS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 ROOT = Path(__file__).resolve().parents[1]
 PICTURED = (0, 14, 0)
@@ -26,6 +32,44 @@ def settings() -> str:
     from internav_data.generation.toml import config_toml  # noqa: PLC0415
 
     return f"```toml\n{config_toml(GenerationConfig()).strip()}\n```"
+
+
+def training_settings() -> str:
+    """Return all settings of `camp-train`, those of both presets side by side."""
+    from internav_data.camp.config import CampConfig, preset  # noqa: PLC0415 - --pictures needs more
+    from internav_data.dataset.jsonschemas import descriptions  # noqa: PLC0415
+
+    small, paper, notes = preset("small"), preset("paper"), descriptions(CampConfig)
+    single, parts = [], []
+    for field in dataclasses.fields(CampConfig):
+        one, two = getattr(small, field.name), getattr(paper, field.name)
+        if not dataclasses.is_dataclass(one):
+            single.append(_setting(field.name, one, two, notes[field.name]))
+            continue
+        rows = [*_HEAD, *_rows(field.name, one, two)]
+        parts.append("\n".join([f"**`{field.name}`** {_line(notes[field.name])}", "", *rows]))
+    return "\n\n".join(["\n".join([*_HEAD, *single]), *parts])
+
+
+_HEAD = ("| | `small` | `paper` | |", "|---|---|---|---|")
+
+
+def _rows(prefix: str, one: Any, two: Any) -> Iterator[str]:  # noqa: ANN401 - parts of a config
+    from internav_data.dataset.jsonschemas import descriptions  # noqa: PLC0415
+
+    notes = descriptions(type(one))
+    for field in dataclasses.fields(one):
+        values = getattr(one, field.name), getattr(two, field.name)
+        yield _setting(f"{prefix}.{field.name}", *values, notes[field.name])
+
+
+def _setting(key: str, one: object, two: object, note: str) -> str:
+    cells = ("none" if value is None else json.dumps(value) for value in (one, two))
+    return " | ".join([f"| `{key}`", *cells, f"{_line(note)} |"])
+
+
+def _line(note: str) -> str:
+    return " ".join(note.split()).replace("|", "\\|")
 
 
 def commands() -> str:
@@ -45,9 +89,12 @@ def replaced(text: str, name: str, content: str) -> str:
 def updated() -> dict[Path, str]:
     """Return texts as they should be."""
     readme, configuration = ROOT / "README.md", ROOT / "docs" / "configuration.md"
+    training = ROOT / "docs" / "training.md"
+    written = training.read_text(encoding="utf-8")
     return {
         readme: replaced(readme.read_text(encoding="utf-8"), "commands", commands()),
         configuration: replaced(configuration.read_text(encoding="utf-8"), "settings", settings()),
+        training: replaced(written, "training settings", training_settings()),
     }
 
 

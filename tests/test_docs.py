@@ -48,12 +48,19 @@ def test_python_in_the_docs_runs(page, small_dataset):
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_commands_in_the_docs_exist_with_their_options(page):
     from click.testing import CliRunner
+    from internav_cli import camp_eval, camp_train
     from internav_cli.main import cli
 
-    for line in re.findall(r"^internav-gen .*$", page.read_text(), re.MULTILINE):
-        words = line.split("#")[0].split("|")[0].split(">")[0].split()
-        shown = CliRunner().invoke(cli, [words[1], "--help"]).output
-        for option in (w for w in words[2:] if w.startswith("--")):
+    text = re.sub(r"(?m)^torchrun .* -m internav_cli\.camp_train", "camp-train", page.read_text())
+    for line in re.findall(r"^(?:internav-gen|camp-eval|camp-train) .*$", text, re.MULTILINE):
+        words = re.split(r" +#|[|]|> ", line)[0].split()
+        command, path = {
+            "internav-gen": (cli, words[1:2]),
+            "camp-eval": (camp_eval.cli, ["compare" if words[1] == "compare" else "evaluate"]),
+            "camp-train": (camp_train.command, []),
+        }[words[0]]
+        shown = CliRunner().invoke(command, [*path, "--help"]).output
+        for option in (w for w in words[1:] if w.startswith("--")):
             assert option in shown, line
 
 
