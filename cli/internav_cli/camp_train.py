@@ -85,7 +85,7 @@ interrupted.""",
 @click.option(
     "--stages",
     metavar="PARTS",
-    help="Some of auxiliary,single,all, in order.  [default: all three]",
+    help="Some of auxiliary,single,all, in order, or cloning alone.  [default: all three]",
 )
 @click.option(
     "--init-from", type=click.Choice(["expert"]), help="Clone the dataset's expert first."
@@ -135,11 +135,13 @@ def _config(given: dict[str, Any]) -> CampConfig:
 
 
 def _request(given: dict[str, Any]) -> Request:
+    from internav_data.camp.cloning import CLONING
     from internav_data.camp.run import Request
     from internav_data.camp.stages import PARTS
 
     config, method = _config(given), given["method"] or "camp"
-    parts = tuple((given["stages"] or ",".join(PARTS)).replace(" ", "").split(","))
+    words = (given["stages"] or ",".join(PARTS)).replace(" ", "").split(",")
+    parts = () if words == [CLONING] else tuple(words)
     return Request(
         dataset=given["dataset"],
         out=given["out"] or Path("runs") / f"{method}-{config.seed}",
@@ -197,11 +199,14 @@ def _train(request: Request, given: dict[str, Any]) -> int:
 
 def _asked(given: dict[str, Any], request: Request) -> dict[str, Any]:
     """Return what was asked for besides --resume, to be compared with the run."""
-    names = ("preset", "config_file", "overrides")
-    asked = any(given[name] for name in names) or bool(_settings(given))
+    from internav_data.camp.run import keys_given
+
+    keys = keys_given(given["config_file"], given["overrides"], _settings(given))
     return {
         "method": given["method"],
-        "config": request.config if asked else None,
+        "config": request.config if keys or given["preset"] else None,
+        "keys": None if given["preset"] else keys,
+        "clones": request.clones,
         "parts": request.parts if given["stages"] else None,
     }
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from internav_data.camp.agents.options import NAVIGATE, PUSH
+from internav_data.camp.stages import TASKS
 from internav_data.camp.tasks import WithoutObstacles, env_state
 from internav_data.envs.auxiliary import AuxiliaryStart, auxiliary_starts, is_cleared
 from internav_data.envs.metrics import KINDS
@@ -116,6 +117,7 @@ class AuxiliaryTasks:
         reward, over = np.concatenate(rewards), np.concatenate(ended)
         told = infos.get("metrics", {})
         told["auxiliary_reward"] = np.zeros(self.num_envs)
+        done = np.concatenate(ended) | np.concatenate(cut)
         for k in range(self._first, self.num_envs):
             note, extra = self._notes[k], 0.0
             if int(actions[k]) in KINDS:
@@ -130,6 +132,9 @@ class AuxiliaryTasks:
             if "return" in told:
                 told["return"][k] += note["extra"]
                 told["auxiliary_reward"][k] = note["extra"]
+        for option, name in TASKS.items():
+            told[f"{name}_success"] = told.get("success", np.zeros(self.num_envs))
+            told[f"_{name}_success"] = done & (np.array(self._tasks) == option)
         return self._seen, reward, over, np.concatenate(cut), infos
 
     def state(self) -> list[dict[str, Any]]:

@@ -125,6 +125,7 @@ class Collector:
             over = ended | cut
             if over.any():
                 if (cut & ~ended).any():
+                    self._check(self._seen)
                     row["final_values"] = self._expected() * torch.from_numpy(cut).to(device)
                 finished += _finished(t, over, infos)
                 self._seen, _ = self.env.reset(options={"reset_mask": over})
@@ -153,7 +154,12 @@ class Collector:
 
 def _finished(t: int, over: NDArray[np.bool_], infos: dict[str, Any]) -> list[Finished]:
     said = infos.get("metrics", {})
+    names = [name for name in said if not name.startswith("_")]
+    everywhere = np.ones(len(over), np.bool_)
     return [
-        Finished(k, t, {name: v[k].item() for name, v in said.items() if not name.startswith("_")})
+        Finished(
+            k, t,
+            {name: said[name][k].item() for name in names if said.get(f"_{name}", everywhere)[k]},
+        )
         for k in np.flatnonzero(over).tolist()
-    ]
+    ]  # fmt: skip

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 Intent = Literal["integrated", "policy", "recursive", "none"]
 Preset = Literal["paper", "small"]
 INTERACTION_ACTIONS: Final = 11
-"""After so many actions an interaction closes (CAMP.md 4; the released code cuts after 10)."""
+"""After so many actions an interaction closes (the released code cuts after more than 10)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class NetworkConfig:
     image_size: int = 64
     """Pixels a side of what the agent sees."""
     encoder: Preset = "small"
-    """"paper": one network for colour and one for depth, fused (facts sheet); "small": one network
+    """"paper": one network for colour and one for depth, fused; "small": one network
     over all four channels."""
     hidden: int = 128
     """Features of an encoder and units of each GRU."""
@@ -140,10 +140,12 @@ class StagesConfig:
 
 @dataclass(frozen=True, slots=True)
 class DataConfig:
-    """Which episodes of the dataset."""
+    """Which episodes of the dataset, and what they pay."""
 
     where: tuple[str, ...] = ()
     """Conditions on columns that all hold, as in "clear_m<=6"; in training and validation."""
+    failed_done_reward: float = 0.0
+    """Of Done away from the goal (-1 in the released configuration)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -107,5 +107,7 @@ class TrainingData:
 
 
 def _arguments(config: CampConfig, *, ids: bool) -> dict[str, Any]:
-    size, longest = config.network.image_size, config.run.max_steps
-    return {"image_size": size, "max_steps": longest, "ids": ids}
+    return {
+        "image_size": config.network.image_size, "max_steps": config.run.max_steps, "ids": ids,
+        "failed_done_reward": config.data.failed_done_reward,
+    }  # fmt: skip

@@ -36,7 +36,7 @@ _SUBSET, _ACTIONS = 1, 0
 
 
 class Player(Protocol):
-    """Who plays: a trained agent (`agent_player`), an oracle (`internav_data.camp.oracles`)."""
+    """Who plays: a trained agent (`camp.players.AgentPlayer`), an oracle (`camp.oracles`)."""
 
     name: str
     image_size: int

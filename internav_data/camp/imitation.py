@@ -8,9 +8,9 @@ import numpy as np
 import torch
 
 from internav_data.camp.agents import Batch
-from internav_data.camp.ppo import alone, step
+from internav_data.camp.ppo import alone, check_finite, step
 from internav_data.camp.rollout import Columns
-from internav_data.records.errors import UsageError
+from internav_data.records.errors import CorruptDataError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -77,6 +77,12 @@ class Demonstrations:
         """Go on in the middle: episodes `ids` are under way, `places` steps of each are taken."""
         self._seen, self._starts = seen, np.ones(self.env.num_envs, np.bool_)
         self._learn({"episode_id": np.array(ids, dtype=object)})
+        for own, place in zip(self._labels, places, strict=True):
+            if not place < len(own["action"]):
+                raise CorruptDataError(
+                    f"checkpoint: environments: {place} actions were taken, the expert has "
+                    f"{len(own['action'])}"
+                )
         self._places, self._starts = list(places), np.array(places) == 0
 
     def collect(self, steps: int, state: State) -> Batch:
@@ -164,6 +170,7 @@ def clone(
         now = agent.evaluate(batch)
         frames = reduce(now.log_prob.new_tensor(float(now.log_prob.numel())))
         wrong = -now.log_prob if now.loss is None else now.loss - now.log_prob
+        check_finite(torch.arange(count), wrong)
         loss = wrong.sum() / frames
         norm = step(optimiser, loss, agent.optimised(), LONGEST_GRADIENT, reduce)
         state = {name: kept.detach() for name, kept in now.state.items()}

@@ -43,8 +43,6 @@ class Logbook:
         The run's folder.
     position
         Bytes of the log that count; what comes after is cut off: those updates are done again.
-    step
-        Environment steps at that place: TensorBoard forgets what comes after.
     board
         Write TensorBoard's files too, if the `tensorboard` package is there.
 
@@ -54,7 +52,7 @@ class Logbook:
         The log is shorter than that.
     """
 
-    def __init__(self, run: Path, position: int = 0, step: int = 0, *, board: bool = True) -> None:
+    def __init__(self, run: Path, position: int = 0, *, board: bool = True) -> None:
         path = run / LOG
         size = path.stat().st_size if path.exists() else 0
         if size < position:
@@ -69,7 +67,8 @@ class Logbook:
         if board and find_spec("tensorboard") is not None:
             from torch.utils.tensorboard import SummaryWriter  # noqa: PLC0415 - seconds
 
-            self._board = SummaryWriter(str(run / BOARD), purge_step=step if position else None)
+            # What a resumed run does again it does to the last bit, so no step is to be purged.
+            self._board = SummaryWriter(str(run / BOARD))
 
     def write(self, row: Row) -> None:
         """Append a row; its "step" is where TensorBoard draws it."""
@@ -135,10 +134,12 @@ class Window:
         if not self._episodes:
             return {"ended": self.ended}
         sums: dict[str, float] = {}
+        counts: dict[str, int] = {}
         for episode in self._episodes:
             for name, value in episode.items():
                 sums[name] = sums.get(name, 0.0) + value
-        means = {name: value / len(self._episodes) for name, value in sums.items()}
+                counts[name] = counts.get(name, 0) + 1
+        means = {name: value / counts[name] for name, value in sums.items()}
         said = {"ended": self.ended, **means}
         said |= {f"reward_{name}": value for name, value in reward_parts(means).items()}
         for told, names in _SUCCESSES.items():
@@ -163,7 +164,7 @@ def reward_parts(means: Mapping[str, float]) -> dict[str, float]:
 
 
 DECISIVE: Final[tuple[str, ...]] = (
-    "action_probs", "intent", "option", "decide", "end_chance", "forced", "plan", "meant",
+    "action_probs", "intent", "option", "choice", "decide", "end_chance", "forced", "plan", "meant",
 )  # fmt: skip
 """What `decisions` reads of a record, where it is there."""
 
@@ -193,7 +194,10 @@ def decisions(record: Mapping[str, Tensor], rewards: Tensor) -> Row:
     said["interactions"] = opened
     if opened:
         said["interaction_length"] = float(interacting.sum()) / opened
-        said["forced_share"] = float(record["forced"].float().sum()) / opened
+    forced = int(record["forced"].sum())
+    ended = forced + int((interacting & (record["choice"] == DONE)).sum())
+    if ended:
+        said["forced_share"] = forced / ended
     if "meant" in record and decide.any():
         said["intent_kl"] = divergence(record["plan"][decide], record["meant"][decide])
     return said

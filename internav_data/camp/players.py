@@ -157,7 +157,7 @@ def candidate(
     agent = _loaded(Path(who))
     about = replace(_facts(agent, about), greedy=greedy, without_intent=without_intent)
     about = replace(about, name=row_name(about))
-    size, ids = agent_config(agent, "network", "image_size", 64), about.method == "nie"
+    size, ids = agent_config(agent, "network", "image_size", 64), getattr(agent, "wants_ids", False)
     if without_intent:
         from internav_data.camp.agents import without_intent as cut  # noqa: PLC0415 - torch
 

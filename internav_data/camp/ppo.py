@@ -176,7 +176,7 @@ def _losses(
     """Return the parts of a minibatch's loss, weighted, and what is said of it."""
     advantages, returns = goals
     now = agent.evaluate(rollout.batch.of(columns))
-    _check(columns, now.log_prob, now.value)
+    check_finite(columns, now.log_prob, now.value)
     log_ratio = now.log_prob - rollout.log_probs[:, columns]
     ratio = log_ratio.exp()
     clipped = ratio.clamp(1.0 - config.clip, 1.0 + config.clip)
@@ -209,7 +209,14 @@ def _losses(
     return sums, {**dict(zip(said, whole, strict=True)), "ratio_error": far}
 
 
-def _check(columns: Tensor, *numbers: Tensor) -> None:
+def check_finite(columns: Tensor, *numbers: Tensor) -> None:
+    """Refuse what networks say, (T, m), of environments with these numbers, (m,).
+
+    Raises
+    ------
+    NotFiniteError
+        Some of it is no number: the first environment is named.
+    """
     for number in numbers:
         fine = number.detach().isfinite().all(0)
         if not bool(fine.all()):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+from datetime import timedelta
 from typing import TYPE_CHECKING, Any
 
 import torch
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from internav_data.camp.ppo import Reduce
+
+
+_PATIENCE_H = 6
+"""Hours that ranks wait for each other: the first one alone validates."""
 
 
 class Ranks:
@@ -111,5 +116,6 @@ def ranks_of(device: torch.device) -> Ranks:
         device = torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0")))
         torch.cuda.set_device(device)
     if not distributed.is_initialized():
-        distributed.init_process_group("nccl" if device.type == "cuda" else "gloo")
+        backend = "nccl" if device.type == "cuda" else "gloo"
+        distributed.init_process_group(backend, timeout=timedelta(hours=_PATIENCE_H))
     return Ranks(device, distributed.get_rank(), size)

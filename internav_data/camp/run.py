@@ -13,6 +13,7 @@ import torch
 from internav_data.camp.agents import agent_names, make_agent
 from internav_data.camp.agents.hierarchy import Hierarchy
 from internav_data.camp.checkpoint import has_checkpoint, read
+from internav_data.camp.cloning import forecast_cloning
 from internav_data.camp.config import CampConfig, from_mapping, plain, preset
 from internav_data.camp.data import TrainingData
 from internav_data.camp.logbook import LOG
@@ -23,10 +24,11 @@ from internav_data.camp.train import Trainer
 from internav_data.dataset.files import write_atomically
 from internav_data.generation import values
 from internav_data.generation.toml import config_toml
+from internav_data.records import Purpose, generator
 from internav_data.records.errors import CorruptDataError, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Mapping, Sequence
     from pathlib import Path
 
     from internav_data.camp.checkpoint import Checkpoint
@@ -35,6 +37,8 @@ if TYPE_CHECKING:
 
 CONFIG: Final = "config.toml"
 """The resolved settings of a run, for people and for `--config`."""
+_TORCH: Final = 5
+"""Where the seeds table has attempts: torch's own random numbers."""
 _MEASURED: Final = 2
 """Updates that a prediction is made of, after one that warms up."""
 
@@ -48,6 +52,7 @@ class Request:
     method: str = "camp"
     config: CampConfig = dataclasses.field(default_factory=CampConfig)
     parts: tuple[str, ...] = PARTS
+    """Stages after cloning; none: cloning alone."""
     clones: bool = False
     """Clone the dataset's expert first."""
     device: str = "auto"
@@ -74,6 +79,24 @@ def config_of(
     for override in overrides:
         config = values.updated(config, override)
     return from_mapping(config, {}, "config")
+
+
+def keys_given(
+    file: Path | None, overrides: Sequence[str], options: Mapping[str, Any]
+) -> list[str]:
+    """Return the dotted keys of the settings that `config_of` is given."""
+
+    def flat(table: Mapping[str, Any], prefix: str = "") -> list[str]:
+        return [
+            key
+            for name, value in table.items()
+            for key in (
+                flat(value, f"{prefix}{name}.") if isinstance(value, dict) else [prefix + name]
+            )
+        ]
+
+    named = [override.partition("=")[0].strip() for override in overrides]
+    return [*flat(_toml(file) if file is not None else {}), *named, *options]
 
 
 def device_of(name: str) -> torch.device:
@@ -106,7 +129,7 @@ def begin(
         There is a run already, or something cannot be meant.
     """
     out = request.out
-    if has_checkpoint(out) or (out / LOG).exists():
+    if has_checkpoint(out) or ((out / LOG).exists() and not (out / CONFIG).exists()):
         raise UsageError(
             f"{out}: a run is there already: go on with it by --resume, or choose another --out"
         )
@@ -133,7 +156,8 @@ def resume(
     request
         Where, on which dataset and device; its config counts for nothing.
     asked
-        What was asked for besides, to be compared: `method`, `config`; `parts` are gone through.
+        What was asked for besides, to be compared: `method`, `clones`, and `config` as far as
+        `keys` go (all of it without them); `parts` are gone through.
     tell, interrupted
         See `Trainer`.
 
@@ -151,10 +175,14 @@ def resume(
             "leave --method out, or choose another --out"
         )
     if asked.get("config") is not None:
-        _compare(request.out, plain(since.config), plain(asked["config"]))
+        _compare(request.out, plain(since.config), plain(asked["config"]), asked.get("keys"))
     place = _place(since)
-    if asked.get("parts"):
-        check_parts(asked["parts"])
+    if asked.get("clones") and not place.clones:
+        raise UsageError(
+            f"{request.out}: this run began without the expert; leave --init-from out, or choose "
+            "another --out"
+        )
+    if asked.get("parts") is not None:
         place.parts = list(asked["parts"])
     request = dataclasses.replace(
         request, method=since.method, config=since.config, parts=tuple(place.parts)
@@ -179,8 +207,12 @@ def forecast(request: Request) -> list[tuple[str, int, float]]:
     trainer, stages = _prepared(request, None, lambda: 0)
     given = request.config.ppo
     found = []
+    if request.clones:
+        updates, seconds = forecast_cloning(trainer, _MEASURED)
+        found.append(("cloning", 0, updates * seconds))
     for stage in stages:
         now = trainer.open(stage)
+        trainer.place.critics[stage.critic] = given.critic_rollouts  # not new: whole updates
         try:
             trainer.update(now)
             began = time.perf_counter()
@@ -191,12 +223,6 @@ def forecast(request: Request) -> list[tuple[str, int, float]]:
             now.task.task.close()
         steps = stage.updates * given.environments * given.steps
         found.append((stage.name, steps, each * stage.updates))
-    if request.clones:
-        cloning = request.config.cloning
-        frames = cloning.frames * cloning.epochs
-        # An update of cloning is one pass; one of PPO a rollout and several passes.
-        _, steps, seconds = found[-1]
-        found.insert(0, ("cloning", 0, seconds / steps * frames / (1 + given.epochs) * 2))
     return found
 
 
@@ -209,13 +235,24 @@ def _prepared(
 ) -> tuple[Trainer, list[Stage]]:
     config = request.config
     torch.set_num_threads(config.run.threads)
+    # Nothing here draws from torch's own generator, but a user's agent may.
+    drawn = generator(config.seed, Purpose.TRAINING, attempt=_TORCH).integers(2**62)
+    torch.manual_seed(int(drawn))
     data = TrainingData(request.dataset, config.data.where)
     with torch.device("meta"):
         agent = make_agent(request.method, config)
     if not agent.optimised():
         names = ", ".join(name for name in agent_names() if name != request.method)
         raise UsageError(f"method {request.method!r} has nothing to learn; expected one of {names}")
-    stages = plan(config, request.parts, hierarchical=isinstance(agent, Hierarchy))
+    if not request.parts and not request.clones:
+        raise UsageError("--stages cloning: there is nothing to clone without --init-from expert")
+    hierarchical = isinstance(agent, Hierarchy)
+    stages = plan(config, request.parts, hierarchical=hierarchical) if request.parts else []
+    if request.clones and config.agent.forbidden:
+        raise UsageError(
+            "agent.forbidden and --init-from expert: the expert does what is forbidden; leave one "
+            "of them out"
+        )
     for single in {stage.single_room for stage in stages}:
         data.episodes(single_room=single)
     place = place or Place(list(request.parts), request.clones)
@@ -241,7 +278,8 @@ def _place(since: Checkpoint) -> Place:
         if not isinstance(said[name], kinds):
             raise CorruptDataError(f"checkpoint: progress: {name}: got {said[name]!r}")
     place = Place(**said)
-    check_parts(place.parts)
+    if place.parts:
+        check_parts(place.parts)
     return place
 
 
@@ -256,11 +294,18 @@ def _check_part(out: Path, place: Place, trainer: Trainer, stages: Sequence[Stag
         )
 
 
-def _compare(out: Path, known: Any, asked: Any, key: str = "") -> None:  # noqa: ANN401 - plain values
+def _compare(
+    out: Path,
+    known: Any,  # noqa: ANN401 - plain values
+    asked: Any,  # noqa: ANN401
+    keys: Collection[str] | None,
+    key: str = "",
+) -> None:
+    """Refuse settings that are others than a run's; only those in `keys`, where there are any."""
     if isinstance(known, dict):
         for name, value in known.items():
-            _compare(out, value, asked[name], f"{key}.{name}".lstrip("."))
-    elif known != asked:
+            _compare(out, value, asked[name], keys, f"{key}.{name}".lstrip("."))
+    elif known != asked and (keys is None or key in keys):
         raise UsageError(
             f"{out}: {key} is {known!r} in this run, asked for {asked!r}: leave settings out "
             "with --resume, or choose another --out"

@@ -1,4 +1,4 @@
-"""Which tasks are trained in which order, for how many steps (section 5.2 and CAMP.md)."""
+"""Which tasks are trained in which order, for how many steps (section 5.2)."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 PARTS: Final = ("auxiliary", "single", "all")
 """What `--stages` can name, in order."""
 TASKS: Final = {NAVIGATE: "navigate", PUSH: "push", PICK: "pick"}
+"""Names of the auxiliary tasks, by the option that each is about."""
 _ENVIRONMENTS: Final = 3
 """Where the seeds table has attempts: orders of episodes in training."""
 _NUMBERS: Final = ("cloning", *PARTS, *(f"auxiliary-{name}" for name in TASKS.values()))

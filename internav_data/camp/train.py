@@ -26,7 +26,7 @@ from internav_data.camp.packing import (
 from internav_data.camp.stages import order_seed
 from internav_data.camp.tasks import Timed
 from internav_data.generation.interrupts import InterruptedRunError
-from internav_data.records.errors import NotFiniteError
+from internav_data.records.errors import NotFiniteError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -100,6 +100,11 @@ class Trainer:
         self.place, self.since, self._tell, self._interrupted = place, since, tell, interrupted
         self.ranks, self._count = ranks, config.ppo.environments
         self.own = ranks.share(self._count, "ppo.environments")
+        if len(self.own) % config.ppo.minibatches:
+            raise UsageError(
+                f"ppo.minibatches is {config.ppo.minibatches}: it must divide the "
+                f"{len(self.own)} environments of each of {ranks.size} processes"
+            )
         self.agent = make_agent(method, config)
         said = since.progress if since else {}
         if since:
@@ -124,7 +129,7 @@ class Trainer:
         position, board = int(said.get("log", 0)), config.run.tensorboard
         with ExitStack() as kept:
             if self.ranks.first:
-                book = Logbook(self.run, position, place.environment_steps, board=board)
+                book = Logbook(self.run, position, board=board)
                 self.log = kept.enter_context(book)
             self._began = time.perf_counter()
             if place.clones and place.stage in {"", CLONING}:

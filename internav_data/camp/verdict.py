@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Methods = Mapping[str, Sequence[Evaluation]]
 
 PRIMARY: Final = ("blocked", "success")
-"""Fixed beforehand (CAMP.md): success on blocked episodes."""
+"""Fixed beforehand: success on blocked episodes."""
 SECONDARY: Final = (
     ("all", "success"),
     ("all", "spl"),

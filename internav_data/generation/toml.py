@@ -8,6 +8,7 @@ import textwrap
 from typing import TYPE_CHECKING, Any
 
 from internav_data.dataset.jsonschemas import descriptions
+from internav_data.generation.values import NOTHING
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -31,6 +32,8 @@ def _table(config: Any, name: str) -> list[str]:  # noqa: ANN401 - a dataclass
         comment = textwrap.wrap(note, WIDTH, initial_indent="# ", subsequent_indent="# ")
         if dataclasses.is_dataclass(value):
             tables += ["", *comment, f"[{name}{field.name}]", *_table(value, f"{field.name}.")]
+        elif value is None and field.default is not None:
+            lines += ["", *comment, f"{field.name} = {_value(NOTHING)}"]
         elif value is None:
             lines += ["", *comment, f"# {field.name} ="]
         else:

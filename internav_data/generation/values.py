@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 C = TypeVar("C", bound="DataclassInstance")
 
+NOTHING = "none"
+"""What stands for no value where a number may be missing; TOML has no word for it."""
 WORDS = {bool: "true or false", int: "a whole number", float: "a number", str: "text in quotes"}
 
 
@@ -149,7 +151,8 @@ def _typed(value: Any, hint: Any, where: str) -> Any:  # noqa: ANN401 - checked 
         return value
     if origin in {types.UnionType, typing.Union}:
         (inner,) = (member for member in members if member is not type(None))
-        return None if value is None else _typed(value, inner, where)
+        nothing = value is None or (value == NOTHING and inner is not str)
+        return None if nothing else _typed(value, inner, where)
     if origin is tuple:
         return _typed_tuple(value, members, where)
     fits = type(value) is hint or (hint is float and type(value) is int)

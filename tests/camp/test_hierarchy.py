@@ -1,4 +1,4 @@
-"""CaMP's model, point by point of CAMP.md's list."""
+"""CaMP's model, point by point."""
 
 import numpy as np
 import pytest

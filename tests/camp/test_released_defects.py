@@ -1,4 +1,4 @@
-"""The eight defects of the released trainer (facts sheet): one test each, by number."""
+"""The eight defects of the released trainer: one test each, by number."""
 
 import inspect
 

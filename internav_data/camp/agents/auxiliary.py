@@ -62,6 +62,8 @@ class Auxiliary(Agent):
         choice = drawn(log_probs[0], None if uniforms is None else uniforms[:, 1])
         chosen = log_probs[0].gather(-1, choice.unsqueeze(-1)).squeeze(-1)
         opened, used, _, _ = advanced(option, choice, state["used"])
+        if not self.hierarchy.keeps:  # `hrl` is told nothing in its whole model either
+            opened, used = opened * 0, used * 0
         after = {"hidden": hidden, "open": opened, "used": used}
         return Step(choice, chosen, value[0], {**known, "choice": choice}, after)
 

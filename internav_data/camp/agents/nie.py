@@ -1,6 +1,6 @@
 """`nie`: PPO that foresees what each action does to objects in sight.
 
-After Zeng et al. 2021, "Pushing it out of the way", as the facts sheet describes the released code:
+After Zeng et al. 2021, "Pushing it out of the way", as the released code has it:
 eight keypoints an object; for each action a 3x4 affine, the identity at the start, says where they
 go; an L1 loss on the action that was taken; a summary by attention joins the GRU's input. Objects
 are known by instance masks: **privileged input** that no other method gets. Ours: keypoints are the

@@ -38,7 +38,7 @@ def start_chances(end: float, interact: float) -> tuple[list[float], list[float]
     """Return the chances at the start of Navigate's actions and of global's options.
 
     Done by global and Done by Navigate end an episode with chance `end` together, half each;
-    global's other options are as 1 - 2 interact - end : interact : interact (CAMP.md: .9 : .045 :
+    global's other options are as 1 - 2 interact - end : interact : interact (.9 : .045 :
     .045).
     """
     weights = [1.0 - 2.0 * interact - end, interact, interact]
