@@ -92,7 +92,11 @@ def _poses(
     if pose is None:
         return
     there = world.copy()
+    # A pocket of furniture that no way leads out of, obstacles or not, teaches nothing.
+    joined = world.stage.lattice.distances(episode.goal.i, episode.goal.j) >= 0
     for i, j in _nodes_near(world, index, pose, _next_node(episode, number)):
+        if not joined[i, j]:
+            continue
         there.i, there.j = i, j
         x, y = there.position
         across = (x - pose.x) * (episode.goal.x - pose.x)

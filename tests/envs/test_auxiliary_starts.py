@@ -32,6 +32,28 @@ def test_agents_stand_opposite_to_the_goal_and_can_act(small, kind):
     assert seen
 
 
+def test_no_start_is_in_a_pocket_that_nothing_leads_out_of(small, monkeypatch):
+    """Where the goal stays out of reach with every obstacle gone, no distance is finite."""
+    dataset = load_dataset(small)
+    episode = next(e for e in dataset if any(o.pickable for o in e.obstacles))
+    stage = Stage.of(dataset.scene(episode.scene_id))
+    starts = auxiliary_starts(stage, episode, dataset.assets, "pick")
+    for start in starts:
+        assert stage.clear_m((start.i / 4, start.j / 4), (episode.goal.x, episode.goal.y))
+    pocket = starts[0][:2]
+    real = type(stage.lattice).distances
+
+    def cut(lattice, i, j):
+        steps = real(lattice, i, j)
+        steps[pocket] = -1
+        return steps
+
+    monkeypatch.setattr(type(stage.lattice), "distances", cut)
+    left = auxiliary_starts(stage, episode, dataset.assets, "pick")
+    assert left
+    assert all(start[:2] != pocket for start in left)
+
+
 @pytest.mark.parametrize(
     ("before", "after", "cleared"),
     [(None, 9, True), (9, 8, True), (9, 9, False), (8, 9, False), (9, None, False)],
