@@ -80,6 +80,20 @@ demo: $(STAMP) ## make a small dataset, prove it right, draw it: about three min
 	@echo "Load it   $(BIN)/python examples/stream_episodes.py $(DEMO)/dataset"
 	@echo "Make more $(BIN)/internav-gen generate --help"
 
+DEMO_TRAIN := --init-from expert --seed 0 --steps 20000 --set cloning.frames=20000 \
+  --set stages.auxiliary_share=0 --set run.max_steps=100 --set run.validate_every=5
+
+.PHONY: demo-train
+demo-train: $(STAMP) ## see CaMP learn on a small dataset: about five minutes
+	$(BIN)/internav-gen generate --out $(DEMO)/houses --scenes 62 --episodes-per-scene 10 \
+	  --rooms 1 --set 'episodes.max_obstacles=[2,2,2]'
+	rm -rf $(DEMO)/camp
+	$(BIN)/camp-train $(DEMO)/houses --device cpu --out $(DEMO)/camp $(DEMO_TRAIN)
+	$(BIN)/camp-eval $(DEMO)/camp $(DEMO)/houses --split val --max-steps 100 --video
+	@echo
+	@echo "Look at   $(DEMO)/camp/evaluation-val/report.html: tables, curves, where it went"
+	@echo "Watch     $(DEMO)/camp/evaluation-val/films: what it saw and meant, step by step"
+
 .PHONY: test
 test: $(STAMP) ## run the tests (but not the slow campaigns)
 	$(BIN)/python -m pytest -q -m 'not slow' -n 2 --dist loadfile $(ARGS)

@@ -68,6 +68,16 @@ def test_gymnasium_finds_nothing_wrong(small):
     assert env.render().shape == (300, 300, 3)
 
 
+def test_stable_baselines_finds_nothing_wrong(small):
+    """Depth in metres is no picture of bytes, which it says and a user knows; nothing else."""
+    from stable_baselines3.common.env_checker import check_env as their_check
+
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        their_check(make(small).unwrapped)
+    assert all("depth" in str(warning.message) for warning in told), [str(w.message) for w in told]
+
+
 def test_observations_lie_in_their_space(small):
     env = make(small)
     for k, step in enumerate(trajectory(env, 5)):
