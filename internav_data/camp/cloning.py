@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from internav_data.camp.train import Trainer
 
 CLONING: Final = "cloning"
+_RARELY: Final = 4
+"""Updates are as much smaller than those of PPO, so checkpoints come after more of them."""
 
 
 def clone_expert(trainer: Trainer) -> None:
@@ -56,7 +58,7 @@ def clone_expert(trainer: Trainer) -> None:
             trainer.write({"step": place.cloned_frames, "cloning": {**said, "frames_per_s": rate}})
             stop = trainer.asked()
             last = said["update"] == said["updates"]
-            due = place.cloned_updates % config.run.checkpoint_every == 0
+            due = place.cloned_updates % (_RARELY * config.run.checkpoint_every) == 0
             if stop or last or due or place.cloned_updates == 1:
                 trainer.save(optimiser, task, held[0])
             trainer.stop(stop)

@@ -72,6 +72,8 @@ def test_stable_baselines_finds_nothing_wrong(small):
     """Depth in metres is no picture of bytes, which it says and a user knows; nothing else."""
     from stable_baselines3.common.env_checker import check_env as their_check
 
+    from internav_data.envs import InterNavEnv
+
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         their_check(InterNavEnv(small, 64))
