@@ -35,11 +35,12 @@ METHODS = {
 }
 TRAINING = (
     "--device", "cpu", "--preset", "small", "--init-from", "expert", *NEAR,
-    "--steps", 40_000, "--set", "run.max_steps=200", "--set", "cloning.frames=90000",
+    "--steps", 60_000, "--set", "run.max_steps=200", "--set", "cloning.frames=100000",
     "--set", "cloning.epochs=1", "--set", "run.validate_every=1000",
     "--set", "run.validation_episodes=32", "--set", "run.tensorboard=false",
+    "--set", "ppo.critic_rollouts=4", "--set", "stages.joint_learning_rate=3e-4",
 )  # fmt: skip
-MEASURE = ("--split", "all", *NEAR, "--max-steps", 200, "--limit", 500, "--no-oracles")
+MEASURE = ("--split", "all", *NEAR, "--max-steps", 200, "--limit", 400, "--no-oracles")
 
 
 def tool(name: str, *words: object) -> None:
