@@ -23,29 +23,14 @@ TINY = (
 )  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def dataset(tmp_path_factory):
-    """Three scenes of one room: val, test and train."""
-    from internav_data.generation import generate, load_config
-
-    out = tmp_path_factory.mktemp("camp-train") / "data"
-    generate(out, load_config(overrides=["episodes_per_scene=4", "house.rooms=1"]), 3, workers=1)
-    return out
+@pytest.fixture
+def dataset(three_houses):
+    return three_houses
 
 
 @pytest.fixture
-def call(capsys, monkeypatch, tmp_path):
-    """Run it in an empty folder; returns code, stdout and stderr."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*words):
-        with pytest.raises(SystemExit) as ended:
-            main([str(word) for word in words])
-        told = capsys.readouterr()
-        assert "Traceback" not in told.err
-        return ended.value.code, told.out, told.err
-
-    return run
+def call(calling):
+    return calling(main)
 
 
 def test_help_is_fast_and_has_examples():
