@@ -82,11 +82,15 @@ demo: $(STAMP) ## make a small dataset, prove it right, draw it: about three min
 
 .PHONY: test
 test: $(STAMP) ## run the tests (but not the slow campaigns)
-	$(BIN)/python -m pytest -q -m 'not slow' -n 2 --dist loadfile $(ARGS)
+	$(BIN)/python -m pytest -q -m 'not slow and not learning' -n 2 --dist loadfile $(ARGS)
 
 .PHONY: test-slow
 test-slow: $(STAMP) ## run the slow campaigns
 	$(BIN)/python -m pytest -q -m slow $(ARGS)
+
+.PHONY: test-learning
+test-learning: $(STAMP) ## see every learner learn, two at a time: about three minutes
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -m learning -n 2 --dist load $(ARGS) tests/camp
 
 .PHONY: test-bare
 test-bare: ## run the loader's tests with nothing but numpy and pyarrow installed
