@@ -113,6 +113,7 @@ bench: $(STAMP) ## run the benchmarks: JSON into bench-results/
 	done
 	$(BIN)/internav-gen generate --out bench-results/dataset --scenes 24 --episodes-per-scene 5
 	$(BIN)/python benchmarks/envs.py bench-results/dataset > bench-results/envs.json
+	$(BIN)/python benchmarks/trainer.py bench-results/dataset > bench-results/trainer.json
 	@echo "Results: bench-results/*.json"
 
 .PHONY: check
