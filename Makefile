@@ -96,11 +96,15 @@ demo-train: $(STAMP) ## see CaMP learn on a small dataset: about five minutes
 
 .PHONY: test
 test: $(STAMP) ## run the tests (but not the slow campaigns)
-	$(BIN)/python -m pytest -q -m 'not slow' -n 2 --dist loadfile $(ARGS)
+	$(BIN)/python -m pytest -q -m 'not slow and not learning' -n 2 --dist loadfile $(ARGS)
 
 .PHONY: test-slow
 test-slow: $(STAMP) ## run the slow campaigns
 	$(BIN)/python -m pytest -q -m slow $(ARGS)
+
+.PHONY: test-learning
+test-learning: $(STAMP) ## see every learner learn, two at a time: about three minutes
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -m learning -n 2 --dist load $(ARGS) tests/camp
 
 .PHONY: test-bare
 test-bare: ## run the loader's tests with nothing but numpy and pyarrow installed
@@ -123,6 +127,7 @@ bench: $(STAMP) ## run the benchmarks: JSON into bench-results/
 	done
 	$(BIN)/internav-gen generate --out bench-results/dataset --scenes 24 --episodes-per-scene 5
 	$(BIN)/python benchmarks/envs.py bench-results/dataset > bench-results/envs.json
+	$(BIN)/python benchmarks/trainer.py bench-results/dataset > bench-results/trainer.json
 	@echo "Results: bench-results/*.json"
 
 .PHONY: check

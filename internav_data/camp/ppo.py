@@ -148,7 +148,8 @@ def step(
     gradients = torch.autograd.grad(loss, parameters, allow_unused=True)
     optimiser.zero_grad()
     for parameter, gradient in zip(parameters, gradients, strict=True):
-        parameter.grad = torch.zeros_like(parameter) if gradient is None else gradient
+        # Contiguous as parameters are, whatever kernels return: sums over it have one order so.
+        parameter.grad = torch.zeros_like(parameter) if gradient is None else gradient.contiguous()
     if reduce is not alone:
         flat = reduce(torch.cat([p.grad.flatten() for p in parameters if p.grad is not None]))
         ends = itertools.accumulate(p.numel() for p in parameters)
