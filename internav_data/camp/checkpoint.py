@@ -38,6 +38,8 @@ FORMAT: Final = 1
 FOLDER: Final = "checkpoints"
 POINTER: Final = "checkpoints.json"
 ABOUT, WEIGHTS, TRAINING = "checkpoint.json", "weights.safetensors", "training.safetensors"
+_TOLD: Final = ("environment_steps", "cloned_frames", "training_s", "dataset")
+"""Progress that evaluations tell of."""
 _JSON_AT_MOST: Final = 256_000_000
 """Bytes. The actions so far of 65,536 environments stay below."""
 _TENSORS_AT_MOST: Final = 16_000_000_000
@@ -174,6 +176,25 @@ def load_agent(path: str | Path, which: str = "last") -> Agent:
         method=checkpoint.method, config=checkpoint.config, progress=dict(checkpoint.progress)
     )
     return agent
+
+
+def export_agent(path: str | Path, folder: str | Path, which: str = "last") -> Path:
+    """Write an agent alone, to be handed on: `load_agent` and `camp-eval` take the folder.
+
+    What only training needs is left out: no run can be resumed from it.
+
+    Raises
+    ------
+    UsageError, CorruptDataError
+        See `read`; or the folder is there already.
+    """
+    folder = Path(folder)
+    if folder.exists():
+        raise UsageError(f"{folder}: is there already; choose another folder")
+    found = read(Path(path), which, training=False)
+    known = {name: found.progress[name] for name in _TOLD if name in found.progress}
+    _write_folder(folder, Checkpoint(found.method, found.config, found.weights, known))
+    return folder
 
 
 def _write_folder(folder: Path, checkpoint: Checkpoint) -> None:

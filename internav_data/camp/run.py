@@ -169,6 +169,11 @@ def resume(
         It is damaged.
     """
     since = read(request.out)
+    if not since.training:
+        raise UsageError(
+            f"{request.out}: an agent alone, without what a run needs to go on: resume the run that "
+            "it came from"
+        )
     if asked.get("method") not in {None, since.method}:
         raise UsageError(
             f"{request.out}: a run of method {since.method!r}, asked for {asked['method']!r}: "

@@ -31,6 +31,21 @@ def kept(tmp_path, made):
     return tmp_path, save(tmp_path, made())
 
 
+def test_an_agent_is_handed_on_alone(kept, made, tmp_path):
+    from internav_data.camp.run import Request, resume
+
+    run, _ = kept
+    folder = checkpoints.export_agent(run, tmp_path / "alone")
+    agent = load_agent(folder)
+    assert agent.progress == {"environment_steps": 32}
+    for name, value in agent.state_dict().items():
+        assert torch.equal(value, made().weights[name])
+    with pytest.raises(UsageError, match="there already"):
+        checkpoints.export_agent(run, folder)
+    with pytest.raises(UsageError, match="an agent alone"):
+        resume(Request(tmp_path, folder), {})
+
+
 def edit(folder, **changes):
     path = folder / checkpoints.ABOUT
     said = json.loads(path.read_bytes())
