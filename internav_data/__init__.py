@@ -16,6 +16,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from internav_data.camp.checkpoint import load_agent
     from internav_data.dataset import Dataset, compute_stats, load_dataset
     from internav_data.generation import generate_episodes, generate_house
 
@@ -26,6 +27,7 @@ _HOMES = {
     "compute_stats": "internav_data.dataset",
     "generate_episodes": "internav_data.generation",
     "generate_house": "internav_data.generation",
+    "load_agent": "internav_data.camp.checkpoint",
     "load_dataset": "internav_data.dataset",
 }
 
@@ -34,6 +36,7 @@ __all__ = [
     "compute_stats",
     "generate_episodes",
     "generate_house",
+    "load_agent",
     "load_dataset",
 ]
 

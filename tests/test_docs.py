@@ -26,6 +26,18 @@ def small_dataset(tmp_path_factory):
     return out
 
 
+@pytest.fixture(scope="module")
+def small_run(tmp_path_factory):
+    """A run that has not learnt anything yet."""
+    from internav_data.camp.agents import make_agent
+    from internav_data.camp.checkpoint import Checkpoint, save
+    from internav_data.camp.config import preset
+
+    run, config = tmp_path_factory.mktemp("docs-run"), preset("small")
+    save(run, Checkpoint("camp", config, make_agent("camp", config).state_dict()))
+    return run
+
+
 def test_generated_texts_are_up_to_date():
     updated = runpy.run_path(str(ROOT / "docs" / "update.py"))["updated"]
     for path, text in updated().items():
@@ -39,9 +51,10 @@ def test_links_lead_somewhere(page):
 
 
 @pytest.mark.parametrize("page", [p for p in PAGES if SNIPPET.search(p.read_text())], ids=str)
-def test_python_in_the_docs_runs(page, small_dataset):
+def test_python_in_the_docs_runs(page, small_dataset, small_run):
     for snippet in SNIPPET.findall(page.read_text()):
         code = snippet.replace("data/mine", str(small_dataset))
+        code = code.replace("runs/camp-0", str(small_run))
         exec(compile(code, page.name, "exec"), {})  # noqa: S102 - our own words
 
 
@@ -71,8 +84,9 @@ def test_an_example_floor_plan_can_be_built():
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.stem)
-def test_examples_run(example, small_dataset, tmp_path):
+def test_examples_run(example, small_dataset, small_run, tmp_path):
     arguments = {
+        "ship_agent": [small_run, tmp_path / "agent"],
         "contact_sheet": [small_dataset, tmp_path / "sheet.png", "--pixels", "120"],
         "stream_episodes": [small_dataset],
         "ways_in_a_house": ["--seed", "7", "--scene", "3"],

@@ -171,8 +171,8 @@ def resume(
     since = read(request.out)
     if not since.training:
         raise UsageError(
-            f"{request.out}: an agent alone, without what a run needs to go on: resume the run that "
-            "it came from"
+            f"{request.out}: an agent alone, without what a run needs to go on; resume the run "
+            "that it came from"
         )
     if asked.get("method") not in {None, since.method}:
         raise UsageError(
