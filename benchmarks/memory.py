@@ -34,7 +34,7 @@ CACHES = {
     "shells of assets": shells.shell_of,
     "shells in place": shells.placed_shell,
     "footprints to drop": drop._standing,
-    "corners": sweeps._about_middle,
+    "corners": sweeps.about_middle,
     "marks": expert_ground._marks,
 }
 
