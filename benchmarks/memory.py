@@ -21,21 +21,27 @@ import numpy as np
 import psutil
 
 from internav_data.envs import InterNavEnv
-from internav_data.episodes import expert_ground
-from internav_data.world import drop, push, settle, shells, sweeps
+from internav_data.episodes.expert_ground import _marks
+from internav_data.world.drop import _standing
+from internav_data.world.push import _push_alone, _push_in
+from internav_data.world.settle import _settle_alone
+from internav_data.world.shells import placed_shell, shell_of
+from internav_data.world.sweeps import about_middle
+from internav_data.world.touch import outline_of
 
 TARGET_MIB = 64.0
 SHARES = np.array([8, 2, 2, 0.5, 0.5, 0.4, 0.4, 0.4, 0.4, 1, 1, 0], np.float64)
 REPORTS = 20
 CACHES = {
-    "push alone": push._push_alone,
-    "push in a scene": push._push_in,
-    "settle alone": settle._settle_alone,
-    "shells of assets": shells.shell_of,
-    "shells in place": shells.placed_shell,
-    "footprints to drop": drop._standing,
-    "corners": sweeps._about_middle,
-    "marks": expert_ground._marks,
+    "push alone": _push_alone,
+    "push in a scene": _push_in,
+    "settle alone": _settle_alone,
+    "shells of assets": shell_of,
+    "shells in place": placed_shell,
+    "outlines in place": outline_of,
+    "footprints to drop": _standing,
+    "corners": about_middle,
+    "marks": _marks,
 }
 
 

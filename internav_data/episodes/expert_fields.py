@@ -75,12 +75,16 @@ def _step_cost(
 
 
 @njit(cache=True)
-def field(fixed: Flags, masks: Ints, banned: int, prices: Ints, ny: int, seeds: Ints) -> Costs:
+def field(
+    fixed: Flags, masks: Ints, banned: int, prices: Ints, ny: int, seeds: Ints, until: int
+) -> Costs:
     """Cost from every pose to the nearest of some poses, FAR where cut off.
 
     Shapes: fixed (3, nodes) uint8 and masks (3, nodes) int64, rows as in the lattice's blockers:
     what closes a node or an edge for good, and one bit for each movable thing that blocks it.
     Things in `banned` close theirs as well; the others cost their price. Dijkstra over buckets.
+    Once the pose `until` is known, so is all that its way down meets: costs above are bounds only.
+    A negative one asks for all.
     """
     poses = 4 * fixed.shape[1]
     costs = np.full(poses, FAR, dtype=np.int32)
@@ -94,7 +98,7 @@ def field(fixed: Flags, masks: Ints, banned: int, prices: Ints, ny: int, seeds: 
         heads[0] = used
         used += 1
         waiting += 1
-    while waiting > 0:
+    while waiting > 0 and (until < 0 or costs[until] >= cost):
         bucket = cost % BUCKETS
         while heads[bucket] >= 0:
             pose = entry[heads[bucket]]

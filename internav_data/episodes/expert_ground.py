@@ -117,9 +117,9 @@ class Ground:
         """Return the number of the agent's pose."""
         return 4 * (world.i * self.ny + world.j) + world.quarter
 
-    def costs(self, masks: Ints, banned: int, prices: Ints) -> Costs:
-        """Cost from every pose to the goal, Done left out."""
-        costs: Costs = field(self.fixed, masks, banned, prices, self.ny, self.goals)
+    def costs(self, masks: Ints, banned: int, prices: Ints, until: int = -1) -> Costs:
+        """Cost from every pose to the goal, Done left out; `until` as in `field`."""
+        costs: Costs = field(self.fixed, masks, banned, prices, self.ny, self.goals, until)
         return costs
 
     def way(
@@ -136,7 +136,7 @@ class Ground:
         """
         seeds = np.array([turned_round(pose)], dtype=np.int64)
         none = np.zeros(THINGS_AT_MOST, dtype=np.int64)
-        back: Costs = field(self.fixed, masks, EVERYTHING, none, self.ny, seeds)
+        back: Costs = field(self.fixed, masks, EVERYTHING, none, self.ny, seeds, -1)
         return back.reshape(-1, 4)[:, [2, 3, 0, 1]].reshape(-1), back
 
     def walk(self, masks: Ints, back: Costs, pose: int) -> list[int]:

@@ -68,7 +68,7 @@ class Polygons:
 
 
 @njit(cache=True)
-def _convex_hull(points: Floats) -> Floats:
+def convex_hull(points: Floats) -> Floats:
     """Corners of the convex hull, counter-clockwise, collinear points dropped (monotone chain)."""
     count = len(points)
     order = np.argsort(points[:, 0])
@@ -167,7 +167,7 @@ def _project(  # noqa: C901 - one kernel, three plain loops
         plan = _clipped(moved[starts[part] : starts[part + 1]], low, high)
         if len(plan) == 0:
             continue
-        hull = _convex_hull(plan)
+        hull = convex_hull(plan)
         vertices = np.concatenate((vertices, hull))
         count += 1
         offsets[count] = len(vertices)

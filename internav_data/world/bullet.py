@@ -11,14 +11,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from internav_data.geometry import asset_corners, centre_of_mass, multiply, rotation_matrix
+from internav_data.geometry import centre_of_mass, multiply, rotation_matrix
 from internav_data.records import Pose
 from internav_data.world.bullet_scene import RULES, STEP_S, Builder, pybullet
 from internav_data.world.setting import Motion, Rest
-from internav_data.world.sweeps import trail_of
+from internav_data.world.sweeps import radius_m, trail_of
 
 if TYPE_CHECKING:
-    from internav_data.records import Asset, Vec3
+    from internav_data.records import Asset
     from internav_data.world.setting import Setting, Shove
 
 
@@ -26,6 +26,8 @@ REST_SPEED = 0.001
 """m/s."""
 REST_SPIN = 0.01
 """rad/s."""
+SHIFT_M = 10.0 * REST_SPEED * STEP_S
+"""What came farther than this in one step is not slow: its speed need not be asked."""
 REST_STEPS = 10
 """A thing is at rest once it was slow for this many steps running."""
 SETTLE_LIMIT_S = 1.0
@@ -54,7 +56,7 @@ class Bullet:
         """Let the first body fall until at rest, one second at most."""
         ids = self._builder.build(setting)
         body = setting.bodies[0]
-        radius = _radius(body.asset)
+        radius = radius_m(body.asset)
         start, start_turn = pybullet.getBasePositionAndOrientation(ids[0], self._builder.client)
         reach, calm, steps = 0.0, 0, 0
         limit = round(SETTLE_LIMIT_S / STEP_S)
@@ -78,31 +80,28 @@ class Bullet:
     def push(self, setting: Setting, shove: Shove) -> Motion:
         """Push the first body along +x, let it go, and wait until all that moves is at rest."""
         ids = self._builder.build(setting)
+        client = self._builder.client
         moving = [k for k, body in enumerate(setting.bodies) if body.moves]
-        trails = [trail_of(setting.bodies[k].asset) for k in moving]
+        pushes_left = round(shove.seconds / STEP_S)
+        limit = pushes_left + round(PUSH_LIMIT_S / STEP_S)
+        trails = [trail_of(setting.bodies[k].asset, limit) for k in moving]
         movers = [(ids[k], trail) for k, trail in zip(moving, trails, strict=True)]
         for mover, _ in movers[1:]:
             # What is not touched neither trembles nor costs time; a touch wakes it.
-            pybullet.changeDynamics(
-                mover, -1, activationState=_ASLEEP, physicsClientId=self._builder.client
-            )
+            pybullet.changeDynamics(mover, -1, activationState=_ASLEEP, physicsClientId=client)
         for mover, trail in movers:
-            trail.follow(*pybullet.getBasePositionAndOrientation(mover, self._builder.client))
+            trail.follow(*pybullet.getBasePositionAndOrientation(mover, client))
         gain = shove.force_n / setting.bodies[0].asset.mass_kg * STEP_S
-        pushes_left = round(shove.seconds / STEP_S)
         calm, steps, rests = 0, 0, False
-        limit = pushes_left + round(PUSH_LIMIT_S / STEP_S)
         while steps < limit and not rests:
             if pushes_left:
                 pushes_left = self._shove(ids[0], shove, gain, pushes_left)
-            pybullet.stepSimulation(self._builder.client)
+            pybullet.stepSimulation(client)
             steps += 1
             slow = not pushes_left
             for mover, trail in movers:
-                trail.follow(*pybullet.getBasePositionAndOrientation(mover, self._builder.client))
-                if slow:
-                    speed, spin = pybullet.getBaseVelocity(mover, self._builder.client)
-                    slow = math.hypot(*speed) < REST_SPEED and math.hypot(*spin) < REST_SPIN
+                shift = trail.follow(*pybullet.getBasePositionAndOrientation(mover, client))
+                slow = slow and shift < SHIFT_M and self._slow(mover)
             calm = calm + 1 if slow else 0
             rests = calm >= REST_STEPS
             if steps % CREEP_STEPS == 0:
@@ -113,9 +112,15 @@ class Bullet:
         return Motion(
             poses=tuple(self._pose(ids[k], setting.bodies[k].asset) for k in moving),
             sweeps=tuple(trail.octagon for trail in trails),
+            paths=tuple(trail.path for trail in trails),
             seconds=steps * STEP_S,
             at_rest=rests,
         )
+
+    def _slow(self, identity: int) -> bool:
+        """Whether a body's speed and spin are those of one at rest."""
+        speed, spin = pybullet.getBaseVelocity(identity, self._builder.client)
+        return math.hypot(*speed) < REST_SPEED and math.hypot(*spin) < REST_SPIN
 
     def _shove(self, identity: int, shove: Shove, gain: float, pushes_left: int) -> int:
         """Push for one step; returns how many steps of pushing are left."""
@@ -144,13 +149,6 @@ class Bullet:
         contacts: Any = pybullet.getContactPoints(bodyA=identity, physicsClientId=client)
         depths = [-contact[8] for contact in contacts]
         return max(0.0, *depths) if depths else 0.0
-
-
-def _radius(asset: Asset) -> float:
-    """Farthest corner from the centre of mass: how far a turn can carry it."""
-    corners, _ = asset_corners(asset)
-    middle: Vec3 = centre_of_mass(asset)
-    return max(math.dist(corner, middle) for corner in corners.tolist())
 
 
 def _angle(first: tuple[float, ...], second: tuple[float, ...]) -> float:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from internav_data.geometry import centre_of_mass
+from internav_data.world.setting import AGENT_HEIGHT_M, AGENT_LOW_M
 from internav_data.world.wavefront import obj_text
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ def _import_quietly() -> ModuleType:
 
 pybullet: Any = _import_quietly()
 
-RULES = 2
+RULES = 3
 """Raised with every change of what scenes, settling or pushing give: certificates name it, so a
 dataset made by other rules is told from a wrong one."""
 STEP_S = 1.0 / 240.0
@@ -57,10 +58,6 @@ rub: slides come out 8 % short, on a box 4 % (of v^2 / 2 mu g)."""
 FLOOR_FRICTION = 1.0
 """Bullet multiplies frictions, so an asset's own is what acts on floor and walls."""
 ROLLING_FRICTION = 0.01
-AGENT_LOW_M = 0.022
-"""What is lower than 2 cm is no obstacle (footprints leave it out), so the agent's body begins
-above it: a column down to the floor would wedge under the feet of what it stands beside."""
-AGENT_HEIGHT_M = 1.8
 
 
 @dataclass(frozen=True, slots=True, eq=False)

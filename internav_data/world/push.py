@@ -7,18 +7,20 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final, Literal
 
-from internav_data.geometry import centre_of_mass, round_m
+from internav_data.geometry import round_m
 from internav_data.records import Pose
+from internav_data.world.displacement import is_still, shift_m, tilt_deg
 from internav_data.world.frames import Frame
-from internav_data.world.octagons import grown, octagon_of_disc, overlap
-from internav_data.world.setting import Body, Column, Setting, Shove
+from internav_data.world.octagons import grown
+from internav_data.world.setting import AGENT_HEIGHT_M, AGENT_LOW_M, Body, Column, Setting, Shove
 from internav_data.world.settle import engine_of_this_process
 from internav_data.world.sweeps import extent_of
+from internav_data.world.touch import met_on_path, outline_of, outline_of_column
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Container, Sequence
 
-    from internav_data.records import Asset, Quaternion, Vec2, Vec3
+    from internav_data.records import Asset, Quaternion, Vec2
     from internav_data.world.octagons import Octagon
     from internav_data.world.setting import Engine, Motion
 
@@ -38,26 +40,26 @@ SUCCESS_M: Final = 0.05
 TOPPLED_DEG: Final = 45.0
 TOUCH_M: Final = 0.005
 """Bodies this near may touch: the engine's hulls are thicker by a margin of 1 mm."""
+MEET_M: Final = 0.012
+"""What a body's kept poses come this near of may touch it: poses lie up to 1 cm apart, so what lies
+between them is missed by half of that at most."""
 AGENT_M: Final = 0.21
 """Radius of the agent's column: nothing ends inside its disc of 0.2 m."""
 AGENT_LEAST_M: Final = 0.2005
 """What already stands nearer than the column is not pressed away by it."""
-AROUND_M: Final = 0.05
-"""How far round the free sweep bodies are gathered at first."""
 ROUNDS: Final = 8
 """What was reached though it was left out joins the next round; the last one takes all within
 `FAR_M`."""
 FAR_M: Final = 4.0
 ON_M: Final = 0.2
-"""How far round what the push may meet bodies are gathered too."""
-STILL_M: Final = 0.0005
-STILL_RAD: Final = 0.001
-"""A neighbour that moved less has not moved: the engine's own trembling."""
+"""How far round what is met more may be met: a guess of how many things will move."""
 _HEIGHT_DIGITS: Final = 3
 """What settled lies 0.9 or 1.0 mm high: one solution serves both."""
 _START_DIGITS: Final = 4
 """Orientations of a free push are rounded to 0.1 mrad, which moves a corner by less than the 0.1 mm
 of stored positions: nearly equal ones share their solution."""
+
+_OWN: Final = Frame(0.0, 0.0, 0)
 
 Failure = Literal["", "too heavy", "something is in the way", "the agent is in the way"]
 
@@ -122,17 +124,18 @@ def push(
     failure: Failure = "too heavy"
 
     def moves() -> bool:
-        return _shift(asset, pose, frame.leave(motion.poses[0])) >= SUCCESS_M
+        return shift_m(asset, pose, frame.leave(motion.poses[0])) >= SUCCESS_M
 
     # What is too heavy alone is not lighter among others, nor freer beside the agent.
-    if moves() and _reached(frame, near, free.sweeps, TOUCH_M):
+    known = _met(frame, near, (asset,), free) if moves() else {}
+    if known:
         failure = "something is in the way"
-        motion, movers = _push_among(asset, start, frame, near, None, shove, free.sweeps)
+        motion, movers = _push_among(asset, start, frame, near, None, shove, known)
     column = _column(frame, agent, agent_gap_m)
-    if column is not None and moves() and _meets(column, motion.sweeps):
+    if column is not None and moves() and _meets(column, (asset, *_assets(movers)), motion):
         # Only now: what never comes near the agent is solved once, wherever it stands.
         failure = "the agent is in the way"
-        motion, movers = _push_among(asset, start, frame, near, column, shove, motion.sweeps)
+        motion, movers = _push_among(asset, start, frame, near, column, shove, known)
     return _judged(asset, pose, frame, motion, movers, failure)
 
 
@@ -143,7 +146,12 @@ def crowd(asset: Asset, pose: Pose, heading: int, near: Near, model: PushModel =
     """
     frame = Frame(pose.x, pose.y, heading)
     free = _push_alone(asset, _start(frame, pose), SHOVES[model], engine_of_this_process())
-    return sum(body.moves for body in _gathered(frame, near, free.sweeps).values())
+    if shift_m(asset, pose, frame.leave(free.poses[0])) < SUCCESS_M:
+        return 0
+    known = _met(frame, near, (asset,), free)
+    for body in [body for body in known.values() if body.moves]:
+        known.update(near(grown(extent_of(body.asset, body.pose).octagon, ON_M)))
+    return sum(body.moves for body in known.values())
 
 
 def _start(frame: Frame, pose: Pose) -> Pose:
@@ -168,11 +176,13 @@ def _push_among(
     near: Near,
     column: Column | None,
     shove: Shove,
-    sweeps: Sequence[Octagon],
+    known: dict[int, Body],
 ) -> tuple[Motion, Movers]:
-    """Push among what can be touched: gathered anew until nothing left out was reached."""
+    """Push among what is touched: solved anew until nothing left out is.
+
+    What turns out to be touched joins `known`.
+    """
     engine = engine_of_this_process()
-    known = _gathered(frame, near, sweeps)
     for left in reversed(range(ROUNDS)):
         around = [(key, known[key]) for key in sorted(known)]
         movers = tuple(pair for pair in around if pair[1].moves)
@@ -182,28 +192,35 @@ def _push_among(
         )
         setting = Setting((Body(asset, start, moves=True), *bodies), column)
         motion = _push_in(setting, shove, engine)
-        reached = _reached(frame, near, motion.sweeps, TOUCH_M)
-        if reached.keys() <= known.keys():
+        met = _met(frame, near, (asset, *_assets(movers)), motion, known)
+        if not met:
             break
-        known.update(reached)
+        known.update(met)
         if left == 1:
-            known.update(_reached(frame, near, sweeps, FAR_M))
+            for sweep in motion.sweeps:
+                known.update(near(grown(frame.leave_octagon(sweep), FAR_M)))
     return motion, movers
 
 
-def _gathered(frame: Frame, near: Near, sweeps: Sequence[Octagon]) -> dict[int, Body]:
-    """Gather what a push may meet, and what that may be driven on to."""
-    known = _reached(frame, near, sweeps, AROUND_M)
-    for body in [body for body in known.values() if body.moves]:
-        known.update(near(grown(extent_of(body.asset, body.pose).octagon, ON_M)))
-    return known
+def _assets(movers: Movers) -> tuple[Asset, ...]:
+    return tuple(body.asset for _, body in movers)
 
 
-def _reached(frame: Frame, near: Near, sweeps: Iterable[Octagon], margin: float) -> dict[int, Body]:
-    """Gather what lies within a margin of what was swept."""
+def _met(
+    frame: Frame,
+    near: Near,
+    moving: Sequence[Asset],
+    motion: Motion,
+    known: Container[int] = (),
+) -> dict[int, Body]:
+    """Gather what is not known yet and may be touched by what moves."""
     found: dict[int, Body] = {}
-    for sweep in sweeps:
-        found.update(near(grown(frame.leave_octagon(sweep), margin)))
+    for asset, sweep, path in zip(moving, motion.sweeps, motion.paths, strict=True):
+        around = near(grown(frame.leave_octagon(sweep), MEET_M))
+        asked = [pair for pair in around if pair[0] not in known and pair[0] not in found]
+        outlines = [outline_of(body.asset, body.pose) for _, body in asked]
+        met = met_on_path(asset, path, frame, outlines, MEET_M)
+        found.update(pair for pair, touched in zip(asked, met, strict=True) if touched)
     return found
 
 
@@ -217,18 +234,18 @@ def _judged(
 ) -> Pushed:
     """Move a motion from the thing's own frame into the house, round it, and judge it."""
     end = frame.leave(motion.poses[0])
-    far = round_m(_shift(asset, pose, end))
+    far = round_m(shift_m(asset, pose, end))
     moved = []
     for (key, body), after in zip(movers, motion.poses[1:], strict=True):
         there = frame.leave(after)
-        if not _still(body, there):
+        if not is_still(body.pose, there):
             moved.append((key, there))
     success = far >= SUCCESS_M
     return Pushed(
         pose=end,
         displacement_m=far,
         seconds=round(motion.seconds, 6),
-        toppled=_tilt_deg(pose.quaternion, end.quaternion) > TOPPLED_DEG,
+        toppled=tilt_deg(pose.quaternion, end.quaternion) > TOPPLED_DEG,
         moved=tuple(moved),
         success=success,
         reason="" if success else failure,
@@ -248,42 +265,10 @@ def _column(frame: Frame, agent: Vec2 | None, gap: float) -> Column | None:
     return Column(x, y, min(AGENT_M, max(AGENT_LEAST_M, round_m(gap))))
 
 
-def _meets(column: Column, sweeps: Iterable[Octagon]) -> bool:
-    """Whether anything swept comes near the agent's column."""
-    disc = octagon_of_disc(column.x, column.y, column.radius_m + TOUCH_M)
-    return any(overlap(disc, sweep) for sweep in sweeps)
-
-
-def _rotated(quaternion: Quaternion, vector: Vec3) -> Vec3:
-    """Turn a vector; plain floats, since arrays of three cost more than they save."""
-    x, y, z, w = quaternion
-    u, v, t = vector
-    s = 2.0 / (x * x + y * y + z * z + w * w)
-    # Twice the cross product with the axis, then once more (Rodrigues).
-    a, b, c = y * t - z * v, z * u - x * t, x * v - y * u
-    return (
-        u + s * (w * a + y * c - z * b),
-        v + s * (w * b + z * a - x * c),
-        t + s * (w * c + x * b - y * a),
+def _meets(column: Column, moving: Sequence[Asset], motion: Motion) -> bool:
+    """Whether anything that moves comes near the agent's column."""
+    agent = outline_of_column(column.x, column.y, column.radius_m, AGENT_LOW_M, AGENT_HEIGHT_M)
+    return any(
+        any(met_on_path(asset, path, _OWN, [agent], MEET_M))
+        for asset, path in zip(moving, motion.paths, strict=True)
     )
-
-
-def _shift(asset: Asset, before: Pose, after: Pose) -> float:
-    """How far the centre of mass moved in the plane."""
-    middle = centre_of_mass(asset)
-    ax, ay, _ = _rotated(before.quaternion, middle)
-    bx, by, _ = _rotated(after.quaternion, middle)
-    return math.hypot(after.x + bx - before.x - ax, after.y + by - before.y - ay)
-
-
-def _tilt_deg(before: Quaternion, after: Quaternion) -> float:
-    """Angle between a thing's own upward axis before and after."""
-    a, b = _rotated(before, (0.0, 0.0, 1.0)), _rotated(after, (0.0, 0.0, 1.0))
-    return math.degrees(math.acos(max(-1.0, min(1.0, a[0] * b[0] + a[1] * b[1] + a[2] * b[2]))))
-
-
-def _still(body: Body, there: Pose) -> bool:
-    here = body.pose
-    near = math.dist((here.x, here.y, here.z), (there.x, there.y, there.z)) < STILL_M
-    turn = abs(sum(p * q for p, q in zip(here.quaternion, there.quaternion, strict=True)))
-    return near and 2.0 * math.acos(min(1.0, turn)) < STILL_RAD

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 from internav_data.records import Asset, Part, Pose
 
@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from internav_data.world.octagons import Octagon
 
 UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
+AGENT_LOW_M: Final = 0.022
+"""What is lower than 2 cm is no obstacle (footprints leave it out), so the agent's body begins
+above it: a column down to the floor would wedge under the feet of what it stands beside."""
+AGENT_HEIGHT_M: Final = 1.8
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +29,7 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """The agent's body: a fixed upright cylinder, 1.8 m high."""
+    """The agent's body: a fixed upright cylinder from `AGENT_LOW_M` to `AGENT_HEIGHT_M`."""
 
     x: float
     y: float
@@ -101,6 +105,8 @@ class Motion:
     """Not rounded: the caller moves them into place first."""
     sweeps: tuple[Octagon, ...]
     """What each body's corners swept in the plane, its start included."""
+    paths: tuple[bytes, ...]
+    """Each body's poses on its way as float32 numbers, seven each: centre of mass, quaternion."""
     seconds: float
     """Simulated time from the first touch until at rest, or the time limit."""
     at_rest: bool

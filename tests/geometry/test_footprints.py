@@ -23,7 +23,7 @@ from internav_data.geometry import (
     wall_footprints,
     yaw_quaternion,
 )
-from internav_data.geometry.footprints import _convex_hull
+from internav_data.geometry.footprints import convex_hull
 from internav_data.records import Asset, Part, Pose
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -99,7 +99,7 @@ def test_footprints_are_the_plans_of_what_stands_between_the_heights(pieces, x, 
 @given(st.lists(st.tuples(centimetres, centimetres), min_size=3, max_size=30))
 def test_hulls_are_shapelys(points):
     expected = shapely.MultiPoint(points).convex_hull
-    found = _convex_hull(np.array(points))
+    found = convex_hull(np.array(points))
     if expected.geom_type != "Polygon":
         return
     assert shapely.Polygon(found).equals(expected)

@@ -1,0 +1,50 @@
+"""How far a thing moved and turned from one pose to another."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+from internav_data.geometry import centre_of_mass
+
+if TYPE_CHECKING:
+    from internav_data.records import Asset, Pose, Quaternion, Vec3
+
+STILL_M: Final = 0.0005
+STILL_RAD: Final = 0.001
+"""A neighbour that moved less has not moved: the engine's own trembling."""
+
+
+def _rotated(quaternion: Quaternion, vector: Vec3) -> Vec3:
+    """Turn a vector; plain floats, since arrays of three cost more than they save."""
+    x, y, z, w = quaternion
+    u, v, t = vector
+    s = 2.0 / (x * x + y * y + z * z + w * w)
+    # Twice the cross product with the axis, then once more (Rodrigues).
+    a, b, c = y * t - z * v, z * u - x * t, x * v - y * u
+    return (
+        u + s * (w * a + y * c - z * b),
+        v + s * (w * b + z * a - x * c),
+        t + s * (w * c + x * b - y * a),
+    )
+
+
+def shift_m(asset: Asset, before: Pose, after: Pose) -> float:
+    """How far a thing's centre of mass moved in the plane, metres."""
+    middle = centre_of_mass(asset)
+    ax, ay, _ = _rotated(before.quaternion, middle)
+    bx, by, _ = _rotated(after.quaternion, middle)
+    return math.hypot(after.x + bx - before.x - ax, after.y + by - before.y - ay)
+
+
+def tilt_deg(before: Quaternion, after: Quaternion) -> float:
+    """Angle between a thing's own upward axis before and after, degrees."""
+    a, b = _rotated(before, (0.0, 0.0, 1.0)), _rotated(after, (0.0, 0.0, 1.0))
+    return math.degrees(math.acos(max(-1.0, min(1.0, a[0] * b[0] + a[1] * b[1] + a[2] * b[2]))))
+
+
+def is_still(here: Pose, there: Pose) -> bool:
+    """Whether a thing moved less than the engine trembles."""
+    near = math.dist((here.x, here.y, here.z), (there.x, there.y, there.z)) < STILL_M
+    turn = abs(sum(p * q for p, q in zip(here.quaternion, there.quaternion, strict=True)))
+    return near and 2.0 * math.acos(min(1.0, turn)) < STILL_RAD
