@@ -240,3 +240,24 @@ def test_a_tall_thing_topples_and_lies_on_the_floor():
     heights = transform(corners, pushed.pose)[:, 2]
     assert heights.min() == pytest.approx(0.001, abs=0.003)
     assert heights.max() < 0.3
+
+
+def test_what_slides_free_slides_straight():
+    """Solvers that let things drift and turn (Bullet's maximal coordinates do) fail here."""
+    from internav_data.catalog import catalogue
+
+    turned, aside = [], []
+    for thing in catalogue().spawnable[::9]:
+        if not thing.pushable:
+            continue
+        done = push(thing, STANDING, 0, alone)
+        if done.toppled or done.displacement_m < 0.2:
+            continue
+        x, y, z, w = done.pose.quaternion
+        yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        turned.append(abs(math.degrees(yaw)))
+        aside.append(abs(done.pose.y - STANDING.y) / done.displacement_m)
+    assert len(turned) > 15
+    assert np.mean(turned) < 0.1
+    assert max(turned) < 1.0
+    assert max(aside) < 0.01
