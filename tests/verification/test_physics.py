@@ -268,6 +268,24 @@ def test_world_that_pushes_into_floor_or_wall(scenes, monkeypatch, into):
     assert "physics.outcome-sunk" in found_in(scenes, 1, 1)
 
 
+def test_what_leans_through_a_window_is_not_in_the_wall(scenes):
+    """Above a sill and below a lintel there is no wall; a board across the sill itself is in it."""
+    house, _ = scenes[1]
+    wall = next(w for w in house.walls if w.z_min == 0.0)
+    sill, lintel = replace(wall, z_max=0.9), replace(wall, z_min=2.1)
+    walls = tuple(w for w in house.walls if w is not wall)
+    x, y = (wall.x_min + wall.x_max) / 2, (wall.y_min + wall.y_max) / 2
+    board = scenery.asset(
+        "Board", (0.4, 0.4, 0.04), (scenery.part("box", (0.0,) * 3, (0.4, 0.4, 0.04)),)
+    )
+    assets = {**ASSETS, "Board": board}
+    for through, sills in ((house, 0), (replace(house, walls=(*walls, sill, lintel)), 1)):
+        theatre = Theatre(Site(through, Shapes(assets)), FORCE)
+        for z, inside in ((0.5, True), (0.925, False), (1.5, False), (2.2, True)):
+            pose = Pose(x, y, z, (0.0, 0.0, 0.0, 1.0))
+            assert theatre.in_walls("Board", pose, 0.01) == (inside or not sills)
+
+
 def test_what_carries_something_is_not_picked_up(scenes):
     house, episodes = scenes[2]
     tall = scenery.part("box", (0.0, 0.0, 0.602), (0.3, 0.4, 0.396))

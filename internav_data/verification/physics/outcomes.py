@@ -13,7 +13,6 @@ import shapely
 
 from internav_data.verification.interactions import PICK_OUTCOME, PUSH_OUTCOMES
 from internav_data.verification.lengths import Between
-from internav_data.verification.overlaps import overlapping_plans
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -125,8 +124,8 @@ class _Judge:
             low, _ = theatre.span(asset_id, pose)
             name = f"{asset_id} ends above the floor"
             self.expect("sunk", name, f"{low:.4f} m", holds=low >= -SUNK_M)
-            hits = overlapping_plans(theatre.footprint(asset_id, pose), theatre.site.walls, SUNK_M)
-            self.expect("sunk", f"{asset_id} ends clear of walls", len(hits), holds=not hits)
+            inside = theatre.in_walls(asset_id, pose, SUNK_M)
+            self.expect("sunk", f"{asset_id} ends clear of walls", "in one", holds=not inside)
 
     def _distances(self, world: World, changes: dict[int, Pose | None]) -> None:
         """Judge both distances with things where they came to rest."""

@@ -9,6 +9,8 @@ import numpy as np
 import shapely
 from shapely import Point
 
+from internav_data.verification.overlaps import overlapping_slabs
+from internav_data.verification.things import wall_slabs
 from internav_data.world import Stage, World
 
 if TYPE_CHECKING:
@@ -41,6 +43,7 @@ class Theatre:
         self.settings = settings
         self.assets: dict[str, Asset] = dict(site.shapes.assets)
         self.stage = Stage.of(replace(site.house, assets=self.assets))
+        self._walls = wall_slabs(site.house)
         self._sites: dict[frozenset[int], Site] = {}
         self._prints: dict[tuple[str, Pose], tuple[Geometry, ...]] = {}
         self._spans: dict[tuple[str, Pose], tuple[float, float]] = {}
@@ -84,6 +87,17 @@ class Theatre:
             slabs = self.site.shapes.slabs(asset_id, pose)
             self._spans[key] = (min(s.low for s in slabs), max(s.high for s in slabs))
         return self._spans[key]
+
+    def in_walls(self, asset_id: str, pose: Pose, depth_m: float) -> bool:
+        """Whether a thing reaches deeper than `depth_m` into a wall.
+
+        In space: what leans over a window's sill is above the wall there.
+        """
+        own = self.site.shapes.slabs(asset_id, pose)
+        plan = shapely.union_all([slab.plan for slab in own])
+        near = [slab for slab in self._walls if shapely.intersects(slab.plan, plan)]
+        owners = [0] * len(near) + [1] * len(own)
+        return bool(overlapping_slabs([*near, *own], owners, lambda *_: False, depth_m))
 
     def gap(self, asset_id: str, pose: Pose, point: tuple[float, float]) -> float:
         """Distance in the plane from a point to a thing, parts of any height, metres."""
