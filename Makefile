@@ -81,14 +81,14 @@ demo: $(STAMP) ## make a small dataset, prove it right, draw it: about three min
 	@echo "Make more $(BIN)/internav-gen generate --help"
 
 DEMO_TRAIN := --device cpu --preset small --init-from expert --steps 32768 \
-  --set cloning.frames=20000 --set cloning.epochs=2 --set ppo.critic_rollouts=4 \
+  --set cloning.frames=80000 --set cloning.epochs=1 --set ppo.critic_rollouts=4 \
   --set stages.auxiliary_share=0 --set stages.joint_learning_rate=3e-4 \
-  --set run.max_steps=100 --set run.validate_every=8
-DEMO_MEASURE := --split all --max-steps 100 --force
+  --set run.max_steps=150 --set run.validate_every=8
+DEMO_MEASURE := --split all --max-steps 150 --force
 
 .PHONY: demo-train
 demo-train: $(STAMP) ## see CaMP learn on a small dataset: about five minutes
-	$(BIN)/internav-gen generate --out $(DEMO)/houses --scenes 62 --episodes-per-scene 10 \
+	$(BIN)/internav-gen generate --out $(DEMO)/houses --scenes 122 --episodes-per-scene 10 \
 	  --rooms 1 --set 'episodes.max_obstacles=[2,2,2]'
 	$(BIN)/internav-gen generate --out $(DEMO)/unseen --scenes 32 --episodes-per-scene 4 \
 	  --rooms 1 --set 'episodes.max_obstacles=[2,2,2]' --seed 1

@@ -12,6 +12,7 @@ seeds of the study.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import subprocess
 import sys
@@ -68,6 +69,30 @@ def one_run(folder: Path, name: str, seed: int) -> None:
     sys.stderr.write(f"{name}-{seed} is done\n")
 
 
+def draw_curves(folder: Path) -> None:
+    """Draw training success against steps, a line a method: means over its seeds."""
+    from internav_data.views.curves import Curve, curves_svg
+
+    curves = []
+    for name in METHODS:
+        logs = sorted((folder / "runs").glob(f"{name}-?/log.jsonl"))
+        found: dict[float, list[float]] = {}
+        for row in (json.loads(line) for log in logs for line in log.open()):
+            # Hierarchies spend the first stage on tasks of their own; the rest is alike.
+            if row.get("stage") in {"single", "all"} and "success" in row.get("episode", {}):
+                found.setdefault(row["step"], []).append(100.0 * row["episode"]["success"])
+        whole = {step: values for step, values in found.items() if len(values) == len(logs)}
+        curves.append(Curve(name, tuple((s, sum(v) / len(v)) for s, v in sorted(whole.items()))))
+    title = "Success of the last 100 training episodes, %"
+    picture = curves_svg(title, "environment steps after cloning", curves)
+    style = "<style>text{font:11px sans-serif}.grid{stroke:#ddd}.left,.name{text-anchor:end}"
+    style += ".below{text-anchor:middle}.title{font-weight:bold}</style>"
+    head, rest = picture.split(">", 1)
+    head = head.replace("<svg", '<svg xmlns="http://www.w3.org/2000/svg" width="920"')
+    ground = '<rect width="100%" height="100%" fill="white"/>'
+    (folder / "results" / "curves.svg").write_text(f"{head}>{style}{ground}{rest}\n")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
@@ -89,6 +114,7 @@ def main() -> None:
         found = sorted((results / kind).iterdir())
         tool("camp-eval", "compare", *found, oracles, "--dataset", unseen,
              "--out", results / f"all-{kind}", "--force")  # fmt: skip
+    draw_curves(folder)
 
 
 if __name__ == "__main__":
