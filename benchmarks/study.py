@@ -41,6 +41,7 @@ TRAINING = (
     "--set", "run.validation_episodes=32", "--set", "run.tensorboard=false",
     "--set", "ppo.critic_rollouts=4", "--set", "stages.joint_learning_rate=3e-4",
 )  # fmt: skip
+LEAST_EPISODES = 50
 MEASURE = ("--split", "all", *NEAR, "--max-steps", 200, "--limit", 400, "--no-oracles")
 
 
@@ -77,10 +78,16 @@ def draw_curves(folder: Path) -> None:
     for name in METHODS:
         logs = sorted((folder / "runs").glob(f"{name}-?/log.jsonl"))
         found: dict[float, list[float]] = {}
-        for row in (json.loads(line) for log in logs for line in log.open()):
-            # Hierarchies spend the first stage on tasks of their own; the rest is alike.
-            if row.get("stage") in {"single", "all"} and "success" in row.get("episode", {}):
-                found.setdefault(row["step"], []).append(100.0 * row["episode"]["success"])
+        for log in logs:
+            ended = 0
+            for row in map(json.loads, log.open()):
+                # All scenes alone: hierarchies spend the first stage on tasks of their own. The
+                # first episodes to end are the short ones, so a mean is over 50 at least.
+                if row.get("stage") == "all" and "episode" in row:
+                    ended += row["episode"]["ended"]
+                    if ended >= LEAST_EPISODES:
+                        success = 100.0 * row["episode"]["success"]
+                        found.setdefault(row["step"], []).append(success)
         whole = {step: values for step, values in found.items() if len(values) == len(logs)}
         curves.append(Curve(name, tuple((s, sum(v) / len(v)) for s, v in sorted(whole.items()))))
     title = "Success of the last 100 training episodes, %"
