@@ -128,7 +128,7 @@ def _settings(given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _config(given: dict[str, Any]) -> CampConfig:
-    from internav_data.camp.run import config_of, default_preset
+    from internav_data.camp.settings import config_of, default_preset
 
     name = given["preset"] or default_preset(given["device"])
     return config_of(name, given["config_file"], given["overrides"], _settings(given))
@@ -199,7 +199,7 @@ def _train(request: Request, given: dict[str, Any]) -> int:
 
 def _asked(given: dict[str, Any], request: Request) -> dict[str, Any]:
     """Return what was asked for besides --resume, to be compared with the run."""
-    from internav_data.camp.run import keys_given
+    from internav_data.camp.settings import keys_given
 
     keys = keys_given(given["config_file"], given["overrides"], _settings(given))
     return {

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
     from torch import Tensor
 
+    from internav_data.camp.ranks import Ranks
+    from internav_data.camp.rollout import Rollout
+
     Row = dict[str, Any]
     """Plain JSON: numbers by name, one level of groups."""
 
@@ -124,6 +127,19 @@ class Window:
         self.ended = len(ended)
         for metrics in ended:
             self._episodes.append({name: float(value) for name, value in metrics.items()})
+
+    def noted(self, rollout: Rollout, own: range, ranks: Ranks) -> Row:
+        """Take in the episodes that ended on all ranks; return what was decided on them.
+
+        `own` are the numbers of this rank's environments.
+        """
+        ended = ranks.listed(
+            [[each.step, own[each.environment], each.metrics] for each in rollout.finished]
+        )
+        self.add([metrics for _, _, metrics in sorted(ended, key=lambda e: e[:2])])
+        noted = rollout.batch.record
+        record = {n: ranks.joined(noted[n], 1) for n in DECISIVE if n in noted}
+        return decisions(record, ranks.joined(rollout.rewards, 1))
 
     def plain(self) -> list[dict[str, float]]:
         """Return what to keep in a checkpoint."""

@@ -14,7 +14,7 @@ from internav_data.camp.agents import Auxiliary, make_agent
 from internav_data.camp.checkpoint import Checkpoint, best_score, save
 from internav_data.camp.cloning import CLONING, clone_expert
 from internav_data.camp.collect import Collector, orders_of, uniforms_of
-from internav_data.camp.logbook import DECISIVE, Logbook, Window, decisions, rates
+from internav_data.camp.logbook import Logbook, Window, rates
 from internav_data.camp.packing import (
     packed,
     unpack_environments,
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from internav_data.camp.logbook import Row
     from internav_data.camp.packing import Place
     from internav_data.camp.ranks import Ranks
-    from internav_data.camp.rollout import Rollout
     from internav_data.camp.stages import Stage
     from internav_data.camp.tasks import Task
 
@@ -193,7 +192,7 @@ class Trainer:
         place.critics[stage.critic] = learnt + 1
         if not stage.tasks and place.done % self.config.agent.sync_every == 0:
             self.agent.synchronise()
-        decided = self._noted(rollout)
+        decided = self._window.noted(rollout, self.own, self.ranks)
         spent = self.lap()
         return {
             "step": place.environment_steps, "update": place.updates, "updates": self._updates,
@@ -274,16 +273,6 @@ class Trainer:
         save(
             self.run, Checkpoint(self.method, self.config, weights, progress, tensors), best=better
         )
-
-    def _noted(self, rollout: Rollout) -> Row:
-        """Take in the episodes that ended on all ranks; return what was decided on them."""
-        ended = self.ranks.listed(
-            [[each.step, self.own[each.environment], each.metrics] for each in rollout.finished]
-        )
-        self._window.add([metrics for _, _, metrics in sorted(ended, key=lambda e: e[:2])])
-        noted = rollout.batch.record
-        record = {n: self.ranks.joined(noted[n], 1) for n in DECISIVE if n in noted}
-        return decisions(record, self.ranks.joined(rollout.rewards, 1))
 
     def asked(self) -> int:
         """Return the signal that asked any rank to stop, 0 for none."""

@@ -16,7 +16,8 @@ from internav_data.camp import train as train_module  # noqa: E402
 from internav_data.camp.checkpoint import find, load_agent  # noqa: E402
 from internav_data.camp.config import from_mapping, preset  # noqa: E402
 from internav_data.camp.data import TrainingData  # noqa: E402
-from internav_data.camp.run import Request, begin, config_of, forecast, resume  # noqa: E402
+from internav_data.camp.run import Request, begin, forecast, resume  # noqa: E402
+from internav_data.camp.settings import config_of  # noqa: E402
 from internav_data.generation.interrupts import InterruptedRunError  # noqa: E402
 from internav_data.records.errors import (  # noqa: E402
     CorruptDataError,
