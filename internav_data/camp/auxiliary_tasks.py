@@ -133,8 +133,8 @@ class AuxiliaryTasks:
                 told["return"][k] += note["extra"]
                 told["auxiliary_reward"][k] = note["extra"]
         for option, name in TASKS.items():
-            told[f"{name}_success"] = told.get("success", np.zeros(self.num_envs))
-            told[f"_{name}_success"] = done & (np.array(self._tasks) == option)
+            told[f"success_{name}"] = told.get("success", np.zeros(self.num_envs))
+            told[f"_success_{name}"] = done & (np.array(self._tasks) == option)
         return self._seen, reward, over, np.concatenate(cut), infos
 
     def state(self) -> list[dict[str, Any]]:

@@ -210,10 +210,11 @@ def decisions(record: Mapping[str, Tensor], rewards: Tensor) -> Row:
     said["interactions"] = opened
     if opened:
         said["interaction_length"] = float(interacting.sum()) / opened
-    forced = int(record["forced"].sum())
-    ended = forced + int((interacting & (record["choice"] == DONE)).sum())
-    if ended:
-        said["forced_share"] = forced / ended
+    if "forced" in record and "choice" in record:
+        forced = int(record["forced"].sum())
+        ended = forced + int((interacting & (record["choice"] == DONE)).sum())
+        if ended:
+            said["forced_share"] = forced / ended
     if "meant" in record and decide.any():
         said["intent_kl"] = divergence(record["plan"][decide], record["meant"][decide])
     return said

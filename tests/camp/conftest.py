@@ -71,6 +71,16 @@ def houses(tmp_path_factory):
     return out
 
 
+@pytest.fixture(scope="session")
+def scenes(tmp_path_factory):
+    """Six houses of a single room, four of them to train on."""
+    from internav_data.generation import generate, load_config
+
+    out = tmp_path_factory.mktemp("train") / "d"
+    generate(out, load_config(overrides=["episodes_per_scene=4", "house.rooms=1"]), 6, workers=1)
+    return out
+
+
 @pytest.fixture
 def fake():
     return FakeEnvironments

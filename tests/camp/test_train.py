@@ -37,16 +37,6 @@ SMALL = {
 }  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def scenes(tmp_path_factory):
-    """Six houses of a single room, four of them to train on."""
-    from internav_data.generation import generate, load_config
-
-    out = tmp_path_factory.mktemp("train") / "d"
-    generate(out, load_config(overrides=["episodes_per_scene=4", "house.rooms=1"]), 6, workers=1)
-    return out
-
-
 @pytest.fixture
 def request_for(scenes, tmp_path):
     def make(name, method="camp", **changes):
