@@ -162,10 +162,10 @@ def _forecast(request: Request, *, as_json: bool) -> int:
         names = ("stage", "steps", "seconds")
         click.echo(json.dumps([dict(zip(names, row, strict=True)) for row in told]))
         return 0
-    for name, steps, seconds in told:
-        click.echo(f"{name:<20} {steps:>12,} steps  {clock(seconds):>12}")
-    whole = sum(seconds for _, _, seconds in told)
-    click.echo(f"{'all':<20} {sum(steps for _, steps, _ in told):>12,} steps  {clock(whole):>12}")
+    whole = ("in all", sum(steps for _, steps, _ in told), sum(seconds for *_, seconds in told))
+    for name, steps, seconds in (*told, whole):
+        amount = f"{steps:,} steps" if steps else ""
+        click.echo(f"{name:<20} {amount:>18} {clock(seconds):>14}")
     click.echo("measured over a few updates; validation is not in it", err=True)
     return 0
 
