@@ -92,8 +92,9 @@ def config():
     from internav_data.camp.config import from_mapping, preset
 
     def make(**changes):
+        # Goals of noise are a small input: what is compared to 1e-6 is not to be amplified by it.
         sizes = {
-            "network": {"image_size": 16, "hidden": 12},
+            "network": {"image_size": 16, "hidden": 12, "goal_scale_m": 10.0},
             "ppo": {"environments": 4, "minibatches": 2, "steps": 8},
         }
         tiny = from_mapping(preset("small"), sizes, "test")
