@@ -98,6 +98,18 @@ def test_examples_run(example, small_dataset, small_run, tmp_path):
     assert done.stdout
 
 
+def test_the_agent_that_ships_plays(small_dataset):
+    from internav_data import load_dataset
+    from internav_data.camp.evaluation import Settings, evaluate
+    from internav_data.camp.players import candidate
+
+    dataset, settings = load_dataset(small_dataset), Settings(limit=2, max_steps=20)
+    shipped = ROOT / "examples" / "camp-small"
+    found = candidate(str(shipped), dataset, settings, greedy=False, without_intent=False)
+    assert (found.about.method, found.about.environment_steps) == ("camp", 60_416)
+    assert len(evaluate(found.player, dataset, settings)) == 2
+
+
 def test_tests_named_in_the_architecture_exist():
     named = re.findall(r"`(test_\w+)` \((tests/[\w/.]+)\)", (ROOT / "ARCHITECTURE.md").read_text())
     assert len(named) > 20

@@ -206,6 +206,8 @@ def _write_folder(folder: Path, checkpoint: Checkpoint) -> None:
         for name, tensors in ((WEIGHTS, checkpoint.weights), (TRAINING, checkpoint.training)):
             kept = {key: value.detach().cpu().contiguous() for key, value in tensors.items()}
             save_file(kept, temporary / name)
+            # safetensors lets nobody else read; who may read the folder may read what is in it.
+            (temporary / name).chmod(temporary.stat().st_mode & 0o666)
             size = (temporary / name).stat().st_size
             files[name] = {"bytes": size, "sha256": file_sha256(temporary / name)}
             sync(temporary / name)
