@@ -160,7 +160,9 @@ class RunConfig:
     threads: int = 1
     """Of torch on a processor; with one, equal runs are equal to the last bit."""
     workers: int = 0
-    """Processes that step the main task's environments; 0: none but this one."""
+    """Processes that step the main task's environments; 0: none but this one, which is nearly as
+    fast on two cores (106 s against 98 s with two, 48,000 steps of CaMP) and leaves one for another
+    run."""
     checkpoint_every: int = 10
     """Updates between checkpoints."""
     validate_every: int = 50
