@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from typing import TYPE_CHECKING, Any
 
 import torch
@@ -31,7 +30,7 @@ def config_of(
     """
     config = preset(name)
     if file is not None:
-        config = values.from_mapping(config, _toml(file), str(file))
+        config = values.from_mapping(config, values.read_toml(file), str(file))
     for key, value in (options or {}).items():
         config = values.from_mapping(config, values.nested(key, value), "option")
     for override in overrides:
@@ -54,7 +53,7 @@ def keys_given(
         ]
 
     named = [override.partition("=")[0].strip() for override in overrides]
-    return [*flat(_toml(file) if file is not None else {}), *named, *options]
+    return [*flat(values.read_toml(file) if file is not None else {}), *named, *options]
 
 
 def device_of(name: str) -> torch.device:
@@ -74,12 +73,3 @@ def device_of(name: str) -> torch.device:
 def default_preset(device: str) -> str:
     """Return the preset that suits this machine: `paper` where there is a GPU, else `small`."""
     return "paper" if device != "cpu" and torch.cuda.is_available() else "small"
-
-
-def _toml(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UsageError(f"cannot read config {path}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"config {path} is not TOML: {error}") from error

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from internav_data.episodes.config import EpisodeConfig
-from internav_data.generation.values import from_mapping, nested, plain, updated
+from internav_data.generation.values import from_mapping, nested, plain, read_toml, updated
 from internav_data.houses.config import HouseConfig
 from internav_data.houses.plan_file import load_floor_plan
 from internav_data.records.errors import UsageError
@@ -116,22 +115,13 @@ def load_config(
     """
     config = GenerationConfig()
     if path is not None:
-        config = from_mapping(config, _read(path), str(path), COMMAND_LINE_ONLY)
+        config = from_mapping(config, read_toml(path), str(path), COMMAND_LINE_ONLY)
         config = _beside(config, path.parent)
     for key, value in (options or {}).items():
         config = from_mapping(config, nested(key, value), "option")
     for override in overrides:
         config = updated(config, override, COMMAND_LINE_ONLY)
     return config
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UsageError(f"cannot read config {path}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"config {path} is not TOML: {error}") from error
 
 
 def _beside(config: GenerationConfig, folder: Path) -> GenerationConfig:

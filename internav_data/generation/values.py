@@ -18,6 +18,7 @@ from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from pathlib import Path
 
     from _typeshed import DataclassInstance
 
@@ -26,6 +27,23 @@ C = TypeVar("C", bound="DataclassInstance")
 NOTHING = "none"
 """What stands for no value where a number may be missing; TOML has no word for it."""
 WORDS = {bool: "true or false", int: "a whole number", float: "a number", str: "text in quotes"}
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Return what a file of settings says.
+
+    Raises
+    ------
+    UsageError
+        It cannot be read, or is not TOML.
+
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UsageError(f"cannot read config {path}: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UsageError(f"config {path} is not TOML: {error}") from error
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401 - whatever a config holds
