@@ -116,8 +116,8 @@ class AuxiliaryTasks:
         infos = merged([part[4] for part in found], self._counts)
         reward, over = np.concatenate(rewards), np.concatenate(ended)
         told = infos.get("metrics", {})
-        told["auxiliary_reward"] = np.zeros(self.num_envs)
-        done = np.concatenate(ended) | np.concatenate(cut)
+        if told:
+            told["auxiliary_reward"] = np.zeros(self.num_envs)
         for k in range(self._first, self.num_envs):
             note, extra = self._notes[k], 0.0
             if int(actions[k]) in KINDS:
@@ -129,12 +129,14 @@ class AuxiliaryTasks:
                 reward[k] = STEP + SUCCESS * cleared
                 told["success"][k] = cleared
                 told["return"][k] += reward[k] - before
-            if "return" in told:
+            if told:
                 told["return"][k] += note["extra"]
                 told["auxiliary_reward"][k] = note["extra"]
-        for option, name in TASKS.items():
-            told[f"success_{name}"] = told.get("success", np.zeros(self.num_envs))
-            told[f"_success_{name}"] = done & (np.array(self._tasks) == option)
+        if told:
+            done, options = over | np.concatenate(cut), np.array(self._tasks)
+            for option, name in TASKS.items():
+                told[f"success_{name}"] = told["success"]
+                told[f"_success_{name}"] = done & (options == option)
         return self._seen, reward, over, np.concatenate(cut), infos
 
     def state(self) -> list[dict[str, Any]]:

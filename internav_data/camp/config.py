@@ -148,7 +148,8 @@ class DataConfig:
     failed_done_reward: float = 0.0
     """Of Done away from the goal (-1 in the released configuration)."""
     houses_kept: int = 512
-    """Houses that a process keeps ready: 10 to 30 ms and up to 2 MB each."""
+    """Houses that a process keeps ready; those of 1 to 3 rooms take 10 ms and 0.1 MB each, and the
+    distances to each of their goals besides."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -221,9 +221,18 @@ def _place(since: Checkpoint) -> Place:
         kinds = (int, float) if isinstance(value, float) else type(value)
         if not isinstance(said[name], kinds):
             raise CorruptDataError(f"checkpoint: progress: {name}: got {said[name]!r}")
+    counts = [since.progress.get("log"), *said["critics"].values()]
+    window = since.progress.get("window")
+    if not all(type(count) is int and count >= 0 for count in counts):
+        raise CorruptDataError(f"checkpoint: progress: log, critics: expected counts, got {counts}")
+    if not isinstance(window, list) or not all(isinstance(each, dict) for each in window):
+        raise CorruptDataError("checkpoint: progress: window: expected a list of episodes")
     place = Place(**said)
     if place.parts:
-        check_parts(place.parts)
+        try:
+            check_parts([str(part) for part in place.parts])
+        except UsageError as error:
+            raise CorruptDataError(f"checkpoint: progress: parts: {error}") from error
     return place
 
 
