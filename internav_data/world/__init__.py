@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from internav_data.world.actions import ACTION_COUNT, Action, Reason, StepResult
+from internav_data.world.engine import engine_of_this_process, solving_anew
 from internav_data.world.push import Pushed, PushModel, push
 from internav_data.world.setting import (
     Body,
@@ -16,7 +17,7 @@ from internav_data.world.setting import (
     Shove,
     wall_body,
 )
-from internav_data.world.settle import Settled, engine_of_this_process, settle
+from internav_data.world.settle import Settled, settle
 
 if TYPE_CHECKING:
     from internav_data.world.stage import Item, Stage
@@ -43,6 +44,7 @@ __all__ = [
     "engine_of_this_process",
     "push",
     "settle",
+    "solving_anew",
     "wall_body",
 ]
 

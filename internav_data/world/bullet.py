@@ -1,4 +1,4 @@
-"""Bullet as the physics engine: one client a process, rebuilt from plain data at each call."""
+"""Bullet as the physics engine: one client a process, a scene of plain data at each call."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from internav_data.geometry import centre_of_mass, multiply, rotation_matrix
 from internav_data.records import Pose
-from internav_data.world.bullet_scene import RULES, STEP_S, Builder, pybullet
+from internav_data.world.bullet_scene import RULES, SCENES_A_WORLD, STEP_S, Builder, pybullet
 from internav_data.world.setting import Motion, Rest
 from internav_data.world.sweeps import radius_m, trail_of
 
@@ -158,9 +158,10 @@ def _angle(first: tuple[float, ...], second: tuple[float, ...]) -> float:
     return 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), abs(w))
 
 
-@lru_cache(maxsize=1)
-def bullet() -> Bullet:
+@lru_cache(maxsize=2)
+def bullet(*, scenes_a_world: int = SCENES_A_WORLD) -> Bullet:
     """Return this process's Bullet: connected at first use, its files removed at exit."""
     folder = tempfile.TemporaryDirectory(prefix="internav-")
     atexit.register(folder.cleanup)
-    return Bullet(Builder(pybullet.connect(pybullet.DIRECT), Path(folder.name)))
+    client = pybullet.connect(pybullet.DIRECT)
+    return Bullet(Builder(client, Path(folder.name), scenes_a_world))

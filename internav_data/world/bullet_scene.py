@@ -1,9 +1,15 @@
-"""Scenes in Bullet: settings of plain data, rebuilt at each call.
+"""Scenes in Bullet: settings of plain data, built anew at each call.
 
-What is worked around here was measured: `resetSimulation` keeps time step and parameters (so all
-are set each time), `removeBody` leaks, saved states are not bit-equal for compounds, automatic
-visual shapes make bodies 27 times slower, and shape arrays stop at 16 shapes without a word. So
-each asset is one OBJ file of convex groups (any number of parts), written once per process.
+What is worked around here was measured: an empty world costs 0.7 ms and more, so it serves many
+scenes; `removeBody` leaks 8 kB, so not too many; `resetSimulation` keeps time step and parameters,
+so all are set each time; saved states are not bit-equal for compounds; automatic visual shapes make
+bodies 27 times slower; shape arrays stop at 16 shapes without a word. So each asset is one OBJ file
+of convex groups (any number of parts), written once per process.
+
+An emptied world has to be as good as new. Bullet's usual broadphase is not: its trees and clocks
+remember, and one push in some thousands came out otherwise in the ninth digit. The simple one
+remembers nothing but the order in which its places became free: bodies go in the reverse order of
+their coming, and the next ones get the same places. `tests/world/test_bullet.py` holds it.
 """
 
 from __future__ import annotations
@@ -20,6 +26,7 @@ from internav_data.world.setting import AGENT_HEIGHT_M, AGENT_LOW_M
 from internav_data.world.wavefront import obj_text
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from types import ModuleType
 
     from internav_data.records import Asset
@@ -41,7 +48,7 @@ def _import_quietly() -> ModuleType:
 
 pybullet: Any = _import_quietly()
 
-RULES = 3
+RULES = 4
 """Raised with every change of what scenes, settling or pushing give: certificates name it, so a
 dataset made by other rules is told from a wrong one."""
 STEP_S = 1.0 / 240.0
@@ -60,18 +67,50 @@ FLOOR_FRICTION = 1.0
 ROLLING_FRICTION = 0.01
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+SCENES_A_WORLD = 256
+
+
+@dataclass(slots=True, eq=False)
 class Builder:
-    """Makes scenes on one client, and keeps the assets' files."""
+    """Makes scenes on one client, and keeps the assets' files and shapes."""
 
     client: int
     folder: Path
+    scenes_a_world: int = SCENES_A_WORLD
+    """1: an empty world for every scene, twice as slow and by definition without history."""
     _files: dict[Asset, str] = field(default_factory=dict)
+    _shapes: dict[tuple[Asset, bool], int] = field(default_factory=dict)
+    _bodies: list[int] = field(default_factory=list)
+    _visual: int = -1
+    _slab: int = -1
+    _scenes_left: int = 0
 
     def build(self, setting: Setting) -> list[int]:
-        """Make the scene anew and return the ids of its bodies, in order."""
+        """Take the last scene down, make another one and return the ids of its bodies, in order."""
+        # Zero until the scene stands: what an interrupt left half done is swept away as a whole.
+        left, self._scenes_left = self._scenes_left, 0
+        if left > 0:
+            self._empty()
+        else:
+            self._begin()
+            left = self.scenes_a_world
+        self._surface(self._place(0.0, self._slab), FLOOR_FRICTION)
+        if setting.column is not None:
+            self._add_agent(setting.column)
+        ids = [self._add(body) for body in setting.bodies]
+        self._scenes_left = left - 1
+        return ids
+
+    def _empty(self) -> None:
+        # In reverse: see above.
+        while self._bodies:
+            pybullet.removeBody(self._bodies.pop(), physicsClientId=self.client)
+
+    def _begin(self) -> None:
         client = self.client
-        pybullet.resetSimulation(physicsClientId=client)
+        self._bodies.clear()
+        self._shapes.clear()
+        pybullet.resetSimulation(pybullet.RESET_USE_SIMPLE_BROADPHASE, physicsClientId=client)
         pybullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=STEP_S,
@@ -89,53 +128,55 @@ class Builder:
         )
         # A dummy visual: without one Bullet makes a visual mesh for every collision shape, and a
         # sphere's many triangles alone would cost two thirds of a settle.
-        visual = pybullet.createVisualShape(
+        self._visual = pybullet.createVisualShape(
             pybullet.GEOM_BOX, halfExtents=(0.01, 0.01, 0.01), physicsClientId=client
         )
-        slab = pybullet.createCollisionShape(
+        self._slab = pybullet.createCollisionShape(
             pybullet.GEOM_BOX,
             halfExtents=FLOOR_HALF_M,
             collisionFramePosition=(0.0, 0.0, -FLOOR_HALF_M[2]),
             physicsClientId=client,
         )
-        floor = pybullet.createMultiBody(0.0, slab, visual, physicsClientId=client)
-        self._surface(floor, FLOOR_FRICTION)
-        if setting.column is not None:
-            self._add_agent(setting.column, visual)
-        return [self._add(body, visual) for body in setting.bodies]
 
-    def _add_agent(self, column: Column, visual: int) -> None:
+    def _place(self, mass_kg: float, shape: int, **where: Sequence[float]) -> int:
+        identity = int(
+            pybullet.createMultiBody(
+                mass_kg, shape, self._visual, physicsClientId=self.client, **where
+            )
+        )
+        self._bodies.append(identity)
+        return identity
+
+    def _add_agent(self, column: Column) -> None:
         shape = pybullet.createCollisionShape(
             pybullet.GEOM_CYLINDER,
             radius=column.radius_m,
             height=AGENT_HEIGHT_M - AGENT_LOW_M,
             physicsClientId=self.client,
         )
-        agent = pybullet.createMultiBody(
-            0.0,
-            shape,
-            visual,
-            basePosition=(column.x, column.y, (AGENT_LOW_M + AGENT_HEIGHT_M) / 2.0),
-            physicsClientId=self.client,
-        )
-        self._surface(agent, FLOOR_FRICTION)
+        middle = (column.x, column.y, (AGENT_LOW_M + AGENT_HEIGHT_M) / 2.0)
+        self._surface(self._place(0.0, int(shape), basePosition=middle), FLOOR_FRICTION)
 
-    def _add(self, body: Body, visual: int) -> int:
+    def _add(self, body: Body) -> int:
         asset, pose = body.asset, body.pose
-        shape = self._shape(body)
-        identity = pybullet.createMultiBody(
+        identity = self._place(
             asset.mass_kg if body.moves else 0.0,
-            shape,
-            visual,
+            self._shape(body),
             basePosition=(pose.x, pose.y, pose.z),
             baseOrientation=pose.quaternion,
             baseInertialFramePosition=centre_of_mass(asset),
-            physicsClientId=self.client,
         )
         self._surface(identity, asset.friction)
-        return int(identity)
+        return identity
 
     def _shape(self, body: Body) -> int:
+        key = (body.asset, body.moves)
+        shape = self._shapes.get(key)
+        if shape is None:
+            shape = self._shapes[key] = self._new_shape(body)
+        return shape
+
+    def _new_shape(self, body: Body) -> int:
         part = body.asset.parts[0]
         if len(body.asset.parts) == 1 and part.shape == "box" and not body.moves:
             # Walls and their like: as many as there are houses, so they get no file.

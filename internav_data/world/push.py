@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Final, Literal
 from internav_data.geometry import round_m
 from internav_data.records import Pose
 from internav_data.world.displacement import is_still, shift_m, tilt_deg
+from internav_data.world.engine import engine_of_this_process
 from internav_data.world.frames import Frame
 from internav_data.world.octagons import grown
 from internav_data.world.setting import AGENT_HEIGHT_M, AGENT_LOW_M, Body, Column, Setting, Shove
-from internav_data.world.settle import engine_of_this_process
 from internav_data.world.sweeps import extent_of
 from internav_data.world.touch import met_on_path, outline_of, outline_of_column
 

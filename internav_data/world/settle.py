@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from internav_data.geometry import multiply, rotation_matrix, round_m, round_quaternion
 from internav_data.records import Pose
+from internav_data.world.engine import engine_of_this_process
 from internav_data.world.setting import UPRIGHT, Body, Setting
 
 if TYPE_CHECKING:
@@ -116,10 +117,3 @@ def _judged(pose: Pose, rest: Rest) -> Settled:
     elif rest.penetration_m > MAX_PENETRATION_M:
         refusal = "sank in too deep"
     return Settled(settled, round(rest.seconds, 6), round(rest.penetration_m, 6), refusal)
-
-
-def engine_of_this_process() -> Engine:
-    """Return the physics engine, connected at first use."""
-    from internav_data.world.bullet import bullet  # noqa: PLC0415 - pybullet is imported when used
-
-    return bullet()
