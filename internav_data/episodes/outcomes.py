@@ -6,13 +6,16 @@ the house or picked up, without the agent in the way.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
+from internav_data.navigation import keeps_clear
 from internav_data.records import Outcome
 from internav_data.world.steps import carries
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    import numpy as np
+    from numpy.typing import NDArray
 
     from internav_data.records import Pose
     from internav_data.world import World
@@ -38,24 +41,67 @@ def outcomes_of(world: World) -> tuple[tuple[Outcome, ...], ...]:
     before = (world.steps(), world.way_m())
     return tuple(
         (
-            *(_pushed(world, index, heading, before) for heading in range(4)),
-            _picked(world, index, before),
+            *(_pushed(world, index, heading, before, lifted) for heading in range(4)),
+            _picked(world, index, before, lifted),
         )
         for index in world.obstacles
+        for lifted in [_Lifted(world, index)]
     )
 
 
 _Distances = tuple[int | None, float | None]
 
 
-def _pushed(world: World, index: int, heading: int, before: _Distances) -> Outcome:
+class _Lifted:
+    """The world without one of its things, which no push of that thing alone can better."""
+
+    def __init__(self, world: World, index: int) -> None:
+        self._world, self._index = world, index
+
+    @cached_property
+    def distances(self) -> _Distances:
+        """Steps and any-angle way to the goal."""
+        there = self._there
+        return there.steps(), None if self._way is None else self._way[0]
+
+    @cached_property
+    def _there(self) -> World:
+        there = self._world.copy()
+        there.put([(self._index, None)])
+        return there
+
+    @cached_property
+    def _way(self) -> tuple[float, NDArray[np.float64]] | None:
+        return self._there.way()
+
+    def laid(self, pose: Pose) -> _Distances:
+        """Distances once the thing lies somewhere and nothing else has moved."""
+        best_steps, best_way_m = self.distances
+        if best_steps is None and best_way_m is None:
+            return None, None
+        there = self._there.copy()
+        there.put([(self._index, pose)])
+        steps = None if best_steps is None else there.steps()
+        # A way that the thing leaves free is still the shortest one.
+        if self._way is None or keeps_clear(self._way[1], there.items[self._index].footprint):
+            return steps, best_way_m
+        return steps, there.way_m()
+
+
+def _pushed(
+    world: World, index: int, heading: int, before: _Distances, lifted: _Lifted
+) -> Outcome:
     if not world.items[index].asset.pushable:
         return _failed(PUSHES[heading], "not pushable", before)
     pushed = world.pushed(index, heading, agent=False)
     if not pushed.success:
         return _failed(PUSHES[heading], pushed.reason, before, pushed.seconds)
-    changes = [(index, pushed.pose), *pushed.moved]
-    steps, way_m = _after(world, changes)
+    if pushed.moved:
+        there = world.copy()
+        there.put([(index, pushed.pose), *pushed.moved])
+        steps, way_m = there.steps(), there.way_m()
+    else:
+        steps, way_m = lifted.laid(pushed.pose)
     return Outcome(
         action=PUSHES[heading],
         success=True,
@@ -68,12 +114,12 @@ def _pushed(world: World, index: int, heading: int, before: _Distances) -> Outco
     )
 
 
-def _picked(world: World, index: int, before: _Distances) -> Outcome:
+def _picked(world: World, index: int, before: _Distances, lifted: _Lifted) -> Outcome:
     if not world.items[index].asset.pickable:
         return _failed(PICK, "not pickable", before)
     if carries(world, index):
         return _failed(PICK, "something rests on it", before)
-    steps, way_m = _after(world, [(index, None)])
+    steps, way_m = lifted.distances
     opened = before[0] is None and steps is not None
     return Outcome(
         action=PICK,
@@ -85,12 +131,6 @@ def _picked(world: World, index: int, before: _Distances) -> Outcome:
         seconds=0.0,
         reason="",
     )
-
-
-def _after(world: World, changes: Iterable[tuple[int, Pose | None]]) -> _Distances:
-    there = world.copy()
-    there.put(changes)
-    return there.steps(), there.way_m()
 
 
 def _failed(action: str, reason: str, before: _Distances, seconds: float = 0.0) -> Outcome:

@@ -3,7 +3,7 @@
 from internav_data.navigation.agent import CLEARANCE_M, RADIUS_M, SPACING_M, TOLERANCE_M
 from internav_data.navigation.lattice import Lattice
 from internav_data.navigation.rooms import PATHS_AT_MOST, node_paths, room_of, room_paths, rooms_of
-from internav_data.navigation.wayfinder import WayFinder
+from internav_data.navigation.wayfinder import WayFinder, keeps_clear
 
 __all__ = [
     "CLEARANCE_M",
@@ -13,6 +13,7 @@ __all__ = [
     "TOLERANCE_M",
     "Lattice",
     "WayFinder",
+    "keeps_clear",
     "node_paths",
     "room_of",
     "room_paths",

@@ -186,6 +186,17 @@ def segment_clear_of(
 
 
 @njit(cache=True)
+def way_clear_of(points: Floats, vertices: Floats, offsets: Ints, boxes: Floats, limit: float) -> bool:
+    """Ask the same of a way (n, 2), of one point or more, leg by leg."""
+    for k in range(max(1, len(points) - 1)):
+        m = min(k + 1, len(points) - 1)
+        ax, ay, bx, by = points[k, 0], points[k, 1], points[m, 0], points[m, 1]
+        if not segment_clear_of(vertices, offsets, boxes, ax, ay, bx, by, limit):
+            return False
+    return True
+
+
+@njit(cache=True)
 def point_clear(
     vertices: Floats, offsets: Ints, boxes: Floats, x: float, y: float, limit: float
 ) -> bool:

@@ -12,7 +12,7 @@ from internav_data.navigation import arcs as arc_kernels
 from internav_data.navigation import links
 from internav_data.navigation.agent import CLEARANCE_M
 from internav_data.navigation.drawing import drawn
-from internav_data.navigation.scene import boxes_of, point_clear, scene_of
+from internav_data.navigation.scene import boxes_of, point_clear, scene_of, way_clear_of
 from internav_data.navigation.search import Query, search
 from internav_data.navigation.tangents import tangents_of
 
@@ -29,6 +29,9 @@ _ASIDE = np.array([7.548776662466927e-8, 5.698402909980532e-8])
 """Clear ways are shifted by this before crossings are counted, so that no corner lies on them:
 stored positions are multiples of 0.1 mm, these are not, and 0.1 um crosses nothing by itself."""
 _NOTHING = Polygons.of([])
+_NO_BOXES = np.empty((0, 4))
+_UNTOUCHED_M = CLEARANCE_M + 0.001
+"""What keeps this distance from a drawn way is out of its way: chords leave arcs by 0.8 mm."""
 
 
 class WayFinder:
@@ -45,7 +48,7 @@ class WayFinder:
     def __init__(self, polygons: Polygons) -> None:
         self._scene = scene_of(polygons, CLEARANCE_M)
         self._arcs: Floats = arc_kernels.free_arcs(
-            *self._scene[:3], _NOTHING.vertices, _NOTHING.offsets, np.empty((0, 4)), CLEARANCE_M
+            *self._scene[:3], _NOTHING.vertices, _NOTHING.offsets, _NO_BOXES, CLEARANCE_M
         )
         self._tangents = tangents_of(self._scene, self._arcs, CLEARANCE_M)
         self._labels = links.clusters(*self._scene[:3], 2.0 * CLEARANCE_M)
@@ -84,6 +87,13 @@ class WayFinder:
         """
         length, points = self._way(p, q, obstacles)
         return None if math.isinf(length) else points.copy()
+
+    def way(
+        self, p: Vec2, q: Vec2, obstacles: Polygons | None = None
+    ) -> tuple[float, Floats] | None:
+        """Both: the length and the points of the shortest way; None where they are sealed off."""
+        length, points = self._way(p, q, obstacles)
+        return None if math.isinf(length) else (length, points.copy())
 
     def sealed(self, p: Vec2, q: Vec2, obstacles: Polygons | None = None) -> bool:
         """Whether no way of the disc leads from p to q, on the lattice or off it: exact.
@@ -128,17 +138,20 @@ class WayFinder:
     def _way(self, p: Vec2, q: Vec2, obstacles: Polygons | None) -> tuple[float, Floats]:
         obstacles = _NOTHING if obstacles is None else obstacles
         boxes = boxes_of(obstacles.vertices, obstacles.offsets)
+        if self._stands(p, _NOTHING, _NO_BOXES) and self._stands(q, _NOTHING, _NO_BOXES):
+            length, points = self._clear_way(p, q)
+            # Nothing is shorter than the clear way: where that is left free, no other is looked for.
+            if math.isinf(length) or keeps_clear(points, obstacles):
+                return length, points
         if self._sealed(p, q, obstacles, boxes):
             return math.inf, np.empty((0, 2))
-        if not len(boxes):
-            return self._clear_way(p, q)
         return self._search(p, q, obstacles, boxes)
 
     def _clear_way(self, p: Vec2, q: Vec2) -> tuple[float, Floats]:
         key = (float(p[0]), float(p[1]), float(q[0]), float(q[1]))
         found = self._clear_ways.get(key)
         if found is None:
-            found = self._search(p, q, _NOTHING, np.empty((0, 4)))
+            found = self._search(p, q, _NOTHING, _NO_BOXES)
             if len(self._clear_ways) >= REMEMBERED:
                 self._clear_ways.clear()
             self._clear_ways[key] = found
@@ -168,3 +181,9 @@ class WayFinder:
         if math.isinf(length):
             return math.inf, np.empty((0, 2))
         return float(length), drawn(rows, slots, arcs, CLEARANCE_M)
+
+
+def keeps_clear(points: Floats, polygons: Polygons) -> bool:
+    """Whether the disc, going a way (n, 2) of `WayFinder.path`, surely keeps clear of polygons."""
+    boxes = boxes_of(polygons.vertices, polygons.offsets)
+    return bool(way_clear_of(points, polygons.vertices, polygons.offsets, boxes, _UNTOUCHED_M))

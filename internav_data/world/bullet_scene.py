@@ -67,7 +67,7 @@ FLOOR_FRICTION = 1.0
 ROLLING_FRICTION = 0.01
 
 
-SCENES_A_WORLD = 256
+SCENES_A_WORLD = 512
 
 
 @dataclass(slots=True, eq=False)
@@ -94,7 +94,6 @@ class Builder:
         else:
             self._begin()
             left = self.scenes_a_world
-        self._surface(self._place(0.0, self._slab), FLOOR_FRICTION)
         if setting.column is not None:
             self._add_agent(setting.column)
         ids = [self._add(body) for body in setting.bodies]
@@ -103,7 +102,7 @@ class Builder:
 
     def _empty(self) -> None:
         # In reverse: see above.
-        while self._bodies:
+        while len(self._bodies) > 1:
             pybullet.removeBody(self._bodies.pop(), physicsClientId=self.client)
 
     def _begin(self) -> None:
@@ -137,6 +136,7 @@ class Builder:
             collisionFramePosition=(0.0, 0.0, -FLOOR_HALF_M[2]),
             physicsClientId=client,
         )
+        self._surface(self._place(0.0, self._slab), FLOOR_FRICTION)
 
     def _place(self, mass_kg: float, shape: int, **where: Sequence[float]) -> int:
         identity = int(

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from internav_data.navigation import Lattice
+    from internav_data.navigation import Lattice, WayFinder
     from internav_data.records import Asset, Episode, Pose, Vec2
     from internav_data.world.actions import StepResult
     from internav_data.world.octagons import Octagon
@@ -157,11 +157,22 @@ class World:
 
     def way_between(self, here: Vec2, there: Vec2) -> float | None:
         """Any-angle distance between two points, things as they lie; None when cut off."""
+        finder, loose = self._loose()
+        way = finder.distance(here, there, loose)
+        return None if way is None else round_m(way)
+
+    def way(self) -> tuple[float, NDArray[np.float64]] | None:
+        """Any-angle distance to the goal and the way's points (n, 2); None when cut off."""
+        finder, loose = self._loose()
+        found = finder.way(self.position, self.goal_point, loose)
+        return None if found is None else (round_m(found[0]), found[1])
+
+    def _loose(self) -> tuple[WayFinder, Polygons]:
+        """Finder of ways among what has not moved, and all else that stands in the way."""
         home = self.stage.items
         displaced = tuple(k for k, item in enumerate(home) if self.items[k] is not item)
         loose = [self.items[k].footprint for k in (*displaced, *self.obstacles)]
-        way = self.stage.ways(displaced).distance(here, there, Polygons.joined(loose))
-        return None if way is None else round_m(way)
+        return self.stage.ways(displaced), Polygons.joined(loose)
 
     def clear_m(self) -> float | None:
         """Any-angle distance to the goal without obstacles, furniture in its place."""
