@@ -222,7 +222,7 @@ def _point(node: tuple[int, int]) -> tuple[float, float]:
 def _recorded(way: Way, index: int, world: World, expert: Expert | None) -> Episode:
     """Write down a finished way; its predicates are judged on the rounded poses."""
     house, way_m = way.site.house, world.way_m()
-    outcomes = outcomes_of(world)
+    outcomes = outcomes_of(world, (way.steps, way_m))
     return Episode(
         episode_id=f"{house.scene_id}/{index:04d}",
         scene_id=house.scene_id,

@@ -48,8 +48,8 @@ ASKED: Final = 20
 """Interactions asked in all, pushes that go on included."""
 CROWD: Final = 1
 """Pushes that may move more things besides are not asked: they cost most and seldom help."""
-TRIES_MORE: Final = 3
-"""Interactions still tried once a plan is known."""
+TRIES_MORE: Final = 2
+"""Interactions still tried once a plan is known: of 400 plans a third one shortens 2."""
 ENOUGH: Final = 0.95
 """A plan is good enough once no other promises to be shorter than this share of it."""
 VISITS: Final = 150

@@ -24,8 +24,13 @@ PUSHES: Final = ("push_east", "push_north", "push_west", "push_south")
 """Headings 0 to 3: along +x, +y, -x and -y of the house."""
 PICK: Final = "pick"
 
+Distances = tuple[int | None, float | None]
+"""Steps on the lattice and metres any-angle to the goal; None where it is cut off."""
 
-def outcomes_of(world: World) -> tuple[tuple[Outcome, ...], ...]:
+
+def outcomes_of(
+    world: World, before: Distances | None = None
+) -> tuple[tuple[Outcome, ...], ...]:
     """Return the outcomes of every obstacle of a world as it stands, in the obstacles' order.
 
     Five for each obstacle: `PUSHES` in order, then `PICK`. A failed one leaves the distances as
@@ -37,8 +42,10 @@ def outcomes_of(world: World) -> tuple[tuple[Outcome, ...], ...]:
     world
         An episode at its start: distances are those from where its agent stands to its goal. It
         is not changed.
+    before
+        Those distances, steps and metres, where they are known already.
     """
-    before = (world.steps(), world.way_m())
+    before = before or (world.steps(), world.way_m())
     return tuple(
         (
             *(_pushed(world, index, heading, before, lifted) for heading in range(4)),
@@ -49,9 +56,6 @@ def outcomes_of(world: World) -> tuple[tuple[Outcome, ...], ...]:
     )
 
 
-_Distances = tuple[int | None, float | None]
-
-
 class _Lifted:
     """The world without one of its things, which no push of that thing alone can better."""
 
@@ -59,7 +63,7 @@ class _Lifted:
         self._world, self._index = world, index
 
     @cached_property
-    def distances(self) -> _Distances:
+    def distances(self) -> Distances:
         """Steps and any-angle way to the goal."""
         there = self._there
         return there.steps(), None if self._way is None else self._way[0]
@@ -74,7 +78,7 @@ class _Lifted:
     def _way(self) -> tuple[float, NDArray[np.float64]] | None:
         return self._there.way()
 
-    def laid(self, pose: Pose) -> _Distances:
+    def laid(self, pose: Pose) -> Distances:
         """Distances once the thing lies somewhere and nothing else has moved."""
         best_steps, best_way_m = self.distances
         if best_steps is None and best_way_m is None:
@@ -89,7 +93,7 @@ class _Lifted:
 
 
 def _pushed(
-    world: World, index: int, heading: int, before: _Distances, lifted: _Lifted
+    world: World, index: int, heading: int, before: Distances, lifted: _Lifted
 ) -> Outcome:
     if not world.items[index].asset.pushable:
         return _failed(PUSHES[heading], "not pushable", before)
@@ -114,7 +118,7 @@ def _pushed(
     )
 
 
-def _picked(world: World, index: int, before: _Distances, lifted: _Lifted) -> Outcome:
+def _picked(world: World, index: int, before: Distances, lifted: _Lifted) -> Outcome:
     if not world.items[index].asset.pickable:
         return _failed(PICK, "not pickable", before)
     if carries(world, index):
@@ -133,7 +137,7 @@ def _picked(world: World, index: int, before: _Distances, lifted: _Lifted) -> Ou
     )
 
 
-def _failed(action: str, reason: str, before: _Distances, seconds: float = 0.0) -> Outcome:
+def _failed(action: str, reason: str, before: Distances, seconds: float = 0.0) -> Outcome:
     return Outcome(
         action=action,
         success=False,

@@ -148,10 +148,14 @@ def crowd(asset: Asset, pose: Pose, heading: int, near: Near, model: PushModel =
     free = _push_alone(asset, _start(frame, pose), SHOVES[model], engine_of_this_process())
     if shift_m(asset, pose, frame.leave(free.poses[0])) < SUCCESS_M:
         return 0
-    known = _met(frame, near, (asset,), free)
-    for body in [body for body in known.values() if body.moves]:
-        known.update(near(grown(extent_of(body.asset, body.pose).octagon, ON_M)))
-    return sum(body.moves for body in known.values())
+
+    def loose(octagon: Octagon) -> list[tuple[int, Body]]:
+        return [pair for pair in near(octagon) if pair[1].moves]
+
+    known = _met(frame, loose, (asset,), free)
+    for body in list(known.values()):
+        known.update(loose(grown(extent_of(body.asset, body.pose).octagon, ON_M)))
+    return len(known)
 
 
 def _start(frame: Frame, pose: Pose) -> Pose:
