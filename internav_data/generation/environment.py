@@ -24,6 +24,7 @@ PACKAGES = {
     "numba": "generate",
     "networkx": "generate",
     "opencv-python-headless": "generate",
+    "platformdirs": "generate",
     "pybullet": "generate",
     "scipy": "generate",
     "shapely": "generate",

@@ -1,7 +1,8 @@
-"""The physics engine of a process, with a memory for what things do alone.
+"""The physics engine of a process, with a memory that all processes of a user share.
 
-A thing on free ground settles, and slides when pushed, the same way in every house: its solution
-depends on asset, orientation and push alone, and is kept on disk (`solutions`).
+What it is asked about is plain data, and the answer depends on that alone: it is kept on disk
+(`solutions`). On free ground a thing settles and slides the same way in every house; and training
+asks again what generating has asked before.
 """
 
 from __future__ import annotations
@@ -27,17 +28,17 @@ if TYPE_CHECKING:
 
 _SOLVERS: Final = ("internav_data.geometry", "internav_data.world")
 """Packages that solutions come from: none is believed once one of their files has changed."""
-_POSE: Final = struct.Struct("<7d")
 _REST: Final = struct.Struct("<7d3d?")
-_MOTION: Final = struct.Struct("<7d8dd?")
+"""Pose; seconds, penetration, reach; at rest."""
+_MOTION: Final = struct.Struct("<d?H")
+"""Seconds, at rest, how many bodies move."""
+_MOVER: Final = struct.Struct("<7d8dI")
+"""Pose, sweep, bytes of the path; the paths themselves follow."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Remembering:
-    """An engine that is asked only for what neither it nor another process has solved.
-
-    Only lone bodies are remembered: every other setting is one of countless.
-    """
+    """An engine that is asked only what neither this process nor another one has had solved."""
 
     engine: Engine
     solutions: Solutions
@@ -56,36 +57,26 @@ class Remembering:
 
     def settle(self, setting: Setting) -> Rest:
         """Let the first body of the setting fall until it rests."""
-        if not _is_lone(setting):
-            return self.engine.settle(setting)
         key = self._key("settle", setting)
-        known = self.solutions.get(key)
-        if known is not None and len(known) == _REST.size:
-            return _read_rest(known)
-        rest = self.engine.settle(setting)
-        self.solutions.put(key, _write_rest(rest))
-        return rest
+        known = _read_rest(self.solutions.get(key))
+        if known is None:
+            known = self.engine.settle(setting)
+            self.solutions.put(key, _write_rest(known))
+        return known
 
     def push(self, setting: Setting, shove: Shove) -> Motion:
         """Push the first body of the setting along +x."""
-        if not _is_lone(setting):
-            return self.engine.push(setting, shove)
-        key = self._key("push", setting, shove)
-        known = self.solutions.get(key)
-        if known is not None and len(known) > _MOTION.size:
-            return _read_motion(known)
-        motion = self.engine.push(setting, shove)
-        self.solutions.put(key, _write_motion(motion))
-        return motion
+        key = self._key(repr(shove), setting)
+        known = _read_motion(self.solutions.get(key))
+        if known is None:
+            known = self.engine.push(setting, shove)
+            self.solutions.put(key, _write_motion(known))
+        return known
 
-    def _key(self, what: str, setting: Setting, shove: Shove | None = None) -> bytes:
-        body = setting.bodies[0]
-        asked = f"{what} {self.origin} {_digest(body.asset)} {body.pose!r} {shove!r}"
-        return hashlib.sha256(asked.encode()).digest()
-
-
-def _is_lone(setting: Setting) -> bool:
-    return len(setting.bodies) == 1 and setting.bodies[0].moves and setting.column is None
+    def _key(self, what: str, setting: Setting) -> bytes:
+        bodies = ((_digest(b.asset), b.pose, b.moves) for b in setting.bodies)
+        asked = (self.origin, what, setting.column, *bodies)
+        return hashlib.sha256(repr(asked).encode()).digest()
 
 
 @lru_cache(maxsize=8192)
@@ -102,26 +93,39 @@ def _write_rest(rest: Rest) -> bytes:
     return _REST.pack(*_numbers(rest.pose), *numbers, rest.at_rest)
 
 
-def _read_rest(value: bytes) -> Rest:
+def _read_rest(value: bytes | None) -> Rest | None:
+    if value is None or len(value) != _REST.size:
+        return None
     x, y, z, a, b, c, d, seconds, penetration_m, reach_m, at_rest = _REST.unpack(value)
     return Rest(Pose(x, y, z, (a, b, c, d)), seconds, at_rest, penetration_m, reach_m)
 
 
 def _write_motion(motion: Motion) -> bytes:
-    head = (*_numbers(motion.poses[0]), *motion.sweeps[0], motion.seconds, motion.at_rest)
-    return _MOTION.pack(*head) + motion.paths[0]
+    movers = zip(motion.poses, motion.sweeps, motion.paths, strict=True)
+    return b"".join((
+        _MOTION.pack(motion.seconds, motion.at_rest, len(motion.poses)),
+        *(_MOVER.pack(*_numbers(pose), *sweep, len(path)) for pose, sweep, path in movers),
+        *motion.paths,
+    ))  # fmt: skip
 
 
-def _read_motion(value: bytes) -> Motion:
-    x, y, z, a, b, c, d, *sweep, seconds, at_rest = _MOTION.unpack_from(value)
-    e, n, w, s, ne, nw, sw, se = sweep
-    return Motion(
-        poses=(Pose(x, y, z, (a, b, c, d)),),
-        sweeps=((e, n, w, s, ne, nw, sw, se),),
-        paths=(value[_MOTION.size :],),
-        seconds=seconds,
-        at_rest=at_rest,
-    )
+def _read_motion(value: bytes | None) -> Motion | None:
+    if value is None or len(value) < _MOTION.size:
+        return None
+    seconds, at_rest, count = _MOTION.unpack_from(value)
+    at = _MOTION.size + count * _MOVER.size
+    if len(value) < at:
+        return None
+    poses, sweeps, paths = [], [], []
+    for row in _MOVER.iter_unpack(value[_MOTION.size : at]):
+        x, y, z, qx, qy, qz, qw, a, b, c, d, e, f, g, h, size = row
+        poses.append(Pose(x, y, z, (qx, qy, qz, qw)))
+        sweeps.append((a, b, c, d, e, f, g, h))
+        paths.append(value[at : at + size])
+        at += size
+    if len(value) != at:
+        return None
+    return Motion(tuple(poses), tuple(sweeps), tuple(paths), seconds, at_rest)
 
 
 @lru_cache(maxsize=1)

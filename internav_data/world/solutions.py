@@ -6,24 +6,29 @@ ever fails for it. What cannot be read is solved anew, what cannot be written is
 
 from __future__ import annotations
 
+import atexit
 import os
 import sqlite3
 import zlib
 from contextlib import suppress
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from platformdirs import user_cache_path
 
 FOLDER_VARIABLE: Final = "INTERNAV_CACHE_DIR"
 """A folder to keep solutions in rather than the user's cache folder; empty: keep none."""
 FILE_NAME: Final = "solutions.sqlite"
-BYTES_AT_MOST: Final = 256 << 20
-"""The catalogue's pushes take about a tenth of it. A file that has filled up is begun anew."""
+BYTES_AT_MOST: Final = 1 << 30
+"""About 150,000 pushes. A file that has filled up is begun anew by the next process."""
 _PAGE: Final = 4096
 _WAIT_S: Final = 0.2
 """How long another process's writing is waited for: a solution takes some milliseconds."""
+_AT_ONCE: Final = 32
+"""Values written down together: one by one each would cost a tenth of what it saves."""
+_VALUE_AT_MOST: Final = 4 << 20
+"""Longer values are neither kept nor read: a push of twenty things takes a tenth of it."""
 _CHECK: Final = 4
 """Bytes of a value's CRC-32, before the value itself."""
 
@@ -47,6 +52,8 @@ class Solutions:
 
     def __init__(self, folder: Path | None) -> None:
         self._file: sqlite3.Connection | None = None
+        self._process = os.getpid()
+        self._new: list[tuple[bytes, bytes]] = []
         if folder is not None:
             with suppress(OSError, sqlite3.Error):
                 folder.mkdir(parents=True, exist_ok=True)
@@ -54,33 +61,44 @@ class Solutions:
 
     def get(self, key: bytes) -> bytes | None:
         """Return what was kept under a key; None where nothing was, or it is damaged."""
-        row = self._ask("SELECT value FROM solutions WHERE key = ?", key)
-        if row is None or not isinstance(row[0], bytes):
+        rows = self._ask("SELECT value FROM solutions WHERE key = ?", key)
+        if not rows or not isinstance(rows[0][0], bytes):
             return None
-        check, value = row[0][:_CHECK], row[0][_CHECK:]
+        check, value = rows[0][0][:_CHECK], rows[0][0][_CHECK:]
         return value if check == _checked(value) else None
 
     def put(self, key: bytes, value: bytes) -> None:
-        """Keep a value, if that is possible."""
-        self._ask("INSERT OR REPLACE INTO solutions VALUES (?, ?)", key, _checked(value) + value)
+        """Keep a value, if that is possible: written down with the next few."""
+        if self._file is not None and len(value) < _VALUE_AT_MOST:
+            self._new.append((key, _checked(value) + value))
+            if len(self._new) >= _AT_ONCE:
+                self.flush()
+
+    def flush(self) -> None:
+        """Write down what was put."""
+        rows, self._new = self._new, []
+        if rows and self._ask("BEGIN IMMEDIATE") is not None:
+            for row in rows:
+                self._ask("INSERT OR REPLACE INTO solutions VALUES (?, ?)", *row)
+            self._ask("COMMIT")
 
     def count(self) -> int:
         """Count what is kept."""
-        row = self._ask("SELECT count(*) FROM solutions")
-        return int(str(row[0])) if row else 0
+        self.flush()
+        rows = self._ask("SELECT count(*) FROM solutions")
+        return int(rows[0][0]) if rows else 0
 
-    def _ask(self, question: str, *values: bytes) -> tuple[object, ...] | None:
-        """Return the first row of an answer; None without any, or where the file is of no use."""
-        if self._file is None:
+    def _ask(self, question: str, *values: bytes) -> list[Any] | None:
+        """Return the rows of an answer; None where the file is of no use."""
+        if self._file is None or self._process != os.getpid():  # SQLite forbids it across forks
             return None
         try:
-            row: tuple[object, ...] | None = self._file.execute(question, values).fetchone()
+            return self._file.execute(question, values).fetchall()
         except sqlite3.OperationalError:  # locked, full, read-only
             return None
         except sqlite3.DatabaseError:  # damaged: the next process finds that too, and begins anew
             self._file = None
             return None
-        return row
 
 
 def _opened(path: Path) -> sqlite3.Connection:
@@ -99,6 +117,7 @@ def _opened(path: Path) -> sqlite3.Connection:
 def _connected(path: Path) -> sqlite3.Connection:
     # Worlds may be stepped in any thread, if in one at a time.
     file = sqlite3.connect(path, timeout=_WAIT_S, isolation_level=None, check_same_thread=False)
+    file.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _VALUE_AT_MOST + _CHECK)
     file.execute("PRAGMA trusted_schema = OFF")
     # Nothing is waited for until it lies on the disk: a solution lost is solved again, and a power
     # cut's damage is told by the check sums.
@@ -121,6 +140,8 @@ def solutions() -> Solutions:
     return _of_process(os.getpid())
 
 
-@lru_cache(maxsize=1)
+@cache  # not the last one only: what a forked process inherits must not be closed in it
 def _of_process(_pid: int) -> Solutions:
-    return Solutions(cache_folder())
+    opened = Solutions(cache_folder())
+    atexit.register(opened.flush)
+    return opened

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from internav_data.verification.physics.experts import check_expert
 from internav_data.verification.physics.outcomes import check_outcomes
 from internav_data.verification.physics.settling import check_settling
-from internav_data.world import engine_of_this_process
+from internav_data.world import engine_of_this_process, solving_anew
 
 if TYPE_CHECKING:
     from internav_data.records import Episode
@@ -16,10 +16,15 @@ if TYPE_CHECKING:
 
 
 def replay_episode(theatre: Theatre, episode: Episode, report: Collector) -> None:
-    """Judge the physics of an episode whose geometry is true.
+    """Judge the physics of an episode whose geometry is true: every scene solved anew.
 
     What cannot be judged is counted among the report's notes.
     """
+    with solving_anew():
+        _replay(theatre, episode, report)
+
+
+def _replay(theatre: Theatre, episode: Episode, report: Collector) -> None:
     name = episode.episode_id
 
     def expect(holds: object, predicate: str, expected: object, got: object) -> bool:
