@@ -28,9 +28,7 @@ Distances = tuple[int | None, float | None]
 """Steps on the lattice and metres any-angle to the goal; None where it is cut off."""
 
 
-def outcomes_of(
-    world: World, before: Distances | None = None
-) -> tuple[tuple[Outcome, ...], ...]:
+def outcomes_of(world: World, before: Distances | None = None) -> tuple[tuple[Outcome, ...], ...]:
     """Return the outcomes of every obstacle of a world as it stands, in the obstacles' order.
 
     Five for each obstacle: `PUSHES` in order, then `PICK`. A failed one leaves the distances as
@@ -92,9 +90,7 @@ class _Lifted:
         return steps, there.way_m()
 
 
-def _pushed(
-    world: World, index: int, heading: int, before: Distances, lifted: _Lifted
-) -> Outcome:
+def _pushed(world: World, index: int, heading: int, before: Distances, lifted: _Lifted) -> Outcome:
     if not world.items[index].asset.pushable:
         return _failed(PUSHES[heading], "not pushable", before)
     pushed = world.pushed(index, heading, agent=False)

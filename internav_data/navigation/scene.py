@@ -186,7 +186,9 @@ def segment_clear_of(
 
 
 @njit(cache=True)
-def way_clear_of(points: Floats, vertices: Floats, offsets: Ints, boxes: Floats, limit: float) -> bool:
+def way_clear_of(
+    points: Floats, vertices: Floats, offsets: Ints, boxes: Floats, limit: float
+) -> bool:
     """Ask the same of a way (n, 2), of one point or more, leg by leg."""
     for k in range(max(1, len(points) - 1)):
         m = min(k + 1, len(points) - 1)

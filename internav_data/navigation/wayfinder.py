@@ -140,7 +140,7 @@ class WayFinder:
         boxes = boxes_of(obstacles.vertices, obstacles.offsets)
         if self._stands(p, _NOTHING, _NO_BOXES) and self._stands(q, _NOTHING, _NO_BOXES):
             length, points = self._clear_way(p, q)
-            # Nothing is shorter than the clear way: where that is left free, no other is looked for.
+            # Nothing is shorter than the clear way: where it is left free, no other is looked for.
             if math.isinf(length) or keeps_clear(points, obstacles):
                 return length, points
         if self._sealed(p, q, obstacles, boxes):

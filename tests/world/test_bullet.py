@@ -1,7 +1,6 @@
 """Bullet's world serves many scenes, and none of them is told from a scene in an empty world."""
 
-import random
-
+import numpy as np
 import pytest
 
 from internav_data.geometry import yaw_quaternion
@@ -40,17 +39,17 @@ THINGS = (
 
 def scenes(count):
     """Pushes and falls of one to four things, some beside a wall or the agent."""
-    rng = random.Random(7)
+    rng = np.random.default_rng(7)
     made = []
     for k in range(count):
         thing = THINGS[k % len(THINGS)]
         around = [
             Body(
-                rng.choice(THINGS),
+                THINGS[rng.integers(len(THINGS))],
                 Pose(0.75 * (n + 1), rng.uniform(-0.2, 0.2), 0.001, yaw_quaternion(15 * k)),
-                rng.random() < 0.7,
+                bool(rng.random() < 0.7),
             )
-            for n in range(rng.randrange(3))
+            for n in range(rng.integers(3))
         ]
         if rng.random() < 0.5:
             around.append(wall_body(Wall(1.5, -2.0, 1.62, 2.0, 0.0, 2.6)))
@@ -68,15 +67,15 @@ def test_an_emptied_world_is_as_good_as_new():
     asked = scenes(60)
     fresh = bullet(scenes_a_world=1)
     expected = [answer(fresh, *scene) for scene in asked]
-    order = list(range(len(asked)))
     for seed in range(4):
-        random.Random(seed).shuffle(order)
-        for k in order:
+        for k in np.random.default_rng(seed).permutation(len(asked)):
             assert answer(bullet(), *asked[k]) == expected[k]
 
 
 def test_what_an_interrupt_left_in_a_world_is_swept_away(monkeypatch):
-    (lone, _), (crowded, _) = scenes(60)[1], scenes(60)[6]
+    asked = [setting for setting, falls in scenes(60) if not falls]
+    lone = next(setting for setting in asked if len(setting.bodies) == 1)
+    crowded = next(setting for setting in asked if len(setting.bodies) > 1)
     expected = bullet(scenes_a_world=1).push(lone, SHOVES["force"])
     real = Builder._place
 
@@ -85,12 +84,12 @@ def test_what_an_interrupt_left_in_a_world_is_swept_away(monkeypatch):
         self._bodies.pop()
         raise KeyboardInterrupt
 
-    assert len(crowded.bodies) > 1
     for _ in range(2):
-        with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-            # A table stands where the next scene's thing would go, and nobody knows its number.
-            patch.setattr(Builder, "_place", interrupted)
+        # A thing stands where the next scene's would go, and nobody knows its number.
+        monkeypatch.setattr(Builder, "_place", interrupted)
+        with pytest.raises(KeyboardInterrupt):
             bullet().push(crowded, SHOVES["force"])
+        monkeypatch.setattr(Builder, "_place", real)
         assert bullet().push(lone, SHOVES["force"]) == expected
 
 
@@ -101,7 +100,5 @@ def test_a_world_is_given_up_before_it_leaks_much():
         engine._builder.build(lone)
     bodies = pybullet.getNumBodies(engine._builder.client)
     assert bodies == 1 + len(lone.bodies)
-    highest = max(
-        pybullet.getBodyUniqueId(k, engine._builder.client) for k in range(bodies)
-    )
+    highest = max(pybullet.getBodyUniqueId(k, engine._builder.client) for k in range(bodies))
     assert highest <= engine._builder.scenes_a_world + 1
