@@ -58,6 +58,7 @@ def examine(out: Path) -> list[Check]:
         _memory(),
         _disk(out),
         _numba_cache(),
+        *_solutions(),
     ]
 
 
@@ -158,6 +159,28 @@ def _numba_cache() -> Check:
         f"{folder} cannot be written: kernels may be compiled again in every run",
         "set NUMBA_CACHE_DIR to a folder of yours, then run `internav-gen warmup`",
     )
+
+
+def _solutions() -> list[Check]:
+    """Look at the pushes kept on disk; nothing where a package is missing, which is told above."""
+    try:
+        from internav_data.world import solutions  # noqa: PLC0415 - heavy, imported when used
+    except ImportError:
+        return []
+    name = "solved pushes"
+    folder = solutions.cache_folder()
+    if folder is None:
+        return [Check(name, "good", f"none kept: {solutions.FOLDER_VARIABLE} is empty", "")]
+    path = folder / solutions.FILE_NAME
+    if path.is_file():
+        mb, most = path.stat().st_size / 1e6, solutions.BYTES_AT_MOST / 1e6
+        return [Check(name, "good", f"{mb:.0f} of at most {most:.0f} MB at {path}", "")]
+    while not folder.exists():
+        folder = folder.parent
+    if os.access(folder, os.W_OK):
+        return [Check(name, "good", f"none yet; will be kept at {path}", "")]
+    remedy = f"set {solutions.FOLDER_VARIABLE} to a folder of yours, or to nothing to keep none"
+    return [Check(name, "warning", f"{folder} cannot be written: none are kept", remedy)]
 
 
 def warm_up() -> float:

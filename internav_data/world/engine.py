@@ -148,11 +148,7 @@ _asked_anew = False
 
 @contextmanager
 def solving_anew() -> Iterator[None]:
-    """Ask the engine itself for everything, each time in a new world.
-
-    What other processes left on disk is not believed, nor that history leaves no trace: the way to
-    prove both.
-    """
+    """Ask the engine itself for everything: what other processes left on disk is not believed."""
     global _asked_anew  # noqa: PLW0603 - belongs to the process, as the engine does
     before, _asked_anew = _asked_anew, True
     try:
@@ -165,9 +161,8 @@ def engine_of_this_process() -> Engine:
     """Return the physics engine, connected at first use."""
     from internav_data.world.bullet import bullet  # noqa: PLC0415 - pybullet is imported when used
 
-    if _asked_anew:
-        return bullet(scenes_a_world=1)
-    return _remembering(bullet(), solutions())
+    engine = bullet()
+    return engine if _asked_anew else _remembering(engine, solutions())
 
 
 @lru_cache(maxsize=1)

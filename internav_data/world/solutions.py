@@ -56,7 +56,7 @@ class Solutions:
         self._new: list[tuple[bytes, bytes]] = []
         if folder is not None:
             with suppress(OSError, sqlite3.Error):
-                folder.mkdir(parents=True, exist_ok=True)
+                folder.mkdir(mode=0o700, parents=True, exist_ok=True)
                 self._file = _opened(folder / FILE_NAME)
 
     def get(self, key: bytes) -> bytes | None:
