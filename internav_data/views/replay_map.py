@@ -20,7 +20,7 @@ from internav_data.views.tasks import (
     paint_obstacle,
     paint_start,
 )
-from internav_data.world.sight import REACH_M
+from internav_data.world.sight import CAMERA_M, REACH_M
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -91,6 +91,11 @@ class MapPainter:
         self._canvas = Canvas((x, y), (x + wide, y + high), max(self.size), PAPER)
         self._outlines: dict[tuple[int, Pose], list[Outline]] = {}
         self._first = {k: story.moments[0].pose(k) for k in self._moving()}
+        self._walls = np.array([
+            (w.x_min, w.y_min, w.x_max, w.y_max)
+            for w in story.stage.house.walls
+            if w.z_min < CAMERA_M < w.z_max
+        ]).reshape(-1, 4)  # fmt: skip
         self._still = self._drawn_once()
         self._furnished: tuple[object, Image] = (None, self._still)
         """The latest picture with things on it: most actions move none."""
@@ -110,6 +115,10 @@ class MapPainter:
         shapes = [part.plan for k, pose in self._first.items() for part in self._parts(k, pose)]
         ends = ((episode.start.x, episode.start.y), (episode.goal.x, episode.goal.y))
         shapes += [canvas.arc(end, 0.45, 0.0, 360.0) for end in ends]
+        # The trail and what is laid aside come later, over the names.
+        shapes += [canvas.arc(m.world.position, 0.3, 0.0, 360.0) for m in story.moments]
+        last = story.moments[-1]
+        shapes += [part.plan for k in self._moving() for part in self._parts(k, last.pose(k))]
         paint_labels(canvas, _seen(still, canvas), shapes)
         paint_start(canvas, episode)
         paint_goal(canvas, episode)
@@ -194,9 +203,10 @@ class MapPainter:
             self._canvas.line(shot.trail, AGENT, 2.6)
 
     def _paint_cone(self, shot: Shot) -> None:
-        """Lighten what the camera's field of view takes in, as far as the agent reaches."""
+        """Tint what the camera's field of view takes in, as far as the agent reaches."""
+        at = np.array((shot.x, shot.y))
         arc = self._canvas.arc((shot.x, shot.y), REACH_M, shot.yaw_deg - 45.0, shot.yaw_deg + 45.0)
-        cone = np.vstack([[(shot.x, shot.y)], arc])
+        cone = np.vstack([at, at + (arc - at) * _open_shares(at, arc, self._walls)[:, None]])
         window = self._canvas.window(
             (float(cone[:, 0].min()), float(cone[:, 1].min())),
             (float(cone[:, 0].max()), float(cone[:, 1].max())),
@@ -224,6 +234,19 @@ def _hull(parts: list[Outline]) -> Floats:
     """Convex outline (n, 2) around all parts."""
     corners = np.vstack([part.plan for part in parts]).astype(np.float32)
     return np.asarray(cv2.convexHull(corners), np.float64).reshape(-1, 2)
+
+
+def _open_shares(at: Floats, ends: Floats, walls: Floats) -> Floats:
+    """Return which share of the way to each end (n, 2) is before the first wall (m, 4), (n,)."""
+    ahead = (ends - at)[:, None, :]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first, second = (walls[:, :2] - at) / ahead, (walls[:, 2:] - at) / ahead
+    # Along a wall's side 0 / 0 says nothing; the other direction decides.
+    enter = np.nan_to_num(np.minimum(first, second), nan=-np.inf).max(axis=2)
+    leave = np.nan_to_num(np.maximum(first, second), nan=np.inf).min(axis=2)
+    hits = np.where((enter <= leave) & (leave > 0.0), np.maximum(enter, 0.0), 1.0)
+    shares: Floats = np.minimum(hits.min(axis=1, initial=1.0), 1.0)
+    return shares
 
 
 def _seen(house: House, canvas: Canvas) -> House:
