@@ -11,6 +11,7 @@ from internav_data.generation.run import identity_for
 from internav_data.generation.scenes import asset_folders, build_scene
 from internav_data.generation.values import plain
 from internav_data.records.errors import UsageError, ValidationError
+from internav_data.world import solving_anew
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -30,7 +31,7 @@ class Made:
 
 
 def made_again(config: GenerationConfig, scene: int, episode: int | None = None) -> Made:
-    """Make a scene with its episodes, or with those up to `episode`.
+    """Make a scene with its episodes, or with those up to `episode`: all physics solved anew.
 
     Raises
     ------
@@ -45,7 +46,8 @@ def made_again(config: GenerationConfig, scene: int, episode: int | None = None)
     if scene < 0 or (episode is not None and episode < 0):
         raise UsageError(f"scene is {scene} and episode is {episode}: both count from 0")
     known = catalogue(asset_folders(config))
-    built = build_scene(scene, config, known, None if episode is None else episode + 1)
+    with solving_anew():
+        built = build_scene(scene, config, known, None if episode is None else episode + 1)
     return Made(built.house, built.episodes, known.assets)
 
 

@@ -172,15 +172,11 @@ def _solutions() -> list[Check]:
     if folder is None:
         return [Check(name, "good", f"none kept: {solutions.FOLDER_VARIABLE} is empty", "")]
     path = folder / solutions.FILE_NAME
-    if path.is_file():
+    if solutions.Solutions(folder).is_open:
         mb, most = path.stat().st_size / 1e6, solutions.BYTES_AT_MOST / 1e6
         return [Check(name, "good", f"{mb:.0f} of at most {most:.0f} MB at {path}", "")]
-    while not folder.exists():
-        folder = folder.parent
-    if os.access(folder, os.W_OK):
-        return [Check(name, "good", f"none yet; will be kept at {path}", "")]
     remedy = f"set {solutions.FOLDER_VARIABLE} to a folder of yours, or to nothing to keep none"
-    return [Check(name, "warning", f"{folder} cannot be written: none are kept", remedy)]
+    return [Check(name, "warning", f"{path} cannot be written: none are kept", remedy)]
 
 
 def warm_up() -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import faulthandler
 import os
 import signal
@@ -28,8 +29,10 @@ def main(fd: int) -> None:
         try:
             _serve(pipe)
         except (EOFError, BrokenPipeError, ConnectionResetError):
-            # The parent is gone or has closed the pipe: nothing is left to do. Skipping the
-            # interpreter's own shutdown ends the process without waiting for libraries' threads.
+            # The parent is gone or has closed the pipe: nothing is left to do but to tidy up, as
+            # `multiprocessing` does. Skipping the interpreter's own shutdown ends the process
+            # without waiting for libraries' threads.
+            atexit._run_exitfuncs()  # noqa: SLF001 - has no public name
             os._exit(0)
 
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import atexit
 import math
+import os
+import shutil
 import tempfile
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -158,10 +160,18 @@ def _angle(first: tuple[float, ...], second: tuple[float, ...]) -> float:
     return 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), abs(w))
 
 
-@lru_cache(maxsize=2)
 def bullet(*, scenes_a_world: int = SCENES_A_WORLD) -> Bullet:
     """Return this process's Bullet: connected at first use, its files removed at exit."""
-    folder = tempfile.TemporaryDirectory(prefix="internav-")
-    atexit.register(folder.cleanup)
-    client = pybullet.connect(pybullet.DIRECT)
-    return Bullet(Builder(client, Path(folder.name), scenes_a_world))
+    return _of_process(os.getpid(), scenes_a_world)
+
+
+@cache  # a forked process has its own: two of them would write each other's files
+def _of_process(pid: int, scenes_a_world: int) -> Bullet:
+    folder = Path(tempfile.mkdtemp(prefix="internav-"))
+    atexit.register(_remove, folder, pid)
+    return Bullet(Builder(pybullet.connect(pybullet.DIRECT), folder, scenes_a_world))
+
+
+def _remove(folder: Path, pid: int) -> None:
+    if pid == os.getpid():
+        shutil.rmtree(folder, ignore_errors=True)

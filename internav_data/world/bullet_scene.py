@@ -7,7 +7,7 @@ bodies 27 times slower; shape arrays stop at 16 shapes without a word. So each a
 of convex groups (any number of parts), written once per process.
 
 An emptied world has to be as good as new. Bullet's usual broadphase is not: its trees and clocks
-remember, and one push in some thousands came out otherwise in the ninth digit. The simple one
+remember, and now and then a push came out otherwise in the ninth digit. The simple one
 remembers nothing but the order in which its places became free: bodies go in the reverse order of
 their coming, and the next ones get the same places. `tests/world/test_bullet.py` holds it.
 """
@@ -94,6 +94,7 @@ class Builder:
         else:
             self._begin()
             left = self.scenes_a_world
+        self._set_parameters()
         if setting.column is not None:
             self._add_agent(setting.column)
         ids = [self._add(body) for body in setting.bodies]
@@ -111,20 +112,6 @@ class Builder:
         self._shapes.clear()
         pybullet.resetSimulation(pybullet.RESET_USE_SIMPLE_BROADPHASE, physicsClientId=client)
         pybullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
-        pybullet.setPhysicsEngineParameter(
-            fixedTimeStep=STEP_S,
-            numSolverIterations=SOLVER_ITERATIONS,
-            numSubSteps=0,
-            deterministicOverlappingPairs=1,
-            restitutionVelocityThreshold=0.2,
-            enableConeFriction=1,
-            solverResidualThreshold=SOLVER_RESIDUAL,
-            contactBreakingThreshold=CONTACT_BREAKS_M,
-            erp=0.2,
-            contactERP=0.2,
-            frictionERP=0.2,
-            physicsClientId=client,
-        )
         # A dummy visual: without one Bullet makes a visual mesh for every collision shape, and a
         # sphere's many triangles alone would cost two thirds of a settle.
         self._visual = pybullet.createVisualShape(
@@ -137,6 +124,23 @@ class Builder:
             physicsClientId=client,
         )
         self._surface(self._place(0.0, self._slab), FLOOR_FRICTION)
+
+    def _set_parameters(self) -> None:
+        # For every scene: some of them are Bullet's own globals, and a user may have a client too.
+        pybullet.setPhysicsEngineParameter(
+            fixedTimeStep=STEP_S,
+            numSolverIterations=SOLVER_ITERATIONS,
+            numSubSteps=0,
+            deterministicOverlappingPairs=1,
+            restitutionVelocityThreshold=0.2,
+            enableConeFriction=1,
+            solverResidualThreshold=SOLVER_RESIDUAL,
+            contactBreakingThreshold=CONTACT_BREAKS_M,
+            erp=0.2,
+            contactERP=0.2,
+            frictionERP=0.2,
+            physicsClientId=self.client,
+        )
 
     def _place(self, mass_kg: float, shape: int, **where: Sequence[float]) -> int:
         identity = int(

@@ -8,17 +8,20 @@ asks again what generating has asked before.
 from __future__ import annotations
 
 import hashlib
+import math
 import platform
 import struct
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib import resources
+from importlib import metadata, resources
+from itertools import chain
 from typing import TYPE_CHECKING, Final
 
 from internav_data.records import Pose
 from internav_data.world.setting import Motion, Rest
 from internav_data.world.solutions import Solutions, solutions
+from internav_data.world.sweeps import PATH_POSE_BYTES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,6 +31,8 @@ if TYPE_CHECKING:
 
 _SOLVERS: Final = ("internav_data.geometry", "internav_data.world")
 """Packages that solutions come from: none is believed once one of their files has changed."""
+_LIBRARIES: Final = ("pybullet", "numpy", "numba", "llvmlite")
+"""Libraries that they come from; an installed one's RECORD holds the digests of all its files."""
 _REST: Final = struct.Struct("<7d3d?")
 """Pose; seconds, penetration, reach; at rest."""
 _MOTION: Final = struct.Struct("<d?H")
@@ -57,6 +62,8 @@ class Remembering:
 
     def settle(self, setting: Setting) -> Rest:
         """Let the first body of the setting fall until it rests."""
+        if not self.solutions.is_open:
+            return self.engine.settle(setting)
         key = self._key("settle", setting)
         known = _read_rest(self.solutions.get(key))
         if known is None:
@@ -66,8 +73,10 @@ class Remembering:
 
     def push(self, setting: Setting, shove: Shove) -> Motion:
         """Push the first body of the setting along +x."""
+        if not self.solutions.is_open:
+            return self.engine.push(setting, shove)
         key = self._key(repr(shove), setting)
-        known = _read_motion(self.solutions.get(key))
+        known = _read_motion(self.solutions.get(key), sum(b.moves for b in setting.bodies))
         if known is None:
             known = self.engine.push(setting, shove)
             self.solutions.put(key, _write_motion(known))
@@ -96,7 +105,10 @@ def _write_rest(rest: Rest) -> bytes:
 def _read_rest(value: bytes | None) -> Rest | None:
     if value is None or len(value) != _REST.size:
         return None
-    x, y, z, a, b, c, d, seconds, penetration_m, reach_m, at_rest = _REST.unpack(value)
+    x, y, z, a, b, c, d, *numbers, at_rest = _REST.unpack(value)
+    if not all(map(math.isfinite, (x, y, z, a, b, c, d, *numbers))):
+        return None
+    seconds, penetration_m, reach_m = numbers
     return Rest(Pose(x, y, z, (a, b, c, d)), seconds, at_rest, penetration_m, reach_m)
 
 
@@ -109,38 +121,55 @@ def _write_motion(motion: Motion) -> bytes:
     ))  # fmt: skip
 
 
-def _read_motion(value: bytes | None) -> Motion | None:
-    if value is None or len(value) < _MOTION.size:
+def _read_motion(value: bytes | None, movers: int) -> Motion | None:
+    """Read a motion of so many bodies; None where it is none."""
+    at = _MOTION.size + movers * _MOVER.size
+    if value is None or len(value) < at:
         return None
     seconds, at_rest, count = _MOTION.unpack_from(value)
-    at = _MOTION.size + count * _MOVER.size
-    if len(value) < at:
+    rows = list(_MOVER.iter_unpack(value[_MOTION.size : at]))
+    if count != movers or not all(math.isfinite(n) for n in (seconds, *chain(*rows))):
         return None
     poses, sweeps, paths = [], [], []
-    for row in _MOVER.iter_unpack(value[_MOTION.size : at]):
-        x, y, z, qx, qy, qz, qw, a, b, c, d, e, f, g, h, size = row
+    for x, y, z, qx, qy, qz, qw, a, b, c, d, e, f, g, h, size in rows:
         poses.append(Pose(x, y, z, (qx, qy, qz, qw)))
         sweeps.append((a, b, c, d, e, f, g, h))
         paths.append(value[at : at + size])
         at += size
-    if len(value) != at:
+    if len(value) != at or not all(path and len(path) % PATH_POSE_BYTES == 0 for path in paths):
         return None
     return Motion(tuple(poses), tuple(sweeps), tuple(paths), seconds, at_rest)
 
 
-@lru_cache(maxsize=1)
-def _origin(build: str) -> str:
-    """Return what answers depend on: a processor with other instructions may round otherwise."""
-    from llvmlite.binding import get_host_cpu_features, get_host_cpu_name  # noqa: PLC0415 - heavy
-
+def _code() -> str:
+    """Digest of the code that solves."""
     code = hashlib.sha256()
     for package in _SOLVERS:
         files = [f for f in resources.files(package).iterdir() if f.name.endswith(".py")]
         for file in sorted(files, key=lambda f: f.name):
             code.update(file.read_bytes())
-    libc = "-".join(platform.libc_ver())
+    return code.hexdigest()
+
+
+_CODE: Final = _code()
+"""Of the files as they were imported: they may change while a process lives."""
+
+
+@lru_cache(maxsize=1)
+def origin(build: str) -> str | None:
+    """Return what answers depend on besides the question; None where that cannot be told.
+
+    Another build of a library, and a processor with other instructions, may round otherwise.
+    """
+    from llvmlite.binding import get_host_cpu_features, get_host_cpu_name  # noqa: PLC0415 - heavy
+
+    libraries = [metadata.distribution(name).read_text("RECORD") for name in _LIBRARIES]
+    if None in libraries:
+        return None
+    records = hashlib.sha256("".join(map(str, libraries)).encode()).hexdigest()
+    system = f"{platform.system()} {'-'.join(platform.libc_ver())} {platform.python_version()}"
     processor = f"{platform.machine()} {get_host_cpu_name()} {get_host_cpu_features().flatten()}"
-    return f"{build}, {code.hexdigest()}, {platform.system()} {libc}, {processor}"
+    return f"{build}, {_CODE}, {records}, {system}, {processor}"
 
 
 _asked_anew = False
@@ -166,5 +195,6 @@ def engine_of_this_process() -> Engine:
 
 
 @lru_cache(maxsize=1)
-def _remembering(engine: Engine, known: Solutions) -> Remembering:
-    return Remembering(engine, known, _origin(engine.build))
+def _remembering(engine: Engine, known: Solutions) -> Engine:
+    where = origin(engine.build)
+    return engine if where is None else Remembering(engine, known, where)

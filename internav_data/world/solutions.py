@@ -21,24 +21,30 @@ FOLDER_VARIABLE: Final = "INTERNAV_CACHE_DIR"
 """A folder to keep solutions in rather than the user's cache folder; empty: keep none."""
 FILE_NAME: Final = "solutions.sqlite"
 BYTES_AT_MOST: Final = 1 << 30
-"""About 150,000 pushes. A file that has filled up is begun anew by the next process."""
+"""About 150,000 pushes. Once it is full, the file is emptied."""
 _PAGE: Final = 4096
+_OPENING_S: Final = 5.0
+"""How long other processes are waited for at first, so that a busy moment does not cost all."""
 _WAIT_S: Final = 0.2
-"""How long another process's writing is waited for: a solution takes some milliseconds."""
+"""How long later on: a solution takes some milliseconds."""
 _AT_ONCE: Final = 32
 """Values written down together: one by one each would cost a tenth of what it saves."""
 _VALUE_AT_MOST: Final = 4 << 20
 """Longer values are neither kept nor read: a push of twenty things takes a tenth of it."""
 _CHECK: Final = 4
 """Bytes of a value's CRC-32, before the value itself."""
+_TABLE: Final = "CREATE TABLE solutions (key BLOB PRIMARY KEY, value BLOB) WITHOUT ROWID"
 
 
 def cache_folder() -> Path | None:
     """Return the folder for solutions, whether it exists or not; None where none are kept."""
     chosen = os.environ.get(FOLDER_VARIABLE)
-    if chosen is None:
-        return user_cache_path("internav", appauthor=False)
-    return Path(chosen) if chosen else None
+    if chosen is not None:
+        return Path(chosen) if chosen else None
+    with suppress(RuntimeError):  # a user without a home, as in some containers
+        folder = user_cache_path("internav", appauthor=False)
+        return folder if folder.is_absolute() else None
+    return None
 
 
 class Solutions:
@@ -53,34 +59,50 @@ class Solutions:
     def __init__(self, folder: Path | None) -> None:
         self._file: sqlite3.Connection | None = None
         self._process = os.getpid()
-        self._new: list[tuple[bytes, bytes]] = []
+        self._new: dict[bytes, bytes] = {}
         if folder is not None:
+            self._path = folder / FILE_NAME
             with suppress(OSError, sqlite3.Error):
                 folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-                self._file = _opened(folder / FILE_NAME)
+                self._file = _opened(self._path)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether anything can be kept."""
+        return self._file is not None and self._process == os.getpid()
 
     def get(self, key: bytes) -> bytes | None:
         """Return what was kept under a key; None where nothing was, or it is damaged."""
-        rows = self._ask("SELECT value FROM solutions WHERE key = ?", key)
-        if not rows or not isinstance(rows[0][0], bytes):
+        kept = self._new.get(key)
+        if kept is None:
+            rows = self._ask("SELECT value FROM solutions WHERE key = ?", key)
+            kept = rows[0][0] if rows else None
+        if not isinstance(kept, bytes):
             return None
-        check, value = rows[0][0][:_CHECK], rows[0][0][_CHECK:]
+        check, value = kept[:_CHECK], kept[_CHECK:]
         return value if check == _checked(value) else None
 
     def put(self, key: bytes, value: bytes) -> None:
         """Keep a value, if that is possible: written down with the next few."""
-        if self._file is not None and len(value) < _VALUE_AT_MOST:
-            self._new.append((key, _checked(value) + value))
+        if self.is_open and len(value) < _VALUE_AT_MOST:
+            self._new[key] = _checked(value) + value
             if len(self._new) >= _AT_ONCE:
                 self.flush()
 
     def flush(self) -> None:
         """Write down what was put."""
-        rows, self._new = self._new, []
-        if rows and self._ask("BEGIN IMMEDIATE") is not None:
-            for row in rows:
-                self._ask("INSERT OR REPLACE INTO solutions VALUES (?, ?)", *row)
+        rows, self._new = self._new, {}
+        if not rows or self._ask("BEGIN IMMEDIATE") is None:
+            return
+        try:
+            for row in rows.items():
+                if self._ask("INSERT OR REPLACE INTO solutions VALUES (?, ?)", *row) is None:
+                    return
             self._ask("COMMIT")
+        finally:
+            # Whatever came between, an interrupt too: an open transaction would bar all others.
+            if self._file is not None and self._file.in_transaction:
+                self._ask("ROLLBACK")
 
     def count(self) -> int:
         """Count what is kept."""
@@ -89,34 +111,37 @@ class Solutions:
         return int(rows[0][0]) if rows else 0
 
     def _ask(self, question: str, *values: bytes) -> list[Any] | None:
-        """Return the rows of an answer; None where the file is of no use."""
+        """Return the rows of an answer; None where there is none."""
         if self._file is None or self._process != os.getpid():  # SQLite forbids it across forks
             return None
         try:
             return self._file.execute(question, values).fetchall()
-        except sqlite3.OperationalError:  # locked, full, read-only
-            return None
-        except sqlite3.DatabaseError:  # damaged: the next process finds that too, and begins anew
-            self._file = None
-            return None
+        except sqlite3.OperationalError as error:  # locked, full, read-only
+            if error.sqlite_errorcode == sqlite3.SQLITE_FULL and question.startswith("INSERT"):
+                self._ask("ROLLBACK")
+                self._ask("DELETE FROM solutions")
+        except sqlite3.Error:  # damaged: the next process begins anew
+            file, self._file = self._file, None
+            with suppress(OSError, sqlite3.Error):
+                file.close()
+                self._path.unlink()
+        return None
 
 
 def _opened(path: Path) -> sqlite3.Connection:
-    if path.exists() and path.stat().st_size > BYTES_AT_MOST - (1 << 20):
-        path.unlink()
     try:
         return _connected(path)
     except sqlite3.OperationalError:
         raise
     except sqlite3.DatabaseError:
-        # No database, or a damaged one: nothing in it is worth more than its making.
+        # No database, a damaged or another one: nothing in it is worth more than its making.
         path.unlink()
         return _connected(path)
 
 
 def _connected(path: Path) -> sqlite3.Connection:
     # Worlds may be stepped in any thread, if in one at a time.
-    file = sqlite3.connect(path, timeout=_WAIT_S, isolation_level=None, check_same_thread=False)
+    file = sqlite3.connect(path, timeout=_OPENING_S, isolation_level=None, check_same_thread=False)
     file.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _VALUE_AT_MOST + _CHECK)
     file.execute("PRAGMA trusted_schema = OFF")
     # Nothing is waited for until it lies on the disk: a solution lost is solved again, and a power
@@ -124,10 +149,13 @@ def _connected(path: Path) -> sqlite3.Connection:
     file.execute("PRAGMA synchronous = OFF")
     file.execute("PRAGMA journal_mode = TRUNCATE")
     file.execute(f"PRAGMA max_page_count = {BYTES_AT_MOST // _PAGE}")
-    file.execute(
-        "CREATE TABLE IF NOT EXISTS solutions (key BLOB PRIMARY KEY, value BLOB) WITHOUT ROWID"
-    )
-    file.execute("SELECT key, value FROM solutions LIMIT 1").fetchone()
+    with suppress(sqlite3.OperationalError):
+        file.execute(_TABLE)
+    found = file.execute("SELECT type, sql FROM sqlite_schema").fetchall()
+    if found != [("table", _TABLE)]:
+        file.close()
+        raise sqlite3.DatabaseError(f"{path} holds something else: {found}")
+    file.execute(f"PRAGMA busy_timeout = {round(1000 * _WAIT_S)}")
     return file
 
 

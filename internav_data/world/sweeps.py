@@ -26,6 +26,8 @@ KEPT_M: Final = 0.004
 """A pose is kept on a body's path once some corner may have come this far since the last one."""
 _POSE: Final = 7
 """Numbers of a pose: the centre of mass and a quaternion."""
+PATH_POSE_BYTES: Final = 4 * _POSE
+"""Of each pose of a `Trail.path`."""
 _KEPT, _LATEST, _COUNT, _LENGTH = 8, 15, 22, 23
 """Where a trail's state holds the last pose kept, the latest pose and the count of those kept;
 the first eight numbers are the octagon's."""

@@ -229,6 +229,21 @@ def test_a_dry_run_tells_time_and_size(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("where", ["", "cache", "file/below"])
+def test_the_doctor_says_where_solved_pushes_are_kept(tmp_path, where):
+    (tmp_path / "file").write_text("in the way")
+    told = run("doctor", "--json", INTERNAV_CACHE_DIR=str(tmp_path / where) if where else "")
+    check = next(c for c in json.loads(told.stdout) if c["name"] == "solved pushes")
+    state, found = {
+        "": ("good", "none kept"),
+        "cache": ("good", "MB at"),
+        "file/below": ("warning", "none are kept"),
+    }[where]
+    assert check["state"] == state
+    assert found in check["found"]
+    assert (check["remedy"] == "") == (state == "good")
+
+
 def test_the_doctor_finds_this_machine_fit(tmp_path):
     told = run("doctor", "--out", tmp_path, "--json")
     checks = {check["name"]: check for check in json.loads(told.stdout)}

@@ -28,6 +28,7 @@ from internav_data.world import (
     wall_body,
 )
 from internav_data.world.setting import UPRIGHT
+from internav_data.world.solutions import Solutions
 
 SCENES = (0, 1, 6)
 
@@ -45,6 +46,16 @@ def houses():
 @pytest.fixture(scope="module")
 def episodes(houses, pool):
     return {scene: build_episodes(house, 6, pool) for scene, house in houses.items()}
+
+
+def test_what_is_kept_on_disk_changes_nothing(houses, pool, episodes, tmp_path, monkeypatch):
+    counts = []
+    for _ in range(2):
+        held = Solutions(tmp_path)
+        monkeypatch.setattr("internav_data.world.engine.solutions", lambda held=held: held)
+        assert build_episodes(houses[6], 6, pool) == episodes[6]
+        counts.append(held.count())
+    assert counts[0] == counts[1] > 50  # the second time nothing was solved
 
 
 def everything(house, episode):

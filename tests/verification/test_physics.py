@@ -1,6 +1,7 @@
 """Settling, outcomes and experts are changed one at a time; playing them again must find it."""
 
 import math
+import struct
 import subprocess
 import sys
 from dataclasses import replace
@@ -24,6 +25,7 @@ from internav_data.verification.settings import Settings
 from internav_data.verification.shapes import Shapes
 from internav_data.verification.site import Site
 from internav_data.world import Item, World
+from internav_data.world.solutions import Solutions
 
 FORCE = Settings()
 
@@ -36,6 +38,30 @@ def scenes():
 def judged(tmp_path, scenes, level="physics", assets=None, config=None, **options):
     write_dataset(tmp_path / "ds", scenes, assets, config)
     return validate(tmp_path / "ds", level, **options)
+
+
+def test_nothing_that_is_kept_on_disk_is_believed(tmp_path, monkeypatch, scenes):
+    def keep_in(held):
+        monkeypatch.setattr("internav_data.world.engine.solutions", lambda: held)
+        return held
+
+    held = keep_in(Solutions(tmp_path))
+    assert physical.physical_scenes() == scenes
+    assert held.count() > 10
+
+    class Lying(Solutions):
+        def get(self, key):
+            value = super().get(key)
+            if value is None or len(value) < 120:  # a fall
+                return value
+            (seconds,) = struct.unpack_from("<d", value)
+            return struct.pack("<d", seconds + 1.0) + value[8:]
+
+    keep_in(Lying(tmp_path))
+    assert physical.physical_scenes() != scenes  # who makes data does believe it
+    for scene, (_, episodes) in enumerate(scenes):
+        for index in range(len(episodes)):
+            assert found_in(scenes, scene, index) == set()
 
 
 def changed(scenes, scene, index, /, **changes):

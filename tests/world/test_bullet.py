@@ -1,5 +1,7 @@
 """Bullet's world serves many scenes, and none of them is told from a scene in an empty world."""
 
+import os
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from internav_data.geometry import yaw_quaternion
 from internav_data.records import Asset, Part, Pose, Wall
 from internav_data.world import Body, Column, Setting, wall_body
 from internav_data.world.bullet import bullet
-from internav_data.world.bullet_scene import Builder, pybullet
+from internav_data.world.bullet_scene import SCENES_A_WORLD, Builder, pybullet
 from internav_data.world.push import SHOVES
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -93,12 +95,35 @@ def test_what_an_interrupt_left_in_a_world_is_swept_away(monkeypatch):
         assert bullet().push(lone, SHOVES["force"]) == expected
 
 
-def test_a_world_is_given_up_before_it_leaks_much():
+def test_a_world_is_given_up_before_it_leaks_much(monkeypatch):
+    begun = []
+    real = Builder._begin
+    monkeypatch.setattr(Builder, "_begin", lambda self: begun.append(real(self)))
     engine = bullet()
-    lone, _ = scenes(60)[1]
-    for _ in range(3 * engine._builder.scenes_a_world // 2):
+    lone = Setting((Body(THINGS[2], Pose(0.0, 0.0, 0.001, UPRIGHT), moves=True),))
+    for _ in range(3 * SCENES_A_WORLD):
         engine._builder.build(lone)
-    bodies = pybullet.getNumBodies(engine._builder.client)
-    assert bodies == 1 + len(lone.bodies)
-    highest = max(pybullet.getBodyUniqueId(k, engine._builder.client) for k in range(bodies))
-    assert highest <= engine._builder.scenes_a_world + 1
+    assert len(begun) == 3
+    assert pybullet.getNumBodies(engine._builder.client) == 1 + len(lone.bodies)
+
+
+def test_what_a_users_own_client_sets_changes_nothing():
+    asked = [setting for setting, falls in scenes(30) if not falls]
+    expected = [bullet().push(setting, SHOVES["force"]) for setting in asked]
+    client = pybullet.connect(pybullet.DIRECT)
+    # Bullet's own global, whichever client it is set by.
+    pybullet.setPhysicsEngineParameter(contactBreakingThreshold=0.02, physicsClientId=client)
+    answers = [bullet().push(setting, SHOVES["force"]) for setting in asked]
+    pybullet.disconnect(client)
+    assert answers == expected
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+def test_a_forked_process_has_a_client_and_files_of_its_own():
+    here = bullet()
+    child = os.fork()
+    if child == 0:
+        there = bullet()
+        os._exit(0 if there is not here and there._builder.folder != here._builder.folder else 1)
+    assert os.waitpid(child, 0)[1] == 0
+    assert here._builder.folder.is_dir()

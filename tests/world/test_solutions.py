@@ -1,11 +1,14 @@
 """What is kept on disk is what was solved; whatever happens to the file, answers stay right."""
 
+import contextlib
+import itertools
+import math
 import os
 import sqlite3
-import struct
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -16,11 +19,11 @@ from internav_data.world import Body, Motion, Rest, Setting, engine_of_this_proc
 from internav_data.world.bullet import bullet
 from internav_data.world.engine import (
     Remembering,
-    _origin,
     _read_motion,
     _read_rest,
     _write_motion,
     _write_rest,
+    origin,
 )
 from internav_data.world.push import SHOVES
 from internav_data.world.solutions import FILE_NAME, Solutions, cache_folder
@@ -104,33 +107,83 @@ def test_other_rules_or_machines_are_not_believed(tmp_path):
     assert later.engine.asked == 1
 
 
-def test_the_origin_names_engine_code_and_processor():
-    origin = _origin(bullet().build)
-    assert bullet().build in origin
-    assert len(origin) > 100
-    assert _origin("other rules") != origin
+@pytest.mark.parametrize(
+    "part",
+    ["_CODE", "platform.python_version", "platform.libc_ver", "metadata.distribution", "_SOLVERS"],
+)
+def test_whatever_answers_depend_on_is_in_the_origin(monkeypatch, part):
+    module = sys.modules["internav_data.world.engine"]
+    here = origin.__wrapped__(bullet().build)
+    assert origin.__wrapped__("pybullet 0, rules 0") != here == origin.__wrapped__(bullet().build)
+    if part == "_SOLVERS":
+        code = module._code()
+        assert code == module._CODE
+        monkeypatch.setattr(module, "_SOLVERS", ("internav_data.geometry",))
+        assert module._code() != code
+        return
+    other = {
+        "_CODE": "other code",
+        "platform.python_version": lambda: "3.99",
+        "platform.libc_ver": lambda: ("other", "1"),
+        "metadata.distribution": lambda name: Record(f"another build of {name}"),
+    }[part]
+    monkeypatch.setattr(f"internav_data.world.engine.{part}", other)
+    assert origin.__wrapped__(bullet().build) not in (None, here)
 
 
-finite = st.floats(allow_nan=False, width=64)
+class Record:
+    def __init__(self, text):
+        self.text = text
+
+    def read_text(self, name):
+        return self.text if name == "RECORD" else None
+
+
+def test_where_a_build_cannot_be_told_nothing_is_kept(monkeypatch):
+    monkeypatch.setattr("internav_data.world.engine.metadata.distribution", lambda _: Record(None))
+    assert origin.__wrapped__(bullet().build) is None
+
+
+finite = st.floats(allow_nan=False, allow_infinity=False, width=64)
 poses = st.builds(lambda *n: Pose(*n[:3], n[3:]), *[finite] * 7)
 
 
-@given(
-    st.lists(st.tuples(poses, st.tuples(*[finite] * 8), st.binary(max_size=60)), max_size=4),
-    finite,
-    st.booleans(),
-)
-def test_motions_come_back_as_they_were(movers, seconds, at_rest):
-    motion = Motion(
+paths = st.integers(1, 3).flatmap(lambda n: st.binary(min_size=28 * n, max_size=28 * n))
+motions = st.builds(
+    lambda movers, seconds, at_rest: Motion(
         tuple(m[0] for m in movers),
         tuple(m[1] for m in movers),
         tuple(m[2] for m in movers),
         seconds,
         at_rest,
-    )
-    written = _write_motion(motion)
-    assert repr(_read_motion(written)) == repr(motion)  # tells -0.0 from 0.0
-    assert all(_read_motion(written[:k]) is None for k in range(len(written)))
+    ),
+    st.lists(st.tuples(poses, st.tuples(*[finite] * 8), paths), min_size=1, max_size=4),
+    finite,
+    st.booleans(),
+)
+
+
+@given(motions)
+def test_motions_come_back_as_they_were(motion):
+    count, written = len(motion.poses), _write_motion(motion)
+    assert repr(_read_motion(written, count)) == repr(motion)  # tells -0.0 from 0.0
+    assert all(_read_motion(written[:k], count) is None for k in range(len(written)))
+    assert _read_motion(written + b"x", count) is None
+    assert _read_motion(written, count + 1) is None
+    assert _read_motion(written, count - 1) is None
+
+
+@given(motions, st.sampled_from([math.nan, math.inf, -math.inf]))
+def test_a_motion_that_is_not_finite_is_none(motion, number):
+    pose = replace(motion.poses[-1], y=number)
+    for wrong in (
+        replace(motion, poses=(*motion.poses[:-1], pose)),
+        replace(motion, seconds=number),
+        replace(motion, sweeps=((number, *motion.sweeps[0][1:]), *motion.sweeps[1:])),
+        replace(motion, paths=(*motion.paths[:-1], b"")),
+        replace(motion, paths=(*motion.paths[:-1], b"abc")),
+    ):
+        assert _read_motion(_write_motion(wrong), len(motion.poses)) is None
 
 
 @given(poses, finite, finite, finite, st.booleans())
@@ -138,16 +191,13 @@ def test_rests_come_back_as_they_were(pose, seconds, penetration_m, reach_m, at_
     rest = Rest(pose, seconds, at_rest, penetration_m, reach_m)
     assert repr(_read_rest(_write_rest(rest))) == repr(rest)
     assert _read_rest(_write_rest(rest)[:-1]) is None
+    assert _read_rest(_write_rest(replace(rest, reach_m=math.nan))) is None
 
 
-@given(st.binary(max_size=400))
-def test_no_bytes_make_reading_fail(value):
-    _read_motion(value)
+@given(st.binary(max_size=400), st.integers(0, 3))
+def test_no_bytes_make_reading_fail(value, movers):
+    _read_motion(value, movers)
     _read_rest(value)
-
-
-def test_many_movers_claimed_are_not_believed():
-    assert _read_motion(struct.pack("<d?H", 1.0, True, 65535)) is None
 
 
 def kept(folder):
@@ -158,7 +208,7 @@ def kept(folder):
 
 
 def rows(folder, *question):
-    with sqlite3.connect(folder / FILE_NAME) as file:
+    with contextlib.closing(opened(folder)) as file:
         return file.execute(*question).fetchall()
 
 
@@ -185,19 +235,41 @@ def test_what_is_no_database_is_begun_anew(tmp_path, content):
     assert later.engine.asked == 0
 
 
-def test_pages_overwritten_while_it_is_open_cost_no_answer(tmp_path):
+@pytest.mark.parametrize(
+    "schema",
+    [
+        "CREATE TABLE solutions (name TEXT)",
+        """CREATE VIEW solutions AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i FROM n)
+        SELECT i AS key, i AS value FROM n""",
+        "CREATE TABLE something (else_ TEXT)",
+    ],
+)
+def test_another_database_is_begun_anew(tmp_path, schema):
+    rows(tmp_path, schema)
+    motion = kept(tmp_path)
+    later = remembering(tmp_path)
+    assert later.push(LONE, SHOVE) == motion
+    assert later.engine.asked == 0
+
+
+@pytest.mark.parametrize("where", [0.0, 0.3, 0.6])
+def test_a_file_damaged_anywhere_costs_no_answer_and_is_begun_anew(tmp_path, where):
     engine = remembering(tmp_path)
     motion = engine.push(LONE, SHOVE)
-    for k in range(40):
+    for k in range(200):
         engine.solutions.put(bytes([k]) * 32, bytes(3000))
     engine.solutions.flush()
     path = tmp_path / FILE_NAME
-    path.write_bytes(b"x" * path.stat().st_size)
-    fresh = remembering(tmp_path)
-    assert engine.push(LONE, SHOVE) == motion
-    assert fresh.push(LONE, SHOVE) == motion
-    engine.solutions.flush()
+    with path.open("r+b") as file:
+        file.seek(int(where * path.stat().st_size))
+        file.write(b"\xff" * (path.stat().st_size - file.tell()))
+    asked = [bytes([k]) * 32 for k in range(200)]
+    for _ in range(2):
+        later = remembering(tmp_path)
+        assert {later.solutions.get(key) for key in asked} <= {None, bytes(3000)}
+        assert later.push(LONE, SHOVE) == engine.push(LONE, SHOVE) == motion
     assert kept(tmp_path) == motion
+    assert remembering(tmp_path).solutions.count() >= 1
 
 
 def test_a_folder_that_cannot_be_made_keeps_nothing(tmp_path):
@@ -217,16 +289,19 @@ def test_a_read_only_file_is_read(tmp_path):
     assert engine.solutions.count() == 1
 
 
-def test_a_full_file_takes_no_more_and_is_begun_anew(tmp_path, monkeypatch):
+def test_a_full_file_is_emptied(tmp_path, monkeypatch):
     module = sys.modules["internav_data.world.solutions"]
     monkeypatch.setattr(module, "BYTES_AT_MOST", 1_200_000)
-    first = Solutions(tmp_path)
+    held, counts = Solutions(tmp_path), []
     for k in range(1000):
-        first.put(k.to_bytes(32, "little"), os.urandom(3000))
-    first.flush()
-    assert 0 < first.count() < 1000
+        held.put(k.to_bytes(32, "little"), os.urandom(3000))
+        counts.append(held.count())
+    assert max(counts) > 100
+    assert sum(after < before for before, after in itertools.pairwise(counts)) >= 2
     assert (tmp_path / FILE_NAME).stat().st_size <= 1_200_000
-    assert Solutions(tmp_path).count() == 0
+    held.put(b"later", b"kept")
+    assert held.count() >= 1
+    assert Solutions(tmp_path).get(b"later") == b"kept"
 
 
 def test_values_beyond_any_use_are_not_kept(tmp_path):
@@ -235,14 +310,65 @@ def test_values_beyond_any_use_are_not_kept(tmp_path):
     assert held.count() == 0
 
 
-def test_a_writer_who_is_waited_for_in_vain_costs_no_answer(tmp_path):
+def test_a_writer_who_is_waited_for_in_vain_costs_no_answer(tmp_path, monkeypatch):
+    monkeypatch.setattr("internav_data.world.solutions._OPENING_S", 0.2)
     motion = kept(tmp_path)
-    with sqlite3.connect(tmp_path / FILE_NAME, isolation_level=None) as other:
+    held = remembering(tmp_path)
+    with contextlib.closing(opened(tmp_path)) as other:
         other.execute("BEGIN EXCLUSIVE")
-        engine = remembering(tmp_path)
-        assert engine.push(LONE, SHOVE) == motion
-        engine.solutions.flush()
-    assert remembering(tmp_path).push(LONE, SHOVE) == motion
+        shut_out = remembering(tmp_path)
+        for engine in (held, shut_out):
+            assert engine.push(LONE, SHOVE) == motion
+            engine.solutions.flush()
+    assert not shut_out.solutions.is_open
+    assert held.push(LONE, SHOVE) == remembering(tmp_path).push(LONE, SHOVE) == motion
+
+
+def opened(folder):
+    return sqlite3.connect(folder / FILE_NAME, isolation_level=None, timeout=0.1)
+
+
+def test_a_reader_in_the_way_of_a_commit_leaves_no_transaction_open(tmp_path):
+    held = Solutions(tmp_path)
+    held.put(b"first", b"1")
+    held.flush()
+    with contextlib.closing(opened(tmp_path)) as reader:
+        reader.execute("BEGIN")
+        reader.execute("SELECT * FROM solutions").fetchall()
+        held.put(b"second", b"2")
+        held.flush()
+        assert not held._file.in_transaction
+        reader.execute("COMMIT")
+    held.put(b"third", b"3")
+    held.flush()
+    assert Solutions(tmp_path).get(b"third") == b"3"
+
+
+def test_an_interrupt_while_writing_leaves_no_transaction_open(tmp_path, monkeypatch):
+    held = Solutions(tmp_path)
+    real = held._ask
+
+    def interrupted(question, *values):
+        if question.startswith("INSERT"):
+            raise KeyboardInterrupt
+        return real(question, *values)
+
+    monkeypatch.setattr(held, "_ask", interrupted)
+    held.put(b"first", b"1")
+    with pytest.raises(KeyboardInterrupt):
+        held.flush()
+    monkeypatch.undo()
+    assert not held._file.in_transaction
+    other = Solutions(tmp_path)
+    other.put(b"second", b"2")
+    assert other.count() == 1
+
+
+def test_what_was_put_is_known_before_it_is_written(tmp_path):
+    held = Solutions(tmp_path)
+    held.put(b"key", b"value")
+    assert held.get(b"key") == b"value"
+    assert Solutions(tmp_path).get(b"key") is None
 
 
 def test_several_processes_write_at_once(tmp_path):
@@ -303,3 +429,17 @@ def test_where_solutions_are_kept_can_be_chosen(tmp_path, monkeypatch):
     folder = cache_folder()
     assert folder is not None
     assert folder.name == "internav"
+
+
+def test_a_user_without_a_home_keeps_nothing(monkeypatch):
+    monkeypatch.delenv("INTERNAV_CACHE_DIR")
+
+    def homeless(*_, **__):
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr("internav_data.world.solutions.user_cache_path", homeless)
+    assert cache_folder() is None
+    monkeypatch.setattr(
+        "internav_data.world.solutions.user_cache_path", lambda *_, **__: Path("~/.cache")
+    )
+    assert cache_folder() is None
