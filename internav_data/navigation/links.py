@@ -150,7 +150,9 @@ def closes(
                 odd ^= _crossings(way, px, py, qx, qy)
                 if not unite(parent, parity, labels[b], count + a, odd):
                     return True
-        for b in range(a + 1, new):
+        for b in near_ids(added_boxes, added_boxes[a], gap):
+            if b <= a:
+                continue
             d, px, py, qx, qy = closest(
                 added, start, stop, added, added_offsets[b], added_offsets[b + 1]
             )
