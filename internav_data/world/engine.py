@@ -163,7 +163,10 @@ def origin(build: str) -> str | None:
     """
     from llvmlite.binding import get_host_cpu_features, get_host_cpu_name  # noqa: PLC0415 - heavy
 
-    libraries = [metadata.distribution(name).read_text("RECORD") for name in _LIBRARIES]
+    try:
+        libraries = [metadata.distribution(name).read_text("RECORD") for name in _LIBRARIES]
+    except metadata.PackageNotFoundError:
+        return None
     if None in libraries:
         return None
     records = hashlib.sha256("".join(map(str, libraries)).encode()).hexdigest()

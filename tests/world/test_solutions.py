@@ -142,6 +142,9 @@ class Record:
 def test_where_a_build_cannot_be_told_nothing_is_kept(monkeypatch):
     monkeypatch.setattr("internav_data.world.engine.metadata.distribution", lambda _: Record(None))
     assert origin.__wrapped__(bullet().build) is None
+    monkeypatch.undo()
+    monkeypatch.setattr("internav_data.world.engine._LIBRARIES", ("no such library",))
+    assert origin.__wrapped__(bullet().build) is None
 
 
 finite = st.floats(allow_nan=False, allow_infinity=False, width=64)
