@@ -73,8 +73,10 @@ def slice_of(corners):
             if low > high:
                 continue
         points += [(a + t * (b - a))[:2] for t in (low, high)]
-    # GEOS's hull stumbles over points that differ in their last bits alone (an example below).
-    return shapely.MultiPoint(np.round(points, 9)).convex_hull if points else shapely.Point()
+    if not points:
+        return shapely.Point()
+    # GEOS's hull stumbles over many points that are nearly or wholly the same (an example below).
+    return shapely.MultiPoint(np.unique(np.round(points, 9), axis=0)).convex_hull
 
 
 def union(polygons):
