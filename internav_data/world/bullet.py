@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from internav_data.geometry import centre_of_mass, multiply, rotation_matrix
 from internav_data.records import Pose
-from internav_data.world.bullet_scene import RULES, SCENES_A_WORLD, STEP_S, Builder, pybullet
+from internav_data.world.bullet_scene import RULES, STEP_S, Builder, pybullet
 from internav_data.world.setting import Motion, Rest
 from internav_data.world.sweeps import radius_m, trail_of
 
@@ -160,16 +160,16 @@ def _angle(first: tuple[float, ...], second: tuple[float, ...]) -> float:
     return 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), abs(w))
 
 
-def bullet(*, scenes_a_world: int = SCENES_A_WORLD) -> Bullet:
+def bullet() -> Bullet:
     """Return this process's Bullet: connected at first use, its files removed at exit."""
-    return _of_process(os.getpid(), scenes_a_world)
+    return _of_process(os.getpid())
 
 
 @cache  # a forked process has its own: two of them would write each other's files
-def _of_process(pid: int, scenes_a_world: int) -> Bullet:
+def _of_process(pid: int) -> Bullet:
     folder = Path(tempfile.mkdtemp(prefix="internav-"))
     atexit.register(_remove, folder, pid)
-    return Bullet(Builder(pybullet.connect(pybullet.DIRECT), folder, scenes_a_world))
+    return Bullet(Builder(pybullet.connect(pybullet.DIRECT), folder))
 
 
 def _remove(folder: Path, pid: int) -> None:

@@ -77,7 +77,7 @@ class Builder:
     client: int
     folder: Path
     scenes_a_world: int = SCENES_A_WORLD
-    """1: an empty world for every scene, twice as slow and by definition without history."""
+    """1: an empty world for every scene, half as slow again and by definition without history."""
     _files: dict[Asset, str] = field(default_factory=dict)
     _shapes: dict[tuple[Asset, bool], int] = field(default_factory=dict)
     _bodies: list[int] = field(default_factory=list)

@@ -152,6 +152,8 @@ def _connected(path: Path) -> sqlite3.Connection:
     with suppress(sqlite3.OperationalError):
         file.execute(_TABLE)
     found = file.execute("SELECT type, sql FROM sqlite_schema").fetchall()
+    if not found:
+        raise sqlite3.OperationalError(f"{path} is locked or read-only")  # another's, so no unlink
     if found != [("table", _TABLE)]:
         file.close()
         raise sqlite3.DatabaseError(f"{path} holds something else: {found}")

@@ -8,7 +8,7 @@ import pytest
 from internav_data.geometry import yaw_quaternion
 from internav_data.records import Asset, Part, Pose, Wall
 from internav_data.world import Body, Column, Setting, wall_body
-from internav_data.world.bullet import bullet
+from internav_data.world.bullet import Bullet, bullet
 from internav_data.world.bullet_scene import SCENES_A_WORLD, Builder, pybullet
 from internav_data.world.push import SHOVES
 
@@ -65,20 +65,27 @@ def answer(engine, setting, falls):
     return engine.settle(setting) if falls else engine.push(setting, SHOVES["force"])
 
 
-def test_an_emptied_world_is_as_good_as_new():
+@pytest.fixture
+def fresh(tmp_path):
+    """Bullet with an empty world for every scene."""
+    client = pybullet.connect(pybullet.DIRECT)
+    yield Bullet(Builder(client, tmp_path, scenes_a_world=1))
+    pybullet.disconnect(client)
+
+
+def test_an_emptied_world_is_as_good_as_new(fresh):
     asked = scenes(60)
-    fresh = bullet(scenes_a_world=1)
     expected = [answer(fresh, *scene) for scene in asked]
     for seed in range(4):
         for k in np.random.default_rng(seed).permutation(len(asked)):
             assert answer(bullet(), *asked[k]) == expected[k]
 
 
-def test_what_an_interrupt_left_in_a_world_is_swept_away(monkeypatch):
+def test_what_an_interrupt_left_in_a_world_is_swept_away(fresh, monkeypatch):
     asked = [setting for setting, falls in scenes(60) if not falls]
     lone = next(setting for setting in asked if len(setting.bodies) == 1)
     crowded = next(setting for setting in asked if len(setting.bodies) > 1)
-    expected = bullet(scenes_a_world=1).push(lone, SHOVES["force"])
+    expected = fresh.push(lone, SHOVES["force"])
     real = Builder._place
 
     def interrupted(self, *args, **where):

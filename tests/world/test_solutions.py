@@ -327,6 +327,17 @@ def test_a_writer_who_is_waited_for_in_vain_costs_no_answer(tmp_path, monkeypatc
     assert held.push(LONE, SHOVE) == remembering(tmp_path).push(LONE, SHOVE) == motion
 
 
+def test_an_empty_file_that_another_holds_is_left_to_it(tmp_path, monkeypatch):
+    monkeypatch.setattr("internav_data.world.solutions._OPENING_S", 0.2)
+    with contextlib.closing(opened(tmp_path)) as other:
+        other.execute("BEGIN IMMEDIATE")
+        other.execute("CREATE TABLE other (name TEXT)")
+        assert not Solutions(tmp_path).is_open
+        other.execute("COMMIT")
+        assert other.execute("SELECT name FROM sqlite_schema").fetchall() == [("other",)]
+        assert (tmp_path / FILE_NAME).is_file()
+
+
 def opened(folder):
     return sqlite3.connect(folder / FILE_NAME, isolation_level=None, timeout=0.1)
 
