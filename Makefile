@@ -148,6 +148,10 @@ check: $(STAMP) ## lint, format, types, layers, schemas
 	$(BIN)/internav-gen schema --out build/schemas
 	diff -r schemas build/schemas
 
+.PHONY: size
+size: $(STAMP) ## print lines of code a room
+	$(BIN)/python docs/size.py
+
 .PHONY: format
 format: $(STAMP) ## mend what ruff can mend
 	$(BIN)/ruff check --fix .

@@ -21,11 +21,11 @@ import numpy as np
 
 from internav_data import generate_house
 from internav_data.catalog import asset_mesh
-from internav_data.navigation import SPACING_M
-from internav_data.world.camera import EYE_HEIGHT_M, Camera, Scenery, View, camera_axes
-from internav_data.world.camera_models import LIBRARY
-from internav_data.world.raster_frame import picture
-from internav_data.world.raster_shade import shade
+from internav_data.navigation import SPACING_M, Lattice
+from internav_data.render.asset_mesh import LIBRARY
+from internav_data.render.camera import EYE_HEIGHT_M, Camera, Scenery, View, camera_axes
+from internav_data.render.frame import picture
+from internav_data.render.shading import shade
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,7 +40,7 @@ def views_of(house: House, count: int, seed: int) -> list[View]:
     scenery = Scenery.of(house)
     props = scenery.props()
     rng = np.random.default_rng(seed)
-    free = np.argwhere(house.lattice().free)
+    free = np.argwhere(Lattice.of(house).free)
     out = []
     for _ in range(count):
         i, j = free[int(rng.integers(len(free)))]

@@ -28,8 +28,8 @@ from internav_data.catalog import catalogue
 from internav_data.episodes import EpisodeConfig, Site, build_episodes
 from internav_data.geometry import Polygons, footprint
 from internav_data.houses import HouseConfig, build_house
+from internav_data.physics import settle
 from internav_data.records import Pose
-from internav_data.world import settle
 
 if TYPE_CHECKING:
     from collections.abc import Callable

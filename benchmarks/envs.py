@@ -23,8 +23,8 @@ from typing import Any
 import numpy as np
 
 from internav_data.envs import InterNavEnv, InterNavVectorEnv
-from internav_data.world.camera_models import LIBRARY
-from internav_data.world.solutions import FOLDER_VARIABLE
+from internav_data.physics.result_cache import FOLDER_VARIABLE
+from internav_data.render.asset_mesh import LIBRARY
 
 TARGETS = {"navigation_steps_per_s": 3000, "uniform_steps_per_s": 1500}
 SHARES = {

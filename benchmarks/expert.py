@@ -25,9 +25,9 @@ import numpy as np
 
 from internav_data.catalog import catalogue
 from internav_data.episodes import build_episodes
-from internav_data.episodes.expert import expert_of_episode
-from internav_data.episodes.expert_ground import Ground
 from internav_data.houses import HouseConfig, build_house
+from internav_data.planner.problem import Ground
+from internav_data.planner.search import expert_of_episode
 from internav_data.world import ACTION_COUNT, Action, Stage, World
 
 if TYPE_CHECKING:

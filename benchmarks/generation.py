@@ -28,7 +28,7 @@ from typing import Self
 import psutil
 
 from internav_data.generation import generate, load_config
-from internav_data.world.solutions import FOLDER_VARIABLE
+from internav_data.physics.result_cache import FOLDER_VARIABLE
 
 PAPER_EPISODES = 595_500
 """12,000 scenes: 11,900 with 50 episodes and 100 with 5."""

@@ -20,7 +20,7 @@ import numpy as np
 from internav_data.catalog import catalogue
 from internav_data.geometry import footprint
 from internav_data.houses import HouseConfig, build_house
-from internav_data.navigation import room_of
+from internav_data.navigation import Lattice, room_of
 
 if TYPE_CHECKING:
     from internav_data.records import House, Room
@@ -90,7 +90,7 @@ def room_steps(house: House, a: int, b: int) -> int | None:
 
 def ways(house: House, rng: np.random.Generator, draws: int = 12) -> list[tuple[float, int]]:
     """Random lattice ways between rooms (inside one for one-room houses): metres, rooms."""
-    lattice = house.lattice()
+    lattice = Lattice.of(house)
     components = lattice.components()
     labels, counts = np.unique(components[components >= 0], return_counts=True)
     nodes = np.argwhere(components == labels[counts.argmax()])

@@ -21,13 +21,13 @@ import numpy as np
 import psutil
 
 from internav_data.envs import InterNavEnv
-from internav_data.episodes.expert_ground import _marks
+from internav_data.physics.narrow_phase import outline_of
+from internav_data.physics.push import _push_alone, _push_in
+from internav_data.physics.settle import _settle_alone
+from internav_data.physics.sweep import about_middle
+from internav_data.planner.problem import _marks
 from internav_data.world.drop import _standing
-from internav_data.world.push import _push_alone, _push_in
-from internav_data.world.settle import _settle_alone
-from internav_data.world.shells import placed_shell, shell_of
-from internav_data.world.sweeps import about_middle
-from internav_data.world.touch import outline_of
+from internav_data.world.occlusion import placed_shell, shell_of
 
 TARGET_MIB = 64.0
 SHARES = np.array([8, 2, 2, 0.5, 0.5, 0.4, 0.4, 0.4, 0.4, 1, 1, 0], np.float64)

@@ -25,13 +25,14 @@ from internav_data.episodes import build_episodes
 from internav_data.episodes.outcomes import outcomes_of
 from internav_data.geometry import yaw_quaternion
 from internav_data.houses import HouseConfig, build_house
+from internav_data.physics import push
+from internav_data.physics.cache import Remembering
+from internav_data.physics.engines.bullet import bullet
+from internav_data.physics.push import SHOVES, _push_alone, _push_in
+from internav_data.physics.result_cache import FOLDER_VARIABLE, Solutions
+from internav_data.physics.scene import UPRIGHT, Body, Setting
 from internav_data.records import Pose
-from internav_data.world import Action, Stage, World, push
-from internav_data.world.bullet import bullet
-from internav_data.world.engine import Remembering
-from internav_data.world.push import SHOVES, _push_alone, _push_in
-from internav_data.world.setting import UPRIGHT, Body, Setting
-from internav_data.world.solutions import FOLDER_VARIABLE, Solutions
+from internav_data.world import Action, Stage, World
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -28,8 +28,8 @@ FILMED = (0, 9, 1)
 
 def settings() -> str:
     """Return all settings with their defaults."""
+    from internav_data.core.config import config_toml  # noqa: PLC0415
     from internav_data.generation import GenerationConfig  # noqa: PLC0415 - --pictures needs more
-    from internav_data.generation.toml import config_toml  # noqa: PLC0415
 
     return f"```toml\n{config_toml(GenerationConfig()).strip()}\n```"
 
@@ -37,7 +37,7 @@ def settings() -> str:
 def training_settings() -> str:
     """Return all settings of `camp-train`, those of both presets side by side."""
     from internav_data.camp.config import CampConfig, preset  # noqa: PLC0415 - --pictures needs more
-    from internav_data.dataset.jsonschemas import descriptions  # noqa: PLC0415
+    from internav_data.core.field_docs import descriptions  # noqa: PLC0415
 
     small, paper, notes = preset("small"), preset("paper"), descriptions(CampConfig)
     single, parts = [], []
@@ -55,7 +55,7 @@ _HEAD = ("| | `small` | `paper` | |", "|---|---|---|---|")
 
 
 def _rows(prefix: str, one: Any, two: Any) -> Iterator[str]:  # noqa: ANN401 - parts of a config
-    from internav_data.dataset.jsonschemas import descriptions  # noqa: PLC0415
+    from internav_data.core.field_docs import descriptions  # noqa: PLC0415
 
     notes = descriptions(type(one))
     for field in dataclasses.fields(one):
@@ -121,7 +121,7 @@ def draw_pictures() -> None:
 
 def draw_replay() -> None:
     """Film an expert at work for the README."""
-    from internav_data import generate_episodes, generate_house  # noqa: PLC0415 - seconds
+    from internav_data import generate_episodes, generate_house  # noqa: PLC0415
     from internav_data.catalog import catalogue  # noqa: PLC0415
     from internav_data.views import replay_frames, write_video  # noqa: PLC0415
 

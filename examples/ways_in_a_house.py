@@ -12,6 +12,7 @@ import numpy as np
 from internav_data import generate_episodes, generate_house
 from internav_data.catalog import catalogue
 from internav_data.geometry import footprint
+from internav_data.navigation import Lattice
 
 
 def main() -> None:
@@ -24,7 +25,7 @@ def main() -> None:
     house = generate_house(seed=options.seed, scene=options.scene)
     print(f"{house.scene_id}: {', '.join(room.type for room in house.rooms)}")
 
-    lattice = house.lattice()
+    lattice = Lattice.of(house)
     print(f"{np.count_nonzero(lattice.free)} free nodes of {lattice.free.size}")
 
     (episode,) = generate_episodes(house, count=1)

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from internav_data.camp.checkpoint import load_agent
     from internav_data.dataset import Dataset, compute_stats, load_dataset
     from internav_data.generation import generate_episodes, generate_house
-
-__version__ = "0.1.0"
+    from internav_data.records.version import __version__
 
 _HOMES = {
+    "__version__": "internav_data.records.version",
     "Dataset": "internav_data.dataset",
     "compute_stats": "internav_data.dataset",
     "generate_episodes": "internav_data.generation",
@@ -33,6 +33,7 @@ _HOMES = {
 
 __all__ = [
     "Dataset",
+    "__version__",
     "compute_stats",
     "generate_episodes",
     "generate_house",

@@ -100,8 +100,8 @@ def test_examples_run(example, small_dataset, small_run, tmp_path):
 
 def test_the_agent_that_ships_plays(small_dataset):
     from internav_data import load_dataset
-    from internav_data.camp.evaluation import Settings, evaluate
-    from internav_data.camp.players import candidate
+    from internav_data.camp.policy import candidate
+    from internav_data.evaluation.evaluate import Settings, evaluate
 
     dataset, settings = load_dataset(small_dataset), Settings(limit=2, max_steps=20)
     shipped = ROOT / "examples" / "camp-small"

@@ -14,10 +14,10 @@ from internav_cli.options import DATASET, JSON, positive
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from internav_data.camp.archive import Evaluation
-    from internav_data.camp.evaluation import Settings
-    from internav_data.camp.verdict import Methods
     from internav_data.dataset import Dataset
+    from internav_data.evaluation.archive import Evaluation
+    from internav_data.evaluation.evaluate import Settings
+    from internav_data.evaluation.statements import Methods
 
 _REPORT = "report.html"
 
@@ -106,16 +106,16 @@ tables.md, tables.json, report.html.""",
 @JSON
 def evaluate_command(**given: Any) -> int:  # noqa: ANN401 - the options above
     """Let RUN play DATASET, and print the paper's tables."""
-    from internav_data.camp.archive import (
+    from internav_data.camp.policy import candidate, oracles_beside
+    from internav_data.evaluation.archive import (
         Evaluation,
         folder_name,
         forget_evaluations,
         write_evaluation,
     )
-    from internav_data.camp.evaluation import evaluate
-    from internav_data.camp.films import films
-    from internav_data.camp.players import candidate, oracles_beside
-    from internav_data.camp.report import methods_of
+    from internav_data.evaluation.evaluate import evaluate
+    from internav_data.evaluation.report import methods_of
+    from internav_data.evaluation.videos import films
 
     names, run = _who(given["run"])
     out = given["out"] or (run or Path()) / f"evaluation-{given['split']}"
@@ -170,8 +170,8 @@ def compare_command(
     *, runs: tuple[Path, ...], data: Path | None, out: Path | None, force: bool, as_json: bool
 ) -> int:
     """Lay evaluations side by side, and say what they can tell."""
-    from internav_data.camp.archive import find_evaluations, read_evaluation
-    from internav_data.camp.report import methods_of
+    from internav_data.evaluation.archive import find_evaluations, read_evaluation
+    from internav_data.evaluation.report import methods_of
 
     if out is not None:
         _check_out(out, force=force)
@@ -184,7 +184,7 @@ def compare_command(
 
 def _who(run: str) -> tuple[list[str], Path | None]:
     """Return names to evaluate, and the run's folder where it is one."""
-    from internav_data.camp.oracles import ORACLES
+    from internav_data.evaluation.reference_policies import ORACLES
 
     names = [name.strip() for name in run.split(",")]
     if all(name in ORACLES for name in names):
@@ -204,7 +204,7 @@ def _dataset(given: dict[str, Any]) -> Dataset[Any]:
 
 
 def _settings(given: dict[str, Any]) -> Settings:
-    from internav_data.camp.evaluation import Settings
+    from internav_data.evaluation.evaluate import Settings
 
     names = ("seed", "batch", "workers", "max_steps", "limit")
     return Settings(**{name: given[name] for name in names})
@@ -223,7 +223,7 @@ def _same_dataset(path: Path, evaluation: Evaluation) -> Dataset[Any]:
 
 
 def _check_out(out: Path, *, force: bool) -> None:
-    from internav_data.camp.archive import ABOUT
+    from internav_data.evaluation.archive import ABOUT
     from internav_data.records.errors import UsageError
 
     if out.exists() and not out.is_dir():
@@ -258,8 +258,14 @@ def _write(
     """Print the tables, and write them where there is a folder to."""
     import json
 
-    from internav_data.camp.logs import find_log, read_log
-    from internav_data.camp.report import data_of, text_of, write_page, write_texts
+    from internav_data.evaluation.report import (
+        data_of,
+        find_log,
+        read_log,
+        text_of,
+        write_page,
+        write_texts,
+    )
 
     if out is not None:
         write_texts(out, methods)

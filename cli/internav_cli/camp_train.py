@@ -107,7 +107,7 @@ interrupted.""",
 def command(**given: Any) -> int:  # noqa: ANN401 - the options above
     """Train an agent on DATASET: CaMP, one of its baselines, or your own."""
     if given["print_config"]:
-        from internav_data.generation.toml import config_toml
+        from internav_data.core.config import config_toml
 
         click.echo(config_toml(_config(given), "camp-train"), nl=False)
         return 0
@@ -128,7 +128,8 @@ def _settings(given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _config(given: dict[str, Any]) -> CampConfig:
-    from internav_data.camp.settings import config_of, default_preset
+    from internav_data.camp.config import config_of
+    from internav_data.camp.distributed import default_preset
 
     name = given["preset"] or default_preset(given["device"])
     return config_of(name, given["config_file"], given["overrides"], _settings(given))
@@ -155,7 +156,7 @@ def _request(given: dict[str, Any]) -> Request:
 
 def _forecast(request: Request, *, as_json: bool) -> int:
     from internav_data.camp.run import forecast
-    from internav_data.generation.progress import clock
+    from internav_data.core.progress import clock
 
     told = forecast(request)
     if as_json:
@@ -171,9 +172,9 @@ def _forecast(request: Request, *, as_json: bool) -> int:
 
 
 def _train(request: Request, given: dict[str, Any]) -> int:
+    from internav_data.camp.logging import Teller
     from internav_data.camp.run import begin, resume
-    from internav_data.camp.telling import Teller
-    from internav_data.generation.interrupts import Interrupts
+    from internav_data.core.interrupts import Interrupts
 
     teller = Teller(sys.stderr)
     with Interrupts() as interrupts:
@@ -199,7 +200,7 @@ def _train(request: Request, given: dict[str, Any]) -> int:
 
 def _asked(given: dict[str, Any], request: Request) -> dict[str, Any]:
     """Return what was asked for besides --resume, to be compared with the run."""
-    from internav_data.camp.settings import keys_given
+    from internav_data.core.config import keys_given
 
     keys = keys_given(given["config_file"], given["overrides"], _settings(given))
     return {

@@ -25,7 +25,7 @@ Examples:
 @JSON
 def command(*, out: Path, as_json: bool) -> int:
     """Look for what keeps this machine from generating, and say what to do about it."""
-    from internav_data.generation.environment import examine
+    from internav_data.generation.diagnostics import examine
 
     checks = examine(out)
     if as_json:

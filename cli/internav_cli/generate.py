@@ -81,12 +81,12 @@ def command(
         episodes__push_model=push_model,
     )
     if print_config:
-        from internav_data.generation.toml import config_toml
+        from internav_data.core.config import config_toml
 
         click.echo(config_toml(config), nl=False)
         return 0
     if scene is not None:
-        from internav_data.generation.again import scene_again
+        from internav_data.generation.reproduce import scene_again
 
         text, verdict = scene_again(config, scene, episode, out)
         click.echo(text)

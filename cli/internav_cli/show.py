@@ -73,7 +73,7 @@ def _stored(dataset: Path, scene: int, episode: int | None) -> tuple[Any, Any, A
 
 
 def _fresh(config: GenerationConfig, scene: int, episode: int | None) -> tuple[Any, Any, Any]:
-    from internav_data.generation.again import made_again
+    from internav_data.generation.reproduce import made_again
 
     made = made_again(config, scene, episode)
     return made.house, made.episodes[-1] if episode is not None else None, made.assets

@@ -13,8 +13,8 @@ Examples:
 )
 def command() -> int:
     """Compile the numba kernels now, rather than when they are first used."""
-    from internav_data.generation.environment import warm_up
-    from internav_data.generation.progress import clock
+    from internav_data.core.progress import clock
+    from internav_data.generation.diagnostics import warm_up
 
     click.echo("compiling numba kernels: about a minute the first time", err=True)
     seconds = warm_up()

@@ -12,10 +12,9 @@ from internav_data.camp.agents.options import NAVIGATE, PUSH
 from internav_data.camp.stages import TASKS
 from internav_data.camp.tasks import WithoutObstacles, env_state
 from internav_data.envs.auxiliary import AuxiliaryStart, auxiliary_starts, is_cleared
-from internav_data.envs.metrics import KINDS
 from internav_data.envs.processes import merged
-from internav_data.envs.rewards import STEP, SUCCESS
 from internav_data.envs.spaces import layout
+from internav_data.envs.tasks import KINDS, STEP, SUCCESS
 from internav_data.envs.vector import InterNavVectorEnv
 from internav_data.records import Purpose, generator
 from internav_data.records.errors import CorruptDataError, UsageError

@@ -1,27 +1,204 @@
-"""The first stage of a run with `--init-from expert`: what the dataset's expert does is cloned."""
+"""The first stage of a run with `--init-from expert`: what the dataset's expert does is cloned.
+
+Cloning the dataset's expert: its episodes are played again and its actions made likely.
+"""
 
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
 import torch
 
-from internav_data.camp.imitation import Demonstrations, clone, experts_of
-from internav_data.camp.logbook import rates
-from internav_data.camp.packing import (
+from internav_data.camp.agents import Batch
+from internav_data.camp.checkpoint import (
     unpack_environments,
     unpack_optimiser,
     unpack_random,
     unpack_state,
 )
+from internav_data.camp.logging import rates
+from internav_data.camp.ppo import alone, check_finite, step
+from internav_data.camp.rollout import Columns
 from internav_data.camp.stages import order_seed
-from internav_data.records.errors import NotFiniteError
+from internav_data.records.errors import CorruptDataError, NotFiniteError, UsageError
 
 if TYPE_CHECKING:
-    from internav_data.camp.agents import State
+    from collections.abc import Callable, Iterator, Sequence
+
+    from numpy.typing import NDArray
+    from torch.optim import Optimizer
+
+    from internav_data.camp.agents import Agent, State
+    from internav_data.camp.collect import Environments, Observations
+    from internav_data.camp.config import CloningConfig
+    from internav_data.camp.ppo import Reduce
     from internav_data.camp.tasks import Task
     from internav_data.camp.train import Trainer
+    from internav_data.dataset import Dataset
+    from internav_data.records import Episode
+
+    Experts = Callable[[str], Sequence[int]]
+    """Actions of the expert of an episode, by its id."""
+
+
+LONGEST_GRADIENT = 0.5
+
+
+def experts_of(dataset: Dataset[Episode]) -> Experts:
+    """Return the experts of a dataset; who asks for one that is missing gets a UsageError."""
+    from internav_data.envs.source import open_source  # noqa: PLC0415 - the camera's kernels
+
+    source = open_source(dataset)
+
+    def actions(episode_id: str) -> Sequence[int]:
+        expert = source.episode(source.number_of(episode_id)).expert
+        if expert is None:
+            raise UsageError(
+                f"episode {episode_id} has no expert to clone: generate the dataset with "
+                "experts, or train without --init-from expert"
+            )
+        return expert.actions
+
+    return actions
+
+
+class Demonstrations:
+    """Experts play in a batch of environments, as an agent would label what they do.
+
+    Parameters
+    ----------
+    env
+        The environments.
+    agent
+        Whose labels: of options too, with hand-backs, where it has them.
+    experts
+        What is played, by episode.
+    """
+
+    def __init__(self, env: Environments, agent: Agent, experts: Experts) -> None:
+        self.env, self._agent, self._experts = env, agent, experts
+        self._labels: list[dict[str, list[int]]] = [{} for _ in range(env.num_envs)]
+        self._places = [0] * env.num_envs
+
+    def begin(self, seed: int) -> None:
+        """Begin an order of episodes anew."""
+        self._seen, infos = self.env.reset(seed=seed)
+        self._starts = np.ones(self.env.num_envs, np.bool_)
+        self._learn(infos)
+
+    def resume(self, seen: Observations, ids: Sequence[str], places: Sequence[int]) -> None:
+        """Go on in the middle: episodes `ids` are under way, `places` steps of each are taken."""
+        self._seen, self._starts = seen, np.ones(self.env.num_envs, np.bool_)
+        self._learn({"episode_id": np.array(ids, dtype=object)})
+        for own, place in zip(self._labels, places, strict=True):
+            if not place < len(own["action"]):
+                raise CorruptDataError(
+                    f"checkpoint: environments: {place} actions were taken, the expert has "
+                    f"{len(own['action'])}"
+                )
+        self._places, self._starts = list(places), np.array(places) == 0
+
+    def collect(self, steps: int, state: State) -> Batch:
+        """Play so many steps, to be lived through after `state`."""
+        device = self._agent.device
+        seen, record, starts = (Columns(steps, device) for _ in range(3))
+        for t in range(steps):
+            seen.write(t, {name: torch.from_numpy(what) for name, what in self._seen.items()})
+            starts.write(t, {"starts": torch.from_numpy(self._starts)})
+            row = {
+                name: np.array(
+                    [own[name][k] for own, k in zip(self._labels, self._places, strict=True)]
+                )
+                for name in self._labels[0]
+            }
+            record.write(t, {name: torch.from_numpy(column) for name, column in row.items()})
+            self._places = [place + 1 for place in self._places]
+            self._seen, _, ended, cut, _ = self.env.step(row["action"])
+            self._starts = ended | cut
+            for k, (own, place) in enumerate(zip(self._labels, self._places, strict=True)):
+                self._starts[k] |= place == len(own["action"])
+            if self._starts.any():
+                self._seen, infos = self.env.reset(options={"reset_mask": self._starts})
+                self._learn(infos)
+        return Batch(seen.columns, starts.columns["starts"], state, record.columns)
+
+    def _learn(self, infos: dict[str, Any]) -> None:
+        ids: NDArray[np.object_] = infos["episode_id"]
+        for k in np.flatnonzero(self._starts).tolist():
+            self._labels[k] = self._agent.labels(self._experts(str(ids[k])))
+            self._places[k] = 0
+
+
+def clone(
+    agent: Agent,
+    optimiser: Optimizer,
+    demonstrations: Demonstrations,
+    config: CloningConfig,
+    seed: int,
+    reduce: Reduce = alone,
+    *,
+    first: int = 0,
+    state: State | None = None,
+    keep: Callable[[State], object] | None = None,
+) -> Iterator[dict[str, float]]:
+    """Make what experts do likely; yields after each update.
+
+    The loss is -log pi_Omega(omega*) where the agent decides, -log pi_omega(a*) everywhere. Each
+    epoch plays the same frames. Hidden states go on from one update to the next, without gradient.
+
+    Parameters
+    ----------
+    agent, optimiser
+        Who learns; the optimiser holds `agent.optimised()`.
+    demonstrations
+        What from.
+    config
+        How.
+    seed
+        Of the order of episodes.
+    reduce
+        Adds a tensor over all ranks.
+    first, state
+        Updates that were done before, and the hidden states after them; `demonstrations` stand
+        where they stood.
+    keep
+        Told the hidden states after each update.
+
+    Yields
+    ------
+    dict
+        `loss`, `gradient_norm`, `learning_rate`, `update`, `updates` (how many there will be).
+    """
+    count = demonstrations.env.num_envs
+    an_epoch = max(1, round(config.frames / (config.environments * config.steps)))
+    updates = an_epoch * config.epochs
+    state = agent.initial_state(count) if state is None else state
+    for update in range(first, updates):
+        if update % an_epoch == 0:
+            demonstrations.begin(seed)
+        rate = config.learning_rate * (1.0 - update / updates)
+        for group in optimiser.param_groups:
+            group["lr"] = rate
+        batch = demonstrations.collect(config.steps, state)
+        now = agent.evaluate(batch)
+        frames = reduce(now.log_prob.new_tensor(float(now.log_prob.numel())))
+        wrong = -now.log_prob if now.loss is None else now.loss - now.log_prob
+        check_finite(torch.arange(count), wrong)
+        loss = wrong.sum() / frames
+        norm = step(optimiser, loss, agent.optimised(), LONGEST_GRADIENT, reduce)
+        state = {name: kept.detach() for name, kept in now.state.items()}
+        if (update + 1) % config.sync_every == 0:
+            agent.synchronise()
+        said = float(reduce(loss.detach().clone()))
+        if keep is not None:
+            keep(state)
+        yield {
+            "loss": said, "gradient_norm": norm, "learning_rate": rate,
+            "update": float(update + 1), "updates": float(updates),
+        }  # fmt: skip
+
 
 CLONING: Final = "cloning"
 _RARELY: Final = 4

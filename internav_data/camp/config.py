@@ -1,16 +1,62 @@
-"""Every hyperparameter of training, with what it means; the presets `paper` and `small`."""
+"""Every hyperparameter of training, with what it means; the presets `paper` and `small`.
+
+What values a setting may have.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from internav_data.camp.bounds import bounds_of
-from internav_data.generation import values
+from internav_data.core import config as values
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
+
+
+_MOST: Final = 10**12
+_LIMITS: Final[dict[str, tuple[float, float]]] = {
+    "seed": (0, 2**63 - 1),
+    "image_size": (16, 1024),
+    "hidden": (1, 8192),
+    "goal_embedding": (1, 8192),
+    "depth_limit_m": (0.1, 1000.0),
+    "goal_scale_m": (0.1, 1000.0),
+    "end_chance": (1e-6, 0.5),
+    "interact_chance": (1e-6, 0.49),
+    "nie_objects": (1, 64),
+    "environments": (1, 65536),
+    "steps": (1, _MOST),
+    "kl_limit": (0.0, _MOST),
+    "gamma": (0.0, 1.0),
+    "lam": (0.0, 1.0),
+    "auxiliary_share": (0.0, 1.0),
+    "single_room_share": (0.0, 1.0),
+    "critic_rollouts": (0, _MOST),
+    "max_steps": (1, 10_000),
+    "workers": (0, 1024),
+    "threads": (1, 1024),
+    "validation_episodes": (0, _MOST),
+    "window": (1, 10_000),
+}
+"""What values a field may have, by its name; whole numbers else from 1, others from 0."""
+
+
+def bounds_of(config: Any, prefix: str = "") -> dict[str, tuple[float, float, float]]:  # noqa: ANN401
+    """Return value, least and most of every number of a config, by dotted key."""
+    found: dict[str, tuple[float, float, float]] = {}
+    for f in dataclasses.fields(config):
+        value = getattr(config, f.name)
+        if dataclasses.is_dataclass(value):
+            found |= bounds_of(value, f"{prefix}{f.name}.")
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            default = (1, _MOST) if isinstance(value, int) else (0.0, _MOST)
+            found[prefix + f.name] = (value, *_LIMITS.get(f.name, default))
+    return found
+
 
 Intent = Literal["integrated", "policy", "recursive", "none"]
 Preset = Literal["paper", "small"]
@@ -270,3 +316,26 @@ def _paper() -> CampConfig:
 
 
 _PRESETS: Final[dict[str, Callable[[], CampConfig]]] = {"paper": _paper, "small": CampConfig}
+
+
+def config_of(
+    name: str,
+    file: Path | None = None,
+    overrides: Sequence[str] = (),
+    options: Mapping[str, Any] | None = None,
+) -> CampConfig:
+    """Return a checked config: a preset, a TOML file, options by dotted key, `a.b=c`.
+
+    Raises
+    ------
+    UsageError
+        Something in them cannot be meant; the place is named.
+    """
+    config = preset(name)
+    if file is not None:
+        config = values.from_mapping(config, values.read_toml(file), str(file))
+    for key, value in (options or {}).items():
+        config = values.from_mapping(config, values.nested(key, value), "option")
+    for override in overrides:
+        config = values.updated(config, override)
+    return from_mapping(config, {}, "config")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from internav_data.camp.evaluation import Settings, evaluate
-from internav_data.camp.players import AgentPlayer
+from internav_data.camp.policy import AgentPlayer
 from internav_data.dataset import load_dataset
 from internav_data.dataset.select import condition
+from internav_data.evaluation.evaluate import Settings, evaluate
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:

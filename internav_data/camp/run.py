@@ -11,18 +11,16 @@ import torch
 
 from internav_data.camp.agents import agent_names, make_agent
 from internav_data.camp.agents.hierarchy import Hierarchy
-from internav_data.camp.checkpoint import has_checkpoint, read
+from internav_data.camp.checkpoint import Place, has_checkpoint, read
 from internav_data.camp.cloning import forecast_cloning
 from internav_data.camp.config import CampConfig, plain
 from internav_data.camp.data import TrainingData
-from internav_data.camp.logbook import LOG
-from internav_data.camp.packing import Place
-from internav_data.camp.ranks import ranks_of
-from internav_data.camp.settings import device_of
+from internav_data.camp.distributed import device_of, ranks_of
+from internav_data.camp.logging import LOG
 from internav_data.camp.stages import PARTS, check_parts, plan
 from internav_data.camp.train import Trainer
-from internav_data.dataset.files import write_atomically
-from internav_data.generation.toml import config_toml
+from internav_data.core.config import config_toml
+from internav_data.core.files import write_atomically
 from internav_data.records import Purpose, generator
 from internav_data.records.errors import CorruptDataError, UsageError
 

@@ -7,8 +7,8 @@ from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from internav_data.dataset import Dataset
-from internav_data.envs.player import EnvState
-from internav_data.envs.vector import make_vector
+from internav_data.envs.make import make_vector
+from internav_data.envs.slot import EnvState
 from internav_data.records import Episode
 from internav_data.records.errors import CorruptDataError
 
@@ -69,7 +69,7 @@ class MainTask:
         dataset: Dataset[Episode],
         count: int,
         workers: int = 0,
-        **arguments: Any,  # noqa: ANN401 - those of `make_vector`
+        **arguments: Any,  # noqa: ANN401 - those of `InterNavVectorEnv`
     ) -> None:
         self.num_envs = count
         self._env: Any = make_vector(

@@ -11,21 +11,23 @@ import torch
 
 from internav_data.camp import ppo
 from internav_data.camp.agents import Auxiliary, make_agent
-from internav_data.camp.checkpoint import Checkpoint, best_score, save
-from internav_data.camp.cloning import CLONING, clone_expert
-from internav_data.camp.collect import Collector, orders_of, uniforms_of
-from internav_data.camp.logbook import Logbook, Window, rates
-from internav_data.camp.packing import (
+from internav_data.camp.checkpoint import (
+    Checkpoint,
+    best_score,
     packed,
+    save,
     unpack_environments,
     unpack_optimiser,
     unpack_random,
     unpack_starts,
     unpack_state,
 )
+from internav_data.camp.cloning import CLONING, clone_expert
+from internav_data.camp.collect import Collector, orders_of, uniforms_of
+from internav_data.camp.logging import Logbook, Window, rates
 from internav_data.camp.stages import order_seed
 from internav_data.camp.tasks import Timed
-from internav_data.generation.interrupts import InterruptedRunError
+from internav_data.core.interrupts import InterruptedRunError
 from internav_data.records.errors import NotFiniteError, UsageError
 
 if TYPE_CHECKING:
@@ -35,11 +37,11 @@ if TYPE_CHECKING:
     from torch.optim import Optimizer
 
     from internav_data.camp.agents import Agent, State
+    from internav_data.camp.checkpoint import Place
     from internav_data.camp.config import CampConfig
     from internav_data.camp.data import TrainingData
-    from internav_data.camp.logbook import Row
-    from internav_data.camp.packing import Place
-    from internav_data.camp.ranks import Ranks
+    from internav_data.camp.distributed import Ranks
+    from internav_data.camp.logging import Row
     from internav_data.camp.stages import Stage
     from internav_data.camp.tasks import Task
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from internav_data.catalog.designs import DESIGNS
-from internav_data.catalog.dice import Dice
+from internav_data.catalog.sampling import Dice
 from internav_data.catalog.shapes import Sketch
 from internav_data.records import Asset, Purpose, generator
 

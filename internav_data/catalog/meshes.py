@@ -64,7 +64,7 @@ def part_triangles(part: Part) -> tuple[Floats, Ints]:
 
 def asset_mesh(asset: Asset) -> Any:  # noqa: ANN401 - trimesh is imported when used
     """Return an asset as `trimesh.Trimesh`: its parts side by side, each watertight, coloured."""
-    import trimesh  # noqa: PLC0415 - 0.6 s, for those who ask
+    import trimesh  # noqa: PLC0415 - only for users with meshes
 
     vertices, faces, colours = [], [], []
     start = 0

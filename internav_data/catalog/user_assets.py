@@ -116,7 +116,7 @@ def _asset(path: Path, note: MeshNote) -> Asset:
 
 def _laid_flat(pieces: list[Piece]) -> list[Piece]:
     """Turn pieces onto the face of their common hull that they rest on most surely."""
-    import trimesh  # noqa: PLC0415 - as in _read
+    import trimesh  # noqa: PLC0415 - only for users with meshes
 
     hull = trimesh.convex.convex_hull(np.vstack([piece.corners for piece in pieces]))
     volumes = np.array([piece.volume for piece in pieces])
@@ -137,7 +137,7 @@ def _read(path: Path) -> tuple[Floats, NDArray[np.int64], RGB]:
         raise UsageError(
             f"{path}: {size} bytes, expected 1 to {MOST_BYTES}; export fewer triangles"
         )
-    import trimesh  # noqa: PLC0415 - 0.6 s, only for users with meshes
+    import trimesh  # noqa: PLC0415 - only for users with meshes
 
     try:
         # From memory and without a resolver: nothing that the file refers to is opened.

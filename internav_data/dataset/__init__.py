@@ -4,7 +4,6 @@ from internav_data.dataset.commit import Identity, assemble, done_scenes, identi
 from internav_data.dataset.decode import from_table
 from internav_data.dataset.digest import logical_digest
 from internav_data.dataset.encode import to_table
-from internav_data.dataset.interactions import refused_share
 from internav_data.dataset.jsonschemas import (
     schema_folder,
     schema_text,
@@ -21,7 +20,16 @@ from internav_data.dataset.manifest import (
     read_manifest,
     write_manifest,
 )
+from internav_data.dataset.outcome_stats import refused_share
 from internav_data.dataset.parquet import FileInfo, read_table, write_parquet
+from internav_data.dataset.staging import (
+    SceneState,
+    finished_scenes,
+    read_scene_rows,
+    work_dir,
+    write_quarantine,
+    write_scene_work,
+)
 from internav_data.dataset.stats import compute_stats
 from internav_data.dataset.tables import (
     ASSETS,
@@ -30,14 +38,6 @@ from internav_data.dataset.tables import (
     SCENES,
     TABLES,
     TableSpec,
-)
-from internav_data.dataset.work import (
-    SceneState,
-    finished_scenes,
-    read_scene_rows,
-    work_dir,
-    write_quarantine,
-    write_scene_work,
 )
 
 __all__ = [

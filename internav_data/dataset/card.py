@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
-from internav_data.dataset.jsonschemas import descriptions
+from internav_data.core.field_docs import descriptions
 from internav_data.dataset.nodes import Coordinates, Field, Keyed, Leaf, Node, Record
 from internav_data.dataset.tables import EPISODES, SCENES, TableSpec
 

@@ -23,7 +23,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
-from internav_data.dataset.files import link_or_copy, write_atomically
+from internav_data.core.files import link_or_copy, write_atomically
 from internav_data.dataset.manifest import (
     MANIFEST,
     Counts,
@@ -34,10 +34,10 @@ from internav_data.dataset.manifest import (
     read_manifest,
     write_manifest,
 )
+from internav_data.dataset.metadata_files import write_sidecars
 from internav_data.dataset.shards import SPLITS, SceneSource, write_shards
-from internav_data.dataset.sidecars import write_sidecars
+from internav_data.dataset.staging import SceneState, finished_scenes, work_dir
 from internav_data.dataset.tables import FORMAT_VERSION
-from internav_data.dataset.work import SceneState, finished_scenes, work_dir
 from internav_data.records.errors import CorruptDataError, UsageError
 
 if TYPE_CHECKING:

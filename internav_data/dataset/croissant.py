@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from internav_data.dataset.jsonschemas import descriptions
+from internav_data.core.field_docs import descriptions
 from internav_data.dataset.nodes import Coordinates, Keyed, Leaf, Node, Record, Sequence
 from internav_data.dataset.tables import EPISODES, FORMAT_VERSION, SCENES, TableSpec
 

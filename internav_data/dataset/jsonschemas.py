@@ -6,14 +6,13 @@ colours are objects. Descriptions are the docstrings that stand below the datacl
 
 from __future__ import annotations
 
-import ast
 import inspect
 import json
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from internav_data.dataset.files import write_atomically
+from internav_data.core.field_docs import descriptions
+from internav_data.core.files import write_atomically
 from internav_data.dataset.manifest import Manifest
 from internav_data.dataset.nodes import (
     Coordinates,
@@ -120,22 +119,3 @@ def _leaf(node: Leaf, *, bounded: bool) -> dict[str, Any]:
         return {"type": "integer"}
     low, high = _BITS[node.kind]
     return {"type": "integer", "minimum": low, "maximum": high}
-
-
-def descriptions(cls: type[Any]) -> dict[str, str]:
-    """Return the docstrings below a dataclass's fields; none where there is no source."""
-    try:
-        tree = ast.parse(inspect.cleandoc(inspect.getsource(cls)))
-    except (OSError, TypeError):
-        return {}
-    notes = {}
-    body = tree.body[0].body if isinstance(tree.body[0], ast.ClassDef) else []
-    for field, after in pairwise(body):
-        if (
-            isinstance(field, ast.AnnAssign)
-            and isinstance(field.target, ast.Name)
-            and isinstance(after, ast.Expr)
-            and isinstance(after.value, ast.Constant)
-        ):
-            notes[field.target.id] = inspect.cleandoc(str(after.value.value))
-    return notes

@@ -13,8 +13,8 @@ import numpy as np
 from internav_data.dataset.decode import from_table
 from internav_data.dataset.manifest import MANIFEST, Manifest, locate, open_file, read_manifest
 from internav_data.dataset.parquet import read_all
+from internav_data.dataset.row_group_cache import Shelf
 from internav_data.dataset.select import Filters, check_columns, matching_rows, read_columns
-from internav_data.dataset.shelf import Shelf
 from internav_data.dataset.stream import EpisodeStream
 from internav_data.dataset.tables import ASSETS, EPISODES, SCENES
 from internav_data.records import Asset, Episode, House

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
-from internav_data.dataset.files import write_atomically
+from internav_data.core.files import write_atomically
 from internav_data.dataset.parquet import footer_sha256, open_parquet
 from internav_data.dataset.tables import FORMAT_VERSION
 from internav_data.records import Split  # noqa: TC001 - as above

@@ -11,10 +11,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from internav_data.core.files import file_sha256, write_with
 from internav_data.dataset.decode import one_array, schema_difference
 from internav_data.dataset.digest import logical_digest
 from internav_data.dataset.encode import to_table
-from internav_data.dataset.files import file_sha256, write_with
 from internav_data.records.errors import CorruptDataError
 
 if TYPE_CHECKING:

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from internav_data.core.files import link_or_copy
 from internav_data.dataset.encode import to_table
-from internav_data.dataset.files import link_or_copy
 from internav_data.dataset.manifest import DataFile, Manifest, locate
 from internav_data.dataset.parquet import FileInfo, read_table, write_table
+from internav_data.dataset.staging import SceneState, read_scene_rows, work_dir
 from internav_data.dataset.tables import ASSETS, EPISODES, SCENES, TableSpec
-from internav_data.dataset.work import SceneState, read_scene_rows, work_dir
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

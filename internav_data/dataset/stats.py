@@ -1,4 +1,7 @@
-"""What a dataset is like, from its columns alone: the paper's Table 2 and more."""
+"""What a dataset is like, from its columns alone: the paper's Table 2 and more.
+
+Figures about many values: means, spreads, counts.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from internav_data.dataset.figures import Spread, counts, mean, share, spread
-from internav_data.dataset.interactions import (
+from internav_data.dataset.manifest import Manifest, open_file, read_manifest
+from internav_data.dataset.outcome_stats import (
     EXPERT_COLUMNS,
     OUTCOME_COLUMNS,
     ExpertRow,
@@ -19,12 +22,13 @@ from internav_data.dataset.interactions import (
     OutcomeRow,
     expert_row,
 )
-from internav_data.dataset.manifest import Manifest, open_file, read_manifest
 from internav_data.dataset.parquet import read_all
+from internav_data.dataset.summary_statistics import Spread, counts, mean, share, spread
 from internav_data.dataset.tables import EPISODES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
 
 _STEP_M = 0.25  # of the lattice: the distance of Table 2 counts its steps
 _SCALARS = (

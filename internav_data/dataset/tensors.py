@@ -25,7 +25,7 @@ def tensors(table: pa.Table) -> dict[str, Any]:
 
     """
     try:
-        import torch  # type: ignore[import-not-found,unused-ignore] # noqa: PLC0415 - optional
+        import torch  # type: ignore[import-not-found,unused-ignore]  # noqa: PLC0415 - optional
     except ImportError as error:
         raise UsageError("to_torch needs torch: install it with `pip install torch`") from error
     leaves = {f.name: f.node for f in EPISODES.node.fields if isinstance(f.node, Leaf)}

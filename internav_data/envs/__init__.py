@@ -12,9 +12,9 @@ import gymnasium
 
 if TYPE_CHECKING:
     from internav_data.envs.auxiliary import AuxiliaryStart, auxiliary_starts
-    from internav_data.envs.player import EnvState
     from internav_data.envs.processes import InterNavProcesses
     from internav_data.envs.single import InterNavEnv
+    from internav_data.envs.slot import EnvState
     from internav_data.envs.vector import InterNavVectorEnv
 
 __all__ = [
@@ -31,7 +31,7 @@ ENV_ID = "InterNav-v0"
 
 _HOMES = {
     "AuxiliaryStart": "auxiliary",
-    "EnvState": "player",
+    "EnvState": "slot",
     "InterNavEnv": "single",
     "InterNavProcesses": "processes",
     "InterNavVectorEnv": "vector",
@@ -45,7 +45,7 @@ def register() -> None:
         gymnasium.register(
             id=ENV_ID,
             entry_point="internav_data.envs.single:InterNavEnv",
-            vector_entry_point="internav_data.envs.vector:make_vector",
+            vector_entry_point="internav_data.envs.make:make_vector",
         )
 
 
@@ -56,6 +56,6 @@ def __getattr__(name: str) -> object:
     """Import what is asked for: registering needs none of it."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module  # noqa: PLC0415 - as all the rest
+    from importlib import import_module  # noqa: PLC0415
 
     return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

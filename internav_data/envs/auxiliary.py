@@ -12,7 +12,7 @@ import numpy as np
 
 from internav_data.navigation import SPACING_M
 from internav_data.world import Stage, World
-from internav_data.world.sight import REACH_M
+from internav_data.world.visibility import REACH_M
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

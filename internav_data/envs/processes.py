@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from gymnasium.vector import VectorEnv
 
-from internav_data.envs.player import EnvState, check_options
+from internav_data.envs.slot import EnvState, check_options
 from internav_data.envs.spaces import layout
 from internav_data.envs.vector import OPTIONS, InterNavVectorEnv, choices, seeds_of, set_spaces
 from internav_data.records.errors import InternavError, UsageError
@@ -111,7 +111,7 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
         copy: bool = True,
         ids: bool = False,
         context: str = "spawn",
-        **arguments: Any,  # noqa: ANN401 - Arguments, checked where they are used
+        **arguments: Any,  # noqa: ANN401 - those of `InterNavVectorEnv`
     ) -> None:
         if not 1 <= workers <= num_envs:
             raise UsageError(f"workers: expected 1 … {num_envs} (num_envs), got {workers}")

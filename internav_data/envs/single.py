@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any, Unpack
 import gymnasium
 import numpy as np
 
-from internav_data.envs.play import WAIT
-from internav_data.envs.player import Arguments, EnvState, Player, check_options, step_info
+from internav_data.envs.episode import WAIT
+from internav_data.envs.slot import Arguments, EnvState, Player, check_options, step_info
 from internav_data.envs.spaces import Board, observation_space
 from internav_data.records.errors import UsageError
+from internav_data.render.camera import Camera
 from internav_data.world import ACTION_COUNT
-from internav_data.world.camera import Camera
 
 if TYPE_CHECKING:
     from pathlib import Path

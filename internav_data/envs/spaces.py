@@ -8,21 +8,21 @@ import numpy as np
 from gymnasium import spaces
 
 from internav_data.records.errors import UsageError
+from internav_data.render.camera import Frames
 from internav_data.world.actions import HORIZONS_DEG
-from internav_data.world.camera import Frames
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from internav_data.envs.play import Play
-    from internav_data.world.camera import Camera
+    from internav_data.envs.episode import Play
+    from internav_data.render.camera import Camera
 
 FAR_M: Final = 1000.0
 """Bound of distances and depths; no house is larger (the camera says 100 where nothing is)."""
 
 
 IDS: Final = (-5, 2**31 - 1)
-"""Least and most of instance ids: see `internav_data.world.camera`."""
+"""Least and most of instance ids: see `internav_data.render.camera`."""
 
 
 def observation_space(size: int, *, ids: bool = False) -> spaces.Dict:

@@ -8,11 +8,11 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from internav_data.envs.player import Arguments, EnvState, Player, check_options, step_info
+from internav_data.envs.slot import Arguments, EnvState, Player, check_options, step_info
 from internav_data.envs.spaces import Board, observation_space
 from internav_data.records.errors import UsageError
+from internav_data.render.camera import Camera
 from internav_data.world import ACTION_COUNT
-from internav_data.world.camera import Camera
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,20 +28,6 @@ if TYPE_CHECKING:
     Stepped = tuple[Observations, NDArray[np.float64], Bools, Bools, dict[str, Any]]
 
 OPTIONS = ("episode_id", "actions", "start", "reset_mask")
-
-
-def make_vector(
-    num_envs: int,
-    dataset: str | Path | Dataset[Episode],
-    workers: int = 0,
-    **arguments: Any,  # noqa: ANN401 - those of the environments below
-) -> VectorEnv[Any, Any, Any]:
-    """Step environments in this process, or (workers > 0) in so many others."""
-    if workers:
-        from internav_data.envs.processes import InterNavProcesses  # noqa: PLC0415 - when asked for
-
-        return InterNavProcesses(num_envs, dataset, workers, **arguments)
-    return InterNavVectorEnv(num_envs, dataset, **arguments)
 
 
 def set_spaces(

@@ -21,6 +21,6 @@ def __getattr__(name: str) -> object:
     """Import what is asked for: a config alone needs neither numba nor Bullet."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module  # noqa: PLC0415 - as all the rest
+    from importlib import import_module  # noqa: PLC0415
 
     return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

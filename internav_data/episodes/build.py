@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from internav_data.episodes.config import EpisodeConfig
-from internav_data.episodes.expert import solve
 from internav_data.episodes.outcomes import outcomes_of
 from internav_data.episodes.site import Site
 from internav_data.episodes.spawn import Way, spawn
 from internav_data.geometry import round_m
 from internav_data.navigation import SPACING_M, node_paths
+from internav_data.physics import engine_of_this_process
+from internav_data.planner.search import solve
 from internav_data.records import (
     Episode,
     Goal,
@@ -29,7 +30,7 @@ from internav_data.records import (
     generator,
 )
 from internav_data.records.errors import QuarantineError
-from internav_data.world import World, engine_of_this_process
+from internav_data.world import World
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

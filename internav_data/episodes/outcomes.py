@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from internav_data.navigation import keeps_clear
 from internav_data.records import Outcome
-from internav_data.world.steps import carries
+from internav_data.world.world import carries
 
 if TYPE_CHECKING:
     import numpy as np

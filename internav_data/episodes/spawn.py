@@ -19,8 +19,8 @@ from internav_data.geometry import (
     yaw_quaternion,
 )
 from internav_data.navigation import room_of
+from internav_data.physics import Body, settle, wall_body
 from internav_data.records import Pose
-from internav_data.world import Body, settle, wall_body
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from internav_data.episodes.config import EpisodeConfig
     from internav_data.episodes.site import Site
     from internav_data.navigation import Lattice
+    from internav_data.physics import Settled
     from internav_data.records import Asset, Mode, NodePath, Vec2
-    from internav_data.world import Settled
 
 YAW_STEP_DEG = 15
 NEAR_M = 0.5

@@ -36,6 +36,6 @@ def __getattr__(name: str) -> object:
     """Import what is asked for: worker processes and `--help` need little of it."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module  # noqa: PLC0415 - as all the rest
+    from importlib import import_module  # noqa: PLC0415
 
     return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

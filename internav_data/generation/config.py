@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from internav_data.core.config import from_mapping, nested, plain, read_toml, updated
 from internav_data.episodes.config import EpisodeConfig
-from internav_data.generation.values import from_mapping, nested, plain, read_toml, updated
 from internav_data.houses.config import HouseConfig
 from internav_data.houses.plan_file import load_floor_plan
 from internav_data.records.errors import UsageError

@@ -10,11 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from internav_data.generation.progress import Progress, clock
+from internav_data.core.progress import clock
+from internav_data.generation.progress import Progress
 from internav_data.generation.run import check_counts, cores
 from internav_data.generation.scenes import asset_folders, build_scene
-from internav_data.houses.splits import split_of_scene
 from internav_data.records.errors import QuarantineError
+from internav_data.records.splits import split_of_scene
 
 if TYPE_CHECKING:
     from internav_data.catalog import Catalogue
@@ -102,7 +103,7 @@ def forecast(
 
 
 def _sample(config: GenerationConfig, scenes: range) -> _Sample:
-    from internav_data.catalog import catalogue  # noqa: PLC0415 - imported when used
+    from internav_data.catalog import catalogue  # noqa: PLC0415
 
     known = catalogue(asset_folders(config))
     sample = _Sample([], [], 0.0, 0.0, 0)

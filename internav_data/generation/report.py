@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
+from internav_data.core.progress import clock
 from internav_data.dataset import refused_share
-from internav_data.generation.progress import clock
 from internav_data.records.errors import QuarantineError
 
 if TYPE_CHECKING:

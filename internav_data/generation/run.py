@@ -14,7 +14,8 @@ import shutil
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from internav_data import __version__
+from internav_data.core.interrupts import InterruptedRunError, Interrupts
+from internav_data.core.lock import locked
 from internav_data.dataset import (
     Identity,
     assemble,
@@ -26,9 +27,6 @@ from internav_data.dataset import (
     work_dir,
     write_quarantine,
 )
-from internav_data.generation.crew import Crew, Recipe
-from internav_data.generation.interrupts import InterruptedRunError, Interrupts
-from internav_data.generation.lock import locked
 from internav_data.generation.messages import Done
 from internav_data.generation.progress import Progress
 from internav_data.generation.report import Report, report_of
@@ -37,10 +35,12 @@ from internav_data.generation.scenes import (
     asset_folders,
     scene_maker,
 )
+from internav_data.generation.worker_pool import Crew, Recipe
 from internav_data.houses.quota import room_count
-from internav_data.houses.splits import split_of_scene
 from internav_data.records import Pose
 from internav_data.records.errors import InternavError, QuarantineError, UsageError
+from internav_data.records.splits import split_of_scene
+from internav_data.records.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -128,7 +128,7 @@ def generate(
 
 
 def _catalogue(config: GenerationConfig) -> Catalogue:
-    from internav_data.catalog import catalogue  # noqa: PLC0415 - imported when needed
+    from internav_data.catalog import catalogue  # noqa: PLC0415
 
     assets = catalogue(asset_folders(config))
     if config.assets:
@@ -139,8 +139,8 @@ def _catalogue(config: GenerationConfig) -> Catalogue:
 
 def check_standing(assets: Iterable[Asset]) -> None:
     """Raise UsageError for meshes that do not stay where they are put: none would be spawned."""
-    from internav_data.world import settle  # noqa: PLC0415 - pybullet, for users with meshes
-    from internav_data.world.setting import UPRIGHT  # noqa: PLC0415 - as above
+    from internav_data.physics import settle  # noqa: PLC0415 - pybullet, for users with meshes
+    from internav_data.physics.scene import UPRIGHT  # noqa: PLC0415 - as above
 
     origin = Pose(0.0, 0.0, 0.0, UPRIGHT)
     rests = ((asset.asset_id, settle(asset, origin, math.inf, tuple).refusal) for asset in assets)

@@ -81,7 +81,7 @@ def obstacle_pool(catalogue: Catalogue, config: GenerationConfig, split: Split) 
 
 def scene_maker(payload: ScenePayload) -> Callable[[int], int]:
     """Set a worker up: return what makes and stores a scene and says how many episodes it has."""
-    from internav_data.dataset.work import write_scene_work  # noqa: PLC0415 - workers only
+    from internav_data.dataset.staging import write_scene_work  # noqa: PLC0415 - workers only
 
     config, assets, work = payload.config, payload.assets, Path(payload.work)
     gc.freeze()  # the catalogue stays: no collection need look at it again

@@ -39,7 +39,7 @@ def generate_house(seed: int = 0, scene: int = 0, config: GenerationConfig | Non
     'scene-000003'
 
     """
-    from internav_data.catalog import catalogue  # noqa: PLC0415 - imported when used
+    from internav_data.catalog import catalogue  # noqa: PLC0415
     from internav_data.houses import build_house  # noqa: PLC0415 - as above
 
     config = config or GenerationConfig()
@@ -78,7 +78,7 @@ def generate_episodes(
     [0, 1, 2, 3, 4]
 
     """
-    from internav_data.catalog import catalogue  # noqa: PLC0415 - imported when used
+    from internav_data.catalog import catalogue  # noqa: PLC0415
     from internav_data.episodes import build_episodes  # noqa: PLC0415 - as above
 
     config = config or GenerationConfig()

@@ -44,7 +44,7 @@ def _serve(pipe: Connection[Any, Any]) -> None:
     except InternavError as error:
         pipe.send(Fatal(type(error).__name__, str(error)))
         return
-    except Exception as error:  # noqa: BLE001 - told to the parent, which raises it
+    except Exception as error:  # noqa: BLE001 - whatever it is, the other side has to hear of it
         pipe.send(Fatal("InternavError", f"a worker could not be set up: {_told(error)}"))
         return
     pipe.send(Ready(time.perf_counter() - began))
@@ -68,7 +68,7 @@ def _answer(work: Callable[[Any], Any], task: Any) -> Done | Failed | Fatal:  # 
         )
     except MemoryError:
         os._exit(1)  # a new process may have more luck: the parent tries again
-    except Exception as error:  # noqa: BLE001 - a bug in one scene must not end the run
+    except Exception as error:  # noqa: BLE001 - whatever it is, the other side has to hear of it
         return Failed(task, _told(error), 1)
 
 

@@ -79,7 +79,7 @@ def asset_bounds(asset: Asset) -> tuple[NDArray[np.float64], NDArray[np.float64]
 
 def _hull_mass(points: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
     """Volume and centroid of the hull of some points (n, 3)."""
-    from scipy.spatial import ConvexHull  # noqa: PLC0415 - only hulls of users' meshes need it
+    from scipy.spatial import ConvexHull  # noqa: PLC0415 - imported when used
 
     hull = ConvexHull(points)
     middle = points.mean(axis=0)

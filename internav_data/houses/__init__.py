@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from internav_data.houses.config import HouseConfig
 from internav_data.houses.quota import room_count
-from internav_data.houses.splits import split_of_scene
+from internav_data.records.splits import split_of_scene
 
 if TYPE_CHECKING:
     from internav_data.houses.build import build_house
@@ -21,6 +21,6 @@ def __getattr__(name: str) -> object:
     """Import what is asked for: a config alone needs no numba."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module  # noqa: PLC0415 - as all the rest
+    from importlib import import_module  # noqa: PLC0415
 
     return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

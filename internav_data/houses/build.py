@@ -11,10 +11,10 @@ from internav_data.houses.materials import draw_materials
 from internav_data.houses.openings import draw_doors, draw_windows
 from internav_data.houses.plan_file import load_floor_plan
 from internav_data.houses.programme import programme
-from internav_data.houses.splits import split_of_scene
 from internav_data.houses.standards import CEILING_CM
 from internav_data.houses.walls import build_walls
 from internav_data.records import Door, House, Purpose, Room, Window, generator
+from internav_data.records.splits import split_of_scene
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -267,6 +267,6 @@ def draw_layout(specs: Sequence[RoomSpec], rng: Generator, wings: float = 0.0) -
     has_hall = any(spec.type == "hall" for spec in specs)
     few = 3
     layout = spine(specs, rng, wings) if has_hall and len(specs) >= few else sliced(specs, rng)
-    if float(rng.random()) < 0.35:  # noqa: PLR2004 - a third of the outlines are notched
+    if float(rng.random()) < 0.35:  # noqa: PLR2004 - other orders now and then
         notch(layout, specs, rng)
     return mirrored(layout, rng)

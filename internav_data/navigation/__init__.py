@@ -1,9 +1,9 @@
 """Where the agent can stand, and how far it is: lattice, any-angle ways, room and node paths."""
 
-from internav_data.navigation.agent import CLEARANCE_M, RADIUS_M, SPACING_M, TOLERANCE_M
 from internav_data.navigation.lattice import Lattice
 from internav_data.navigation.rooms import PATHS_AT_MOST, node_paths, room_of, room_paths, rooms_of
-from internav_data.navigation.wayfinder import WayFinder, keeps_clear
+from internav_data.navigation.tangent_graph.shortest_path import WayFinder, keeps_clear
+from internav_data.records.agent import CLEARANCE_M, RADIUS_M, SPACING_M, TOLERANCE_M
 
 __all__ = [
     "CLEARANCE_M",

@@ -9,7 +9,7 @@ import numpy as np
 
 from internav_data.geometry import Polygons, house_footprints
 from internav_data.navigation import grid
-from internav_data.navigation.agent import CLEARANCE_M, SPACING_M
+from internav_data.records.agent import CLEARANCE_M, SPACING_M
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:

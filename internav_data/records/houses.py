@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from internav_data.records.assets import RGB, Asset
 from internav_data.records.poses import Pose, Vec2
-
-if TYPE_CHECKING:
-    from internav_data.navigation import Lattice
 
 Split = Literal["train", "val", "test"]
 DoorKind = Literal["opening", "doorway", "single", "wide", "double", "entrance"]
@@ -135,9 +132,3 @@ class House:
     area_m2: float
     assets: Mapping[str, Asset] = field(compare=False, repr=False)
     """The assets of `things` (at least), by asset_id. Not part of the scene row."""
-
-    def lattice(self) -> Lattice:
-        """Where the agent can stand in this house: a fresh lattice that the caller may change."""
-        from internav_data.navigation import Lattice  # noqa: PLC0415 - numba is imported when used
-
-        return Lattice.of(self)

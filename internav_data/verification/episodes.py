@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from shapely import Point, Polygon
 
-from internav_data.verification.ground import SPACING_M
+from internav_data.verification.checked_lattice import SPACING_M
 from internav_data.verification.lengths import Between
 from internav_data.verification.obstacles import check_obstacles
 
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from shapely import Geometry
 
     from internav_data.records import Episode, Goal, Start
+    from internav_data.verification.checked_layout import Site
     from internav_data.verification.findings import Collector
-    from internav_data.verification.site import Site
 
 LEAST_CLEAR_M = 2.0
 ROUNDED_M = 1e-4

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from internav_data.verification.ground import KEEP_M
+from internav_data.verification.checked_lattice import KEEP_M
 from internav_data.verification.ways import FINE, FINEST, Sight, ellipse, grown, joined
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from shapely import Geometry
 
-    from internav_data.verification.site import Site
+    from internav_data.verification.checked_layout import Site
 
 AGREE = 0.0005
 """Any-angle distances agree with the visibility graph within this share …"""

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from shapely import Geometry
 
     from internav_data.records import Episode, Obstacle
+    from internav_data.verification.checked_layout import Site
     from internav_data.verification.findings import Collector
-    from internav_data.verification.site import Site
 
 MAX_SETTLE_S = 1.0
 MAX_PENETRATION_M = 0.002

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from internav_data.verification.checked_layout import Site
 from internav_data.verification.episodes import check_episode
 from internav_data.verification.findings import Collector
 from internav_data.verification.houses import check_doors, check_rooms, check_walls
-from internav_data.verification.site import Site
 from internav_data.verification.things import check_things, check_ways_through
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ def _check_house(house: House, shapes: Shapes, report: Collector) -> Site | None
 
 def _replay(site: Site, episodes: Sequence[Episode], settings: Settings, report: Collector) -> None:
     """Play episodes again. The engine is imported here: geometry does without."""
-    from internav_data.verification.physics import Theatre, replay_episode  # noqa: PLC0415
+    from internav_data.verification.replay import Theatre, replay_episode  # noqa: PLC0415
 
     theatre = Theatre(site, settings)
     for episode in episodes:

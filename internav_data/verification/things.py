@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from shapely import Geometry
 
     from internav_data.records import Door, House, Thing
+    from internav_data.verification.checked_lattice import Ground
     from internav_data.verification.findings import Collector
-    from internav_data.verification.ground import Ground
     from internav_data.verification.shapes import Shapes
 
 DOOR_CLEAR_M = 0.65

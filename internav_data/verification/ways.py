@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from internav_data.verification.ground import KEEP_M
+from internav_data.verification.checked_lattice import KEEP_M
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

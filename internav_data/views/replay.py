@@ -1,4 +1,7 @@
-"""Replays: the agent's camera beside the map, what it does in words, as frames of a film."""
+"""Replays: the agent's camera beside the map, what it does in words, as frames of a film.
+
+A story cut into shots: what each picture of a replay shows, and for how many frames.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +11,8 @@ from typing import TYPE_CHECKING, Final, Self
 import numpy as np
 
 from internav_data.records.errors import UsageError
-from internav_data.views.replay_eye import EyePainter
-from internav_data.views.replay_map import MapPainter
-from internav_data.views.replay_shots import shots
-from internav_data.views.replay_story import Moment, played
-from internav_data.views.replay_strips import Footer, Header, title_card
+from internav_data.views.replay_panels import EyePainter, Footer, Header, MapPainter, title_card
+from internav_data.views.replay_story import Moment, Shot, Story, played, shots
 from internav_data.world import Stage
 
 if TYPE_CHECKING:
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from internav_data.physics import PushModel
     from internav_data.records import RGB, Asset, Episode, House
-    from internav_data.views.replay_shots import Shot
-    from internav_data.views.replay_story import Story
-    from internav_data.world import PushModel
 
     Image = NDArray[np.uint8]
-    Panel = Callable[[Moment], Image]
+
+    Panel = Callable[["Moment"], Image]
+
 
 SIZE: Final = 480
 """Pixels a side of the camera's picture."""

@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from internav_data.physics import PushModel
     from internav_data.records import RGB, Asset, Episode, House, Pose, Vec2
     from internav_data.views.canvas import Canvas
     from internav_data.views.replay_story import Story
-    from internav_data.world import PushModel
 
     Floats = NDArray[np.float64]
     Image = NDArray[np.uint8]

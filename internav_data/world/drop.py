@@ -16,23 +16,23 @@ from internav_data.geometry import (
     round_m,
     round_quaternion,
 )
+from internav_data.geometry.headings import TURNS, turned
 from internav_data.geometry.planar import segment_polygon_distance
 from internav_data.navigation import CLEARANCE_M, RADIUS_M
+from internav_data.physics.kdop import square_round
+from internav_data.physics.settle import settle
 from internav_data.records import Pose
-from internav_data.world.frames import TURNS, turned
-from internav_data.world.octagons import square_round
-from internav_data.world.settle import settle
-from internav_data.world.sight import axis_distance
+from internav_data.world.visibility import axis_distance
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
+    from internav_data.physics.kdop import Octagon
+    from internav_data.physics.scene import Body
+    from internav_data.physics.settle import Settled
     from internav_data.records import Asset, Vec2
-    from internav_data.world.octagons import Octagon
-    from internav_data.world.setting import Body
-    from internav_data.world.settle import Settled
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]

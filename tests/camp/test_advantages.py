@@ -5,7 +5,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from internav_data.camp.gae import advantages_of  # noqa: E402
+from internav_data.camp.rollout import advantages_of  # noqa: E402
 
 
 def _one(rewards, values, last, terminated, truncated, final, gamma=0.99, lam=0.95):

@@ -8,7 +8,7 @@ torch = pytest.importorskip("torch")
 from internav_data.camp.agents.options import NAVIGATE, PICK, PUSH  # noqa: E402
 from internav_data.camp.auxiliary_tasks import AuxiliaryTasks  # noqa: E402
 from internav_data.dataset import load_dataset  # noqa: E402
-from internav_data.envs.rewards import STEP, SUCCESS, interaction_reward  # noqa: E402
+from internav_data.envs.tasks import STEP, SUCCESS, interaction_reward  # noqa: E402
 from internav_data.records.errors import CorruptDataError, UsageError  # noqa: E402
 
 AHEAD, PUSH_AHEAD, PICKUP, DONE = 0, 5, 9, 11

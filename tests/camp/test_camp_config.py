@@ -6,7 +6,7 @@ import json
 import pytest
 
 from internav_data.camp.config import CampConfig, from_mapping, plain, preset
-from internav_data.dataset.jsonschemas import descriptions
+from internav_data.core.field_docs import descriptions
 from internav_data.records.errors import UsageError
 
 

@@ -18,7 +18,7 @@ from internav_data.camp.agents.options import (  # noqa: E402
     WAIT,
     follow,
 )
-from internav_data.camp.imitation import Demonstrations, clone  # noqa: E402
+from internav_data.camp.cloning import Demonstrations, clone  # noqa: E402
 
 AHEAD, LEFT, RIGHT, DOWN, PUSHED, UP, DROP = 0, 1, 2, 3, 5, 9, 10
 N, P, I, S = NAVIGATE, PUSH, PICK, STOP
@@ -206,7 +206,7 @@ def test_hidden_states_go_on_between_updates(experts, config):
 
 
 def test_the_datasets_experts_reach_their_goals_hand_backs_and_all(houses, config):
-    from internav_data.camp.imitation import experts_of
+    from internav_data.camp.cloning import experts_of
     from internav_data.dataset import load_dataset
     from internav_data.envs.vector import InterNavVectorEnv
 
@@ -236,7 +236,7 @@ def test_the_datasets_experts_reach_their_goals_hand_backs_and_all(houses, confi
 
 
 def test_an_episode_without_expert_is_refused(houses, config, monkeypatch):
-    from internav_data.camp.imitation import experts_of
+    from internav_data.camp.cloning import experts_of
     from internav_data.dataset import load_dataset
     from internav_data.envs.source import Source
     from internav_data.records.errors import UsageError

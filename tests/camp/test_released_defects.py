@@ -75,7 +75,7 @@ def test_defect_3_cut_off_from_the_goal_is_a_failure_that_counts(fake, config):
 
 def test_defect_4_a_move_counts_once():
     """Pushes and looks after a move add nothing to the path."""
-    from internav_data.envs.metrics import Tally, metrics
+    from internav_data.envs.tasks import Tally, metrics
 
     tally = Tally(moves=4)
     tally.tried["push"] = tally.done["push"] = 7

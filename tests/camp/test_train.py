@@ -14,11 +14,14 @@ from safetensors.torch import load_file  # noqa: E402
 from internav_data.camp import data as data_module  # noqa: E402
 from internav_data.camp import train as train_module  # noqa: E402
 from internav_data.camp.checkpoint import find, load_agent  # noqa: E402
-from internav_data.camp.config import from_mapping, preset  # noqa: E402
+from internav_data.camp.config import (  # noqa: E402
+    config_of,
+    from_mapping,
+    preset,
+)
 from internav_data.camp.data import TrainingData  # noqa: E402
 from internav_data.camp.run import Request, begin, forecast, resume  # noqa: E402
-from internav_data.camp.settings import config_of  # noqa: E402
-from internav_data.generation.interrupts import InterruptedRunError  # noqa: E402
+from internav_data.core.interrupts import InterruptedRunError  # noqa: E402
 from internav_data.records.errors import (  # noqa: E402
     CorruptDataError,
     NotFiniteError,

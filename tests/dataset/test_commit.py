@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 import strategies
 
+from internav_data.core import files
 from internav_data.dataset import (
     Identity,
     assemble,
     commit,
     done_scenes,
-    files,
     finished_scenes,
     has_manifest,
     load_dataset,
@@ -27,7 +27,7 @@ from internav_data.dataset import (
     write_quarantine,
     write_scene_work,
 )
-from internav_data.dataset.work import scene_file
+from internav_data.dataset.staging import scene_file
 from internav_data.records import Asset, Episode, House
 from internav_data.records.errors import CorruptDataError, UsageError
 

@@ -179,7 +179,7 @@ def test_row_groups_end_where_scenes_end(dataset_folder):
 
 
 def test_memory_held_is_bounded(ds, monkeypatch):
-    from internav_data.dataset import shelf
+    from internav_data.dataset import row_group_cache as shelf
 
     some = load_dataset(ds.path)
     monkeypatch.setattr(shelf, "_CACHED_BYTES", 1)

@@ -8,8 +8,8 @@ from collections import Counter
 
 import pytest
 
+from internav_data.core.field_docs import descriptions
 from internav_data.dataset import compute_stats, load_dataset, read_manifest
-from internav_data.dataset.jsonschemas import descriptions
 from internav_data.dataset.nodes import Record, Sequence
 from internav_data.dataset.tables import TABLES
 

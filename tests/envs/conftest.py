@@ -6,8 +6,8 @@ from types import MappingProxyType
 
 import pytest
 
-from internav_data.envs.places import Place
-from internav_data.envs.play import Play, Rules
+from internav_data.envs.episode import Play, Rules
+from internav_data.envs.source import Place
 from internav_data.generation import generate, load_config
 from internav_data.records import (
     Asset,

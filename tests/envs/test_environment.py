@@ -12,8 +12,7 @@ import internav_data.envs
 from internav_data.dataset import load_dataset
 from internav_data.envs import EnvState, InterNavVectorEnv
 from internav_data.envs.order import EpisodeOrder
-from internav_data.envs.places import FIELDS_KEPT, Places
-from internav_data.envs.source import open_source
+from internav_data.envs.source import FIELDS_KEPT, Places, open_source
 from internav_data.generation import generate, load_config
 from internav_data.navigation import WayFinder
 from internav_data.records.errors import CorruptDataError, UsageError

@@ -2,7 +2,7 @@
 
 import pytest
 
-from internav_data.envs.rewards import interaction_reward
+from internav_data.envs.tasks import interaction_reward
 from internav_data.records.errors import UsageError
 
 AHEAD, LEFT, PICK, DROP, DONE, WAIT = 0, 1, 9, 10, 11, -1

@@ -11,24 +11,17 @@ import shapely
 
 from internav_data.catalog import catalogue
 from internav_data.episodes import EpisodeConfig, build_batch, build_episodes, mode_of
-from internav_data.episodes.expert import replay
 from internav_data.episodes.outcomes import outcomes_of
 from internav_data.episodes.spawn import NEAR_M
 from internav_data.geometry import asset_corners, footprint, house_footprints, transform
 from internav_data.houses import HouseConfig, build_house
+from internav_data.physics import Body, Setting, engine_of_this_process, wall_body
+from internav_data.physics.result_cache import Solutions
+from internav_data.physics.scene import UPRIGHT
+from internav_data.planner.search import replay
 from internav_data.records import Pose
 from internav_data.records.errors import QuarantineError, UsageError
-from internav_data.world import (
-    Action,
-    Body,
-    Setting,
-    Stage,
-    World,
-    engine_of_this_process,
-    wall_body,
-)
-from internav_data.world.setting import UPRIGHT
-from internav_data.world.solutions import Solutions
+from internav_data.world import Action, Stage, World
 
 SCENES = (0, 1, 6)
 
@@ -52,7 +45,7 @@ def test_what_is_kept_on_disk_changes_nothing(houses, pool, episodes, tmp_path, 
     counts = []
     for _ in range(2):
         held = Solutions(tmp_path)
-        monkeypatch.setattr("internav_data.world.engine.solutions", lambda held=held: held)
+        monkeypatch.setattr("internav_data.physics.registry.solutions", lambda held=held: held)
         assert build_episodes(houses[6], 6, pool) == episodes[6]
         counts.append(held.count())
     assert counts[0] == counts[1] > 50  # the second time nothing was solved

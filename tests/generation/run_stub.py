@@ -7,8 +7,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from scene_stubs import CATALOGUE, stub
 
+from internav_data.core.interrupts import InterruptedRunError
 from internav_data.generation.config import load_config
-from internav_data.generation.interrupts import InterruptedRunError
 from internav_data.generation.run import generate
 
 out, scenes, workers = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])

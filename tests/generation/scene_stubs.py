@@ -10,9 +10,9 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from internav_data.dataset import write_scene_work
-from internav_data.houses.splits import split_of_scene
 from internav_data.records import Asset, Episode, Goal, House, Obstacle, Part, Physics, Room, Start
 from internav_data.records.errors import QuarantineError
+from internav_data.records.splits import split_of_scene
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 SQUARE = ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0))

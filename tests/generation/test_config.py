@@ -2,8 +2,8 @@ import dataclasses
 
 import pytest
 
+from internav_data.core.config import known_keys
 from internav_data.generation.config import GenerationConfig, identity_digest, load_config
-from internav_data.generation.values import known_keys
 from internav_data.records.errors import UsageError
 
 

@@ -4,8 +4,8 @@ import time
 import crew_stubs
 import pytest
 
-from internav_data.generation.crew import CannotStartError, Crew, Recipe
 from internav_data.generation.messages import Done, Failed
+from internav_data.generation.worker_pool import CannotStartError, Crew, Recipe
 from internav_data.records.errors import InternavError, UsageError
 
 

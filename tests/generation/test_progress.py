@@ -1,6 +1,7 @@
 import io
 
-from internav_data.generation.progress import Progress, clock
+from internav_data.core.progress import clock
+from internav_data.generation.progress import Progress
 
 
 class Terminal(io.StringIO):

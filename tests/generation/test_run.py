@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from scene_stubs import CATALOGUE, stub
 
+from internav_data.core.lock import LockedError, locked
 from internav_data.dataset import read_manifest
 from internav_data.generation.config import GenerationConfig, load_config
-from internav_data.generation.lock import LockedError, locked
 from internav_data.generation.run import generate
 from internav_data.records.errors import InternavError, QuarantineError, UsageError
 

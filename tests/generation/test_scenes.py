@@ -11,7 +11,7 @@ import scene_stubs
 from internav_data.catalog import catalogue, split_of_asset
 from internav_data.dataset import write_scene_work
 from internav_data.generation import generate, generate_episodes, generate_house, load_config
-from internav_data.generation.again import scene_again
+from internav_data.generation.reproduce import scene_again
 from internav_data.generation.run import identity_for
 from internav_data.generation.scenes import ATTEMPTS, build_scene, obstacle_pool
 from internav_data.records.errors import QuarantineError, UsageError, ValidationError
@@ -96,7 +96,7 @@ def test_a_scene_again_is_compared(dataset, tmp_path):
 
 
 def test_a_dataset_that_holds_something_else_is_told(dataset, monkeypatch):
-    import internav_data.generation.again as module
+    import internav_data.generation.reproduce as module
 
     true = module.made_again(CONFIG, 2, 1)
     moved = dataclasses.replace(true.episodes[1], clear_m=99.0)

@@ -9,6 +9,7 @@ import sys
 import pytest
 
 from internav_data.houses import HouseConfig, build_house, load_floor_plan
+from internav_data.navigation import Lattice
 from internav_data.records import OUTSIDE
 from internav_data.records.errors import UsageError
 
@@ -44,7 +45,7 @@ def test_the_lattice_agrees_that_one_component_holds_every_room(sample):
     from internav_data.navigation import room_of
 
     for house in sample["paper"]:
-        lattice = house.lattice()
+        lattice = Lattice.of(house)
         components = lattice.components()
         main = max(range(components.max() + 1), key=lambda c: (components == c).sum())
         rooms = {

@@ -14,9 +14,18 @@ from navigation_scenes import convex, rectangle, ring
 
 from internav_data.geometry import Polygons
 from internav_data.navigation import WayFinder
-from internav_data.navigation.arcs import HALF, MID_X, MID_Y, X, Y
-from internav_data.navigation.links import closest
-from internav_data.navigation.shadows import ALL, NONE, SOME, shadow
+from internav_data.navigation.tangent_graph.arcs import (
+    ALL,
+    HALF,
+    MID_X,
+    MID_Y,
+    NONE,
+    SOME,
+    X,
+    Y,
+    shadow,
+)
+from internav_data.navigation.tangent_graph.disconnection import closest
 
 TURNS = np.radians(np.arange(720) / 2 + 0.123)
 HAIR = 1e-7

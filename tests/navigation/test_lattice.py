@@ -67,7 +67,7 @@ def test_a_furnished_house_is_that_of_shapely_and_networkx():
 
 def test_of_a_house_sees_its_walls_and_furniture_but_not_its_lintels():
     house = two_rooms(things=[(1.5, 3.5, 30.0)])
-    lattice = house.lattice()
+    lattice = Lattice.of(house)
     assert lattice.shape == (25, 17)
     walls = [rectangle(w.x_min, w.y_min, w.x_max, w.y_max) for w in house.walls if w.z_min < 1.8]
     polygons = [*walls, turned(1.5, 3.5, 1.2, 0.8, 30.0)]

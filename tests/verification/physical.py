@@ -7,10 +7,11 @@ from dataclasses import replace
 import scenery
 from scenery import ASSETS, Grid, obstacle, small_scenes, thing
 
-from internav_data.episodes.expert import expert_of_episode
 from internav_data.episodes.outcomes import outcomes_of
+from internav_data.physics import engine_of_this_process, settle
+from internav_data.planner.search import expert_of_episode
 from internav_data.records import Pose
-from internav_data.world import Stage, World, engine_of_this_process, settle
+from internav_data.world import Stage, World
 
 
 def settled(one):

@@ -11,21 +11,21 @@ import pytest
 import scenery
 from scenery import ASSETS, Grid, brute_steps, thing, write_dataset
 
-import internav_data.world.steps
+import internav_data.world.world
 from internav_data.navigation import Lattice
+from internav_data.physics.result_cache import Solutions
 from internav_data.records import Pose
 from internav_data.records.errors import CorruptDataError
 from internav_data.verification import validate
+from internav_data.verification.checked_layout import Site
 from internav_data.verification.interactions import check_interactions
 from internav_data.verification.lengths import Between
-from internav_data.verification.physics import Theatre
-from internav_data.verification.physics.outcomes import _Judge
+from internav_data.verification.replay import Theatre
+from internav_data.verification.replay.outcomes import _Judge
 from internav_data.verification.scenes import check_scene
 from internav_data.verification.settings import Settings
 from internav_data.verification.shapes import Shapes
-from internav_data.verification.site import Site
 from internav_data.world import Item, World
-from internav_data.world.solutions import Solutions
 
 FORCE = Settings()
 
@@ -42,7 +42,7 @@ def judged(tmp_path, scenes, level="physics", assets=None, config=None, **option
 
 def test_nothing_that_is_kept_on_disk_is_believed(tmp_path, monkeypatch, scenes):
     def keep_in(held):
-        monkeypatch.setattr("internav_data.world.engine.solutions", lambda: held)
+        monkeypatch.setattr("internav_data.physics.registry.solutions", lambda: held)
         return held
 
     held = keep_in(Solutions(tmp_path))
@@ -265,7 +265,7 @@ def test_a_detour_is_no_untruth(scenes):
 
 
 def test_world_that_calls_any_place_the_goal(scenes, monkeypatch):
-    monkeypatch.setattr(internav_data.world.steps, "GOAL_M", 99.0)
+    monkeypatch.setattr(internav_data.world.world, "GOAL_M", 99.0)
     there = expert_changed(scenes, 2, 1, lambda _: [1, 11])
     assert found_in(there, 2, 1) == {"physics.expert-goal"}
 

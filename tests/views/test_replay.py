@@ -8,13 +8,12 @@ import cv2
 import numpy as np
 import pytest
 
-from internav_data.episodes.expert import expert_of_episode
+from internav_data.planner.search import expert_of_episode
 from internav_data.records.errors import InternavError, UsageError
+from internav_data.render.camera import Camera, Scenery, View
 from internav_data.views import Replay, read_actions, replay_frames, write_video
-from internav_data.views.replay_shots import shots
-from internav_data.views.replay_story import sentence
+from internav_data.views.replay_story import sentence, shots
 from internav_data.world import Action, Stage
-from internav_data.world.camera import Camera, Scenery, View
 
 AHEAD, LEFT, RIGHT, DOWN, PUSH, PICK, DROP, DONE = 0, 1, 2, 3, 5, 9, 10, 11
 # From (3, 1) looking north: to the door's height, up to the chair in the door, away with it.
@@ -148,7 +147,7 @@ def _alone(stage, obstacles):
 
 
 def test_the_map_shows_the_agent_where_it_stands(tried, frames):
-    from internav_data.views.replay_map import AGENT, MapPainter
+    from internav_data.views.replay_panels import AGENT, MapPainter
 
     painter = MapPainter(tried.story, SIZE)
     canvas = painter._canvas
@@ -173,7 +172,7 @@ def share_of(picture, canvas, low, high, colour):
 
 
 def test_the_map_shows_the_trail_and_where_things_stood(tried):
-    from internav_data.views.replay_map import _GHOST, AGENT, MapPainter
+    from internav_data.views.replay_panels import _GHOST, AGENT, MapPainter
 
     painter = MapPainter(tried.story, 400)
     all_shots = list(shots(tried.story, 12.0))

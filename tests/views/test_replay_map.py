@@ -8,7 +8,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from internav_data.views.replay_map import _open_shares
+from internav_data.views.replay_panels import _open_shares
 
 REACH_M = 1.25
 spots = st.floats(-2.0, 2.0).map(lambda v: round(v, 2))

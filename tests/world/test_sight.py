@@ -7,10 +7,10 @@ import pytest
 from scipy.spatial import Delaunay
 
 from internav_data.geometry import part_corners, transform, yaw_quaternion
+from internav_data.geometry.headings import HEADINGS
 from internav_data.records import Asset, Part, Pose
-from internav_data.world.frames import HEADINGS
-from internav_data.world.shells import POINTS_AT_MOST, placed_shell, shell_of
-from internav_data.world.sight import CAMERA_M, REACH_M, Screen, _hidden, view_from
+from internav_data.world.occlusion import POINTS_AT_MOST, placed_shell, shell_of
+from internav_data.world.visibility import CAMERA_M, REACH_M, Screen, _hidden, view_from
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 SHAPES = ("box", "cylinder", "sphere")

@@ -22,7 +22,7 @@ from internav_data.catalog.designs import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from internav_data.catalog.dice import Dice
+    from internav_data.catalog.sampling import Dice
     from internav_data.catalog.shapes import Sketch
 
     Design = Callable[[Sketch, float, float, float, Dice], None]

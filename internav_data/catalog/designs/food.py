@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from internav_data.catalog.dice import LEAF, STEM
+from internav_data.catalog.sampling import LEAF, STEM
 from internav_data.catalog.shapes import Paint, ring
 
 if TYPE_CHECKING:
-    from internav_data.catalog.dice import Dice
+    from internav_data.catalog.sampling import Dice
     from internav_data.catalog.shapes import Sketch
 
 _CRUSTS = ((196, 140, 82), (168, 112, 62), (210, 162, 104), (142, 92, 54))

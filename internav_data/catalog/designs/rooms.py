@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from internav_data.catalog.designs.storage import doors
 from internav_data.catalog.designs.tables import drawers
-from internav_data.catalog.dice import (
+from internav_data.catalog.sampling import (
     BLACK,
     CERAMIC,
     CHROME,
@@ -23,7 +23,7 @@ from internav_data.catalog.dice import (
 from internav_data.catalog.shapes import Paint, ring
 
 if TYPE_CHECKING:
-    from internav_data.catalog.dice import Dice
+    from internav_data.catalog.sampling import Dice
     from internav_data.catalog.shapes import Sketch
 
 _WATER = Paint((206, 216, 218), "ceramic")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from internav_data.catalog.dice import BLACK, BRASS, IRON, LINEN, PAPER, SCREEN, STEEL, WHITE
+from internav_data.catalog.sampling import BLACK, BRASS, IRON, LINEN, PAPER, SCREEN, STEEL, WHITE
 from internav_data.catalog.shapes import Paint, ring
 
 if TYPE_CHECKING:
-    from internav_data.catalog.dice import Dice
+    from internav_data.catalog.sampling import Dice
     from internav_data.catalog.shapes import Sketch
 
 _CARDBOARD = (

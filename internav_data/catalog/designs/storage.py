@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from internav_data.catalog.designs.tables import drawers
-from internav_data.catalog.dice import BLACK, BRASS, CHROME, IRON, STEEL
+from internav_data.catalog.sampling import BLACK, BRASS, CHROME, IRON, STEEL
 from internav_data.catalog.shapes import Paint
 
 if TYPE_CHECKING:
-    from internav_data.catalog.dice import Dice
+    from internav_data.catalog.sampling import Dice
     from internav_data.catalog.shapes import Sketch, Span
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from internav_data.catalog.dice import BRASS, GLASS, IRON, MIRROR
+from internav_data.catalog.sampling import BRASS, GLASS, IRON, MIRROR
 from internav_data.catalog.shapes import ring
 
 if TYPE_CHECKING:
-    from internav_data.catalog.dice import Dice
+    from internav_data.catalog.sampling import Dice
     from internav_data.catalog.shapes import Paint, Sketch, Span
 
 

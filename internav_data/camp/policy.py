@@ -1,0 +1,223 @@
+"""Who can be evaluated: oracles by name, and trained agents from a run's folder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from internav_data.evaluation.archive import About
+from internav_data.evaluation.evaluate import episode_generator
+from internav_data.evaluation.reference_policies import ORACLES, oracle
+from internav_data.records.errors import UsageError
+
+if TYPE_CHECKING:
+    from numpy.random import Generator
+    from numpy.typing import NDArray
+
+    from internav_data.dataset import Dataset
+    from internav_data.evaluation.evaluate import Observations, Player, Settings
+    from internav_data.evaluation.policies import Note
+    from internav_data.records import Episode
+
+OPTIONS: Final = ("Navigate", "Push", "Pick", "Done")
+ACTIONS: Final = (
+    "MoveAhead", "RotateLeft", "RotateRight", "LookDown", "LookUp", "PushAhead", "PushBack",
+    "PushRight", "PushLeft", "Pickup", "Drop", "Done",
+)  # fmt: skip
+_CHECKPOINT: Final = "internav_data.camp.checkpoint"
+
+_NOTED: Final = {
+    "plan": ("option", "option"),
+    "intent": ("intent", ""),
+    "action_probs": ("action", "choice"),
+}
+"""What agents record that can be shown: its title, and where they record what was taken."""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """Somebody to evaluate, and what is known of them."""
+
+    player: Player
+    about: About
+
+
+class AgentPlayer:
+    """A trained agent as a `Player`: torch is imported when it plays.
+
+    Parameters
+    ----------
+    name
+        Of its row.
+    agent
+        `initial_state` and `act` of `internav_data.camp.agents`.
+    image_size
+        That it was trained with.
+    greedy
+        The most probable option and action, rather than drawn ones.
+    ids
+        It wants instance masks too: privileged input (`nie`).
+    """
+
+    def __init__(
+        self,
+        name: str,
+        agent: Any,  # noqa: ANN401 - an Agent; a user's own needs no base class to be played
+        image_size: int,
+        *,
+        greedy: bool,
+        ids: bool = False,
+    ) -> None:
+        self.name, self.image_size, self.ids = name, image_size, ids
+        self._agent, self._greedy = agent, greedy
+        self._seed = 0
+        self._state: dict[str, Any] = {}
+        self._starts: NDArray[np.bool_] = np.zeros(0, np.bool_)
+        self._draws: list[Generator | None] = []
+        self._record: Mapping[str, Any] = {}
+
+    def begin(self, count: int, seed: int) -> None:
+        """See `Player`."""
+        self._agent.eval()
+        self._seed, self._state = seed, self._agent.initial_state(count)
+        self._starts, self._draws = np.ones(count, np.bool_), [None] * count
+
+    def start(self, seat: int, episode: Episode) -> None:
+        """See `Player`."""
+        self._starts[seat] = True
+        self._draws[seat] = episode_generator(self._seed, episode)
+
+    def act(self, observations: Observations) -> NDArray[np.int64]:
+        """See `Player`. Two numbers are drawn a step, used or not: for an option, an action."""
+        import torch  # noqa: PLC0415 - oracles do without
+
+        device = next((p.device for p in self._agent.parameters()), torch.device("cpu"))
+        seen = {name: torch.tensor(array, device=device) for name, array in observations.items()}
+        uniforms = None
+        if not self._greedy:
+            drawn = np.zeros((len(self._draws), 2), np.float32)
+            for row, draw in zip(drawn, self._draws, strict=True):
+                if draw is not None:
+                    row[:] = draw.random(2, np.float32)
+            uniforms = torch.from_numpy(drawn).to(device)
+        starts = torch.from_numpy(self._starts).to(device)
+        with torch.inference_mode():
+            step = self._agent.act(seen, self._state, starts, uniforms)
+        self._state, self._record = step.state, step.record
+        self._starts = np.zeros(len(self._starts), np.bool_)
+        actions: NDArray[np.int64] = step.action.cpu().numpy()
+        return actions
+
+    def notes(self, seat: int) -> list[Note]:
+        """Return what led to a seat's last action: chances of options, intent, of actions."""
+        told: list[Note] = []
+        for name, (title, taken) in _NOTED.items():
+            noted = self._record.get(name)
+            if noted is None:
+                continue
+            shares = tuple(float(share) for share in noted[seat].reshape(-1).tolist())
+            names = {len(OPTIONS): OPTIONS, len(ACTIONS): ACTIONS}.get(len(shares))
+            chosen = self._record.get(taken)
+            if names is not None:
+                told.append((title, names, shares, -1 if chosen is None else int(chosen[seat])))
+        return told
+
+
+def candidate(
+    who: str,
+    dataset: Dataset[Episode],
+    settings: Settings,
+    *,
+    greedy: bool = False,
+    without_intent: bool = False,
+) -> Candidate:
+    """Return an oracle by its name, or the agent of a run's folder.
+
+    Raises
+    ------
+    UsageError
+        There is neither, or the agent cannot be evaluated as asked.
+    """
+    about = About(
+        name=who, method=who, dataset=dataset.fingerprint, split=dataset.split or "all",
+        seed=settings.seed, max_steps=settings.max_steps, oracle=True,
+    )  # fmt: skip
+    if who in ORACLES:
+        return Candidate(oracle(who, dataset), about)
+    if not Path(who).exists():
+        raise UsageError(
+            f"{who}: neither a run's folder nor an oracle; expected what `camp-train` wrote, or "
+            f"some of {', '.join(ORACLES)} with commas between them"
+        )
+    agent = _loaded(Path(who))
+    about = replace(_facts(agent, about), greedy=greedy, without_intent=without_intent)
+    about = replace(about, name=row_name(about))
+    size, ids = agent_config(agent, "network", "image_size", 64), getattr(agent, "wants_ids", False)
+    if without_intent:
+        from internav_data.camp.agents import without_intent as cut  # noqa: PLC0415 - torch
+
+        agent = cut(agent)
+    return Candidate(AgentPlayer(about.name, agent, size, greedy=greedy, ids=ids), about)
+
+
+def oracles_beside(dataset: Dataset[Episode]) -> list[str]:
+    """Return the oracles that go beside a trained agent: those that the dataset has."""
+    experts = dataset.to_table(["expert"]).column("expert")
+    return ["expert", "planner"] if experts.null_count < len(experts) else ["planner"]
+
+
+def row_name(about: About) -> str:
+    """Return the name of a run's row: its method, and how it differs from the default one."""
+    words = [about.method]
+    if about.method in {"camp", "ppo-intent"}:
+        words += [f"--intent {about.intent}"] if about.intent not in {"", "integrated"} else []
+        words += [f"--sync-every {about.sync_every}"] if about.sync_every not in {None, 3} else []
+    words += ["--without-intent"] if about.without_intent else []
+    words += ["(cloned only)"] if about.cloned_frames and about.environment_steps == 0 else []
+    return " ".join(words)
+
+
+def agent_config(agent: object, part: str, name: str, default: Any) -> Any:  # noqa: ANN401
+    """Return a value of an agent's config; the default where it has none."""
+    return getattr(getattr(getattr(agent, "config", None), part, None), name, default)
+
+
+def _loaded(run: Path) -> Any:  # noqa: ANN401 - an Agent, with what its checkpoint says of it
+    from importlib import import_module  # noqa: PLC0415
+
+    try:
+        module = import_module(_CHECKPOINT)
+    except ModuleNotFoundError as error:
+        if error.name != _CHECKPOINT:
+            raise
+        raise UsageError(
+            f"{run}: this version cannot read trained runs; evaluate {', '.join(ORACLES)}"
+        ) from None
+    return module.load_agent(run)
+
+
+def _facts(agent: object, about: About) -> About:
+    """Fill in what a loaded agent says of itself: `method`, `config` and `progress`."""
+    progress = getattr(agent, "progress", None)
+    known = progress if isinstance(progress, Mapping) else {}
+    method = str(getattr(agent, "method", type(agent).__name__))
+    has_intent = method in {"camp", "ppo-intent"}
+    parameters = getattr(agent, "parameters", None)
+    count = sum(p.numel() for p in parameters()) if parameters is not None else None
+    seed = getattr(getattr(agent, "config", None), "seed", None)
+    return replace(
+        about,
+        method=method,
+        oracle=False,
+        intent=agent_config(agent, "agent", "intent", "") if has_intent else "",
+        sync_every=agent_config(agent, "agent", "sync_every", None) if has_intent else None,
+        training_seed=seed,
+        environment_steps=known.get("environment_steps"),
+        cloned_frames=known.get("cloned_frames"),
+        training_s=known.get("training_s"),
+        parameters=count,
+    )

@@ -1,0 +1,145 @@
+"""What experts and outcomes of a dataset are like, from their columns alone."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from internav_data.dataset.summary_statistics import Spread, mean, share, spread
+
+if TYPE_CHECKING:
+    from internav_data.dataset.manifest import Manifest
+    from internav_data.records import Redraw
+
+_STEP_M = 0.25
+EXPERT_COLUMNS = tuple(f"expert.{name}" for name in ("steps", "pushes", "picks", "path_m"))
+OUTCOME_COLUMNS = tuple(
+    f"obstacles.list.element.outcomes.list.element.{name}"
+    for name in ("action", "success", "opened")
+)
+REFUSED: Redraw = "no expert"
+
+
+@dataclass(frozen=True, slots=True)
+class ExpertRow:
+    """How the experts do: no agent on the same lattice can be expected to do better."""
+
+    solved: int
+    """Episodes with an expert."""
+    solved_share: float
+    steps: Spread
+    """Done included."""
+    pushes: float
+    """Mean of those with an expert, as the next."""
+    picks: float
+    spl: float
+    """Mean over all episodes of clear_m / max(path_m, clear_m), 0 without an expert."""
+    sts: float
+    """Mean over all episodes of clear_m / 0.25 m / steps, 0 without an expert."""
+    refused: int
+    """Draws of the whole dataset, all splits, that were thrown away since no expert was found."""
+    refused_share: float
+    """Of those and the episodes together."""
+
+
+@dataclass(frozen=True, slots=True)
+class OutcomeRow:
+    """What one interaction does to the obstacles of all episodes."""
+
+    action: str
+    possible: int
+    """Obstacles that can be pushed, or picked up, at all."""
+    success_share: float
+    """Of those."""
+    opened: int
+    """How often it alone opens a blocked way."""
+
+
+@dataclass(slots=True)
+class OutcomeCounts:
+    """Counts over the outcomes of some files."""
+
+    possible: Counter[str] = field(default_factory=Counter)
+    succeeded: Counter[str] = field(default_factory=Counter)
+    opened: Counter[str] = field(default_factory=Counter)
+    openable: int = 0
+    """Episodes that a single interaction opens."""
+
+    def add(self, obstacles: pa.ListArray) -> None:
+        """Count the outcomes of a column of obstacles, one list for each episode."""
+        things = dict(
+            zip(_names(obstacles.type.value_type), obstacles.flatten().flatten(), strict=True)
+        )
+        lists = things["outcomes"]
+        rows = dict(zip(_names(lists.type.value_type), lists.flatten().flatten(), strict=True))
+        thing = pc.list_parent_indices(lists)
+        able = pc.if_else(
+            pc.equal(rows["action"], "pick"),
+            things["pickable"].take(thing),
+            things["pushable"].take(thing),
+        )
+        table = pa.table({"action": rows["action"], "able": able} | rows)
+        sums = table.group_by("action").aggregate(
+            [("able", "sum"), ("success", "sum"), ("opened", "sum")]
+        )
+        for row in sums.to_pylist():
+            self.possible[row["action"]] += row["able_sum"]
+            self.succeeded[row["action"]] += row["success_sum"]
+            self.opened[row["action"]] += row["opened_sum"]
+        episode = pc.list_parent_indices(obstacles).take(thing)
+        self.openable += len(pc.unique(episode.filter(rows["opened"])))
+
+    def rows(self) -> tuple[OutcomeRow, ...]:
+        """Return a row for each interaction."""
+        return tuple(
+            OutcomeRow(
+                action, count, share(self.succeeded[action], count), int(self.opened[action])
+            )
+            for action, count in sorted(self.possible.items())
+        )
+
+
+def expert_row(table: pa.Table, manifest: Manifest) -> ExpertRow:
+    """Return how the experts of some episodes do.
+
+    Parameters
+    ----------
+    table
+        With `clear_m` and, of `expert`, the `EXPERT_COLUMNS`.
+    manifest
+        Of the whole dataset.
+
+    """
+    expert = table.column("expert")
+    solved = expert.is_valid().to_numpy()
+    steps, pushes, picks, path_m = (
+        pc.struct_field(expert, name).drop_null().to_numpy()
+        for name in ("steps", "pushes", "picks", "path_m")
+    )
+    clear_m = table.column("clear_m").to_numpy()[solved]
+    return ExpertRow(
+        solved=int(solved.sum()),
+        solved_share=mean(solved),
+        steps=spread(steps),
+        pushes=mean(pushes),
+        picks=mean(picks),
+        spl=share(float((clear_m / np.maximum(path_m, clear_m)).sum()), len(solved)),
+        sts=share(float((clear_m / _STEP_M / steps).sum()), len(solved)),
+        refused=manifest.redraws.get(REFUSED, 0),
+        refused_share=refused_share(manifest),
+    )
+
+
+def refused_share(manifest: Manifest) -> float:
+    """Return the share of spawned draws that the expert refused."""
+    refused = manifest.redraws.get(REFUSED, 0)
+    return share(refused, refused + sum(count.episodes for count in manifest.counts.values()))
+
+
+def _names(kind: pa.StructType) -> list[str]:
+    return [kind.field(k).name for k in range(kind.num_fields)]

@@ -1,0 +1,29 @@
+"""Choice of how many processes environments are stepped in."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from internav_data.envs.vector import InterNavVectorEnv
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from gymnasium.vector import VectorEnv
+
+    from internav_data.dataset import Dataset
+    from internav_data.records import Episode
+
+
+def make_vector(
+    num_envs: int,
+    dataset: str | Path | Dataset[Episode],
+    workers: int = 0,
+    **arguments: Any,  # noqa: ANN401 - those of `InterNavVectorEnv`
+) -> VectorEnv[Any, Any, Any]:
+    """Step environments in this process, or (workers > 0) in so many others."""
+    if workers:
+        from internav_data.envs.processes import InterNavProcesses  # noqa: PLC0415 - when asked for
+
+        return InterNavProcesses(num_envs, dataset, workers, **arguments)
+    return InterNavVectorEnv(num_envs, dataset, **arguments)

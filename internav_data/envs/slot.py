@@ -1,0 +1,178 @@
+"""Who plays on: the order of episodes, the one that is played now, and its state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypedDict
+
+from internav_data.envs.episode import Play, Rules
+from internav_data.envs.source import HOUSES_KEPT, PLACES, Source, open_source
+from internav_data.records.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from pathlib import Path
+
+    from internav_data.dataset import Dataset
+    from internav_data.envs.episode import Step
+    from internav_data.envs.order import EpisodeOrder
+    from internav_data.physics import PushModel
+    from internav_data.records import Episode
+
+
+class Arguments(TypedDict, total=False):
+    """Arguments of all environments; `docs/environment.md` has them with their defaults."""
+
+    split: str | None
+    filters: list[tuple[str, str, object]] | None
+    max_steps: int
+    failed_done_reward: float
+    push_model: PushModel
+    episodes_per_house: int
+    shuffle: bool
+    houses_kept: int
+
+
+@dataclass(frozen=True, slots=True)
+class EnvState:
+    """All that an environment is: from it, any process can build it again."""
+
+    episode_id: str
+    actions: tuple[int, ...]
+    """So far, -1 for `wait`."""
+    seed: int
+    """Of the order of episodes."""
+    position: int
+    """In that order, of the episode that comes next."""
+    start: tuple[int, int, int] | None = None
+    """Node i, j and quarter turn, where it did not begin at the episode's own start."""
+
+
+class Player:
+    """One environment without its pictures."""
+
+    __slots__ = ("_order", "_position", "_rules", "_seed", "_shuffle", "_stay", "current", "source")
+
+    def __init__(self, source: Source, rules: Rules, *, stay: int, shuffle: bool) -> None:
+        self.source, self._rules = source, rules
+        self._stay, self._shuffle = stay, shuffle
+        self._order: EpisodeOrder | None = None
+        self._seed = self._position = 0
+        self.current: Play | None = None
+
+    @staticmethod
+    def several(
+        count: int, dataset: str | Path | Dataset[Episode], arguments: Arguments
+    ) -> list[Player]:
+        """Make players that share one source.
+
+        Raises
+        ------
+        UsageError
+            An argument that cannot be meant, or is unknown.
+        """
+        unknown = sorted(set(arguments) - set(Arguments.__annotations__))
+        if unknown:
+            raise UsageError(
+                f"InterNav: no argument {unknown[0]!r}; there are "
+                f"{sorted(Arguments.__annotations__)}"
+            )
+        stay = arguments.get("episodes_per_house", 4)
+        kept = arguments.get("houses_kept", HOUSES_KEPT)
+        if min(count, stay, kept) < 1:
+            raise UsageError(
+                f"num_envs, episodes_per_house and houses_kept: expected at least 1 each, "
+                f"got {count}, {stay} and {kept}"
+            )
+        PLACES.capacity = max(PLACES.capacity, kept)
+        source = open_source(dataset, arguments.get("split"), arguments.get("filters"))
+        rules = Rules(
+            arguments.get("max_steps", 500),
+            arguments.get("failed_done_reward", 0.0),
+            arguments.get("push_model", source.push_model),
+        )
+        rules.check()
+        shuffle = arguments.get("shuffle", True)
+        return [Player(source, rules, stay=stay, shuffle=shuffle) for _ in range(count)]
+
+    @property
+    def ordered(self) -> bool:
+        """Whether it knows its order."""
+        return self._order is not None
+
+    @property
+    def play(self) -> Play:
+        """The episode being played."""
+        if self.current is None:
+            raise UsageError("InterNav: nothing is played yet; call reset() first")
+        return self.current
+
+    def seed(self, seed: int) -> None:
+        """Start an order of episodes from its beginning."""
+        self._seed, self._position = int(seed), 0
+        self._order = self.source.order(self._seed, stay=self._stay, shuffle=self._shuffle)
+
+    def begin(
+        self,
+        episode_id: str | None = None,
+        actions: Iterable[int] = (),
+        start: Sequence[int] | None = None,
+    ) -> Play:
+        """Begin the next episode, or a named one (which leaves the order where it is)."""
+        if episode_id is not None:
+            number = self.source.number_of(episode_id)
+        elif self._order is None:
+            raise UsageError("InterNav: no order of episodes yet; call reset() first")
+        else:
+            number = self._order.number(self._position)
+            self._position += 1
+        episode = self.source.episode(number)
+        place, assets = self.source.place(episode), self.source.dataset.assets
+        self.current = Play(episode, place, assets, self._rules, start)
+        for action in actions:
+            self.current.step(int(action))
+        return self.current
+
+    def state(self) -> EnvState:
+        """Return all that this is."""
+        play = self.play
+        return EnvState(
+            play.episode.episode_id, tuple(play.actions), self._seed, self._position, play.start
+        )
+
+    def restore(self, state: EnvState) -> Play:
+        """Become what a state says."""
+        self.seed(state.seed)
+        self._position = state.position
+        return self.begin(state.episode_id, state.actions, state.start)
+
+
+def step_info(play: Play, step: Step) -> dict[str, Any]:
+    """Return what is said about a step."""
+    last = play.last
+    if last is None:
+        return {}
+    info: dict[str, Any] = {
+        "action_success": last.success,
+        "reason": last.reason,
+        "target": last.target,
+    }
+    if step.terminated or step.truncated:
+        info["metrics"] = play.metrics()
+    return info
+
+
+def check_options(options: Mapping[str, Any] | None, known: tuple[str, ...]) -> dict[str, Any]:
+    """Return reset's options, refused where they cannot be meant."""
+    if options is None:
+        return {}
+    if not isinstance(options, Mapping):
+        raise UsageError(f"options: expected a dictionary, got {type(options).__name__}")
+    unknown = sorted(set(options) - set(known))
+    if unknown:
+        raise UsageError(f"options: no option {unknown[0]!r}; there are {list(known)}")
+    for name in ("actions", "start"):
+        if name in options and options.get("episode_id") is None:
+            raise UsageError(f"options[{name!r}]: say of which episode, by options['episode_id']")
+    return dict(options)

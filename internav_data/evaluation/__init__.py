@@ -1,0 +1,1 @@
+"""Metrics, reference policies, tables, statistics and reports; no torch."""

@@ -1,0 +1,208 @@
+"""Let somebody play a split's episodes, many at a time, and note how each one went.
+
+What comes out depends on the player, the evaluation seed and the episode alone: not on how many
+are played side by side, nor in which order. (A network's arithmetic may differ in the last bit
+between batch sizes; at an even chance in a million a sampled action can then differ too.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from internav_data.evaluation.metrics import EpisodeResult, result_of
+from internav_data.records import Purpose, generator
+from internav_data.records.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.random import Generator
+    from numpy.typing import NDArray
+
+    from internav_data.dataset import Dataset
+    from internav_data.records import Episode
+
+    Observations = Mapping[str, NDArray[Any]]
+    Tell = Callable[[int, int], None]
+
+WAIT = -1
+"""What an empty seat does: nothing, until the last episodes have ended."""
+STEPS_AT_MOST = 10_000
+_SUBSET, _ACTIONS = 1, 0
+"""Where the seeds table has attempts: what of an evaluation is drawn."""
+
+
+class Player(Protocol):
+    """Policy being evaluated: a trained agent (`camp.policy`) or a reference policy."""
+
+    name: str
+    image_size: int
+    """Pixels a side that it wants to see. One that has `ids = True` sees instance masks too."""
+
+    def begin(self, count: int, seed: int) -> None:
+        """Take `count` seats; all that is random derives from `seed` and the episode."""
+
+    def start(self, seat: int, episode: Episode) -> None:
+        """Forget what happened in a seat: an episode begins there."""
+
+    def act(self, observations: Observations) -> NDArray[np.int64]:
+        """Return an action for every seat, (count,): 0 … 11, or -1 to wait.
+
+        Observations are those of the vector environment, (count, …) each; they are overwritten
+        by the next step. What is returned for an empty seat counts for nothing.
+        """
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How an evaluation is made."""
+
+    seed: int = 0
+    """Actions are drawn by a generator keyed by this and the episode."""
+    batch: int = 16
+    """Episodes side by side."""
+    workers: int = 0
+    """Processes that step them; 0: this one."""
+    max_steps: int = 500
+    limit: int | None = None
+    """So many episodes only: a fixed random choice, of which a smaller limit's is a part."""
+
+    def check(self) -> None:
+        """Refuse what cannot be meant."""
+        least = {"batch": self.batch, "max_steps": self.max_steps, "limit": self.limit}
+        for name, value in least.items():
+            if value is not None and value < 1:
+                raise UsageError(f"{name}: expected 1 or more, got {value}")
+        if self.max_steps > STEPS_AT_MOST:
+            raise UsageError(f"max_steps: at most {STEPS_AT_MOST}, got {self.max_steps}")
+        if self.seed < 0 or self.workers < 0:
+            raise UsageError(
+                f"seed and workers: expected 0 or more, got {self.seed} and {self.workers}"
+            )
+
+
+def episode_generator(seed: int, episode: Episode) -> Generator:
+    """Return the random numbers of one episode of an evaluation, whoever plays it and when."""
+    scene = int(episode.scene_id.rpartition("-")[2])
+    return generator(seed, Purpose.EVALUATION, scene, _ACTIONS, episode.index)
+
+
+def chosen(count: int, limit: int | None) -> list[int]:
+    """Return the numbers of the episodes to play, ascending: all, or a fixed choice of them."""
+    if limit is None or limit >= count:
+        return list(range(count))
+    order = generator(0, Purpose.EVALUATION, attempt=_SUBSET).permutation(count)
+    return sorted(order[:limit].tolist())
+
+
+def evaluate(
+    player: Player,
+    dataset: Dataset[Episode],
+    settings: Settings | None = None,
+    tell: Tell | None = None,
+) -> list[EpisodeResult]:
+    """Play the episodes of a dataset; the results come in the dataset's order.
+
+    Parameters
+    ----------
+    player
+        Who plays.
+    dataset
+        What `load_dataset` returned for a split, filters and all.
+    settings
+        How; the defaults if not given.
+    tell
+        Called with how many episodes have ended, and of how many.
+
+    Raises
+    ------
+    UsageError
+        Nothing is selected, or a setting cannot be meant.
+    """
+    from internav_data.envs.make import make_vector  # noqa: PLC0415 - the camera's kernels
+
+    settings = settings or Settings()
+    settings.check()
+    if not len(dataset):
+        raise UsageError(
+            f"{dataset.path}: no episode is left of split={dataset.split!r}, "
+            f"filters={dataset.filters!r}; choose others: "
+            "`internav-gen stats` tells what the dataset holds"
+        )
+    numbers = chosen(len(dataset), settings.limit)
+    count = min(settings.batch, len(numbers))
+    masks = {"ids": True} if getattr(player, "ids", False) else {}
+    env = make_vector(
+        count, dataset, min(settings.workers, count), image_size=player.image_size,
+        autoreset=False, copy=False, max_steps=settings.max_steps, **masks,
+    )  # fmt: skip
+    try:
+        player.begin(count, settings.seed)
+        return _Round(env, player, dataset, numbers, settings.seed).played(tell)
+    finally:
+        env.close()
+
+
+class _Round:
+    """One evaluation under way: who sits where, and what they did so far."""
+
+    def __init__(
+        self,
+        env: Any,  # noqa: ANN401 - either vector environment
+        player: Player,
+        dataset: Dataset[Episode],
+        numbers: Sequence[int],
+        seed: int,
+    ) -> None:
+        self._env, self._player, self._dataset, self._seed = env, player, dataset, seed
+        self._numbers, self._next = numbers, 0
+        self._episodes: list[Episode | None] = [None] * env.num_envs
+        self._ids: list[str] = [""] * env.num_envs
+        self._actions: list[list[int]] = [[] for _ in range(env.num_envs)]
+        self._playing = [0] * env.num_envs
+        self._found: dict[int, EpisodeResult] = {}
+
+    def played(self, tell: Tell | None) -> list[EpisodeResult]:
+        env, count = self._env, self._env.num_envs
+        for seat in range(count):
+            self._seat(seat)
+        seen, _ = env.reset(seed=self._seed, options={"episode_id": self._ids})
+        while any(episode is not None for episode in self._episodes):
+            actions = np.array(self._player.act(seen), dtype=np.int64)
+            idle = [episode is None for episode in self._episodes]
+            actions[idle] = WAIT
+            for seat, action in enumerate(actions.tolist()):
+                self._actions[seat].append(action)
+            seen, _, terminated, truncated, infos = env.step(actions)
+            over = terminated | truncated
+            if not over.any():
+                continue
+            for seat in np.flatnonzero(over).tolist():
+                self._ended(seat, infos)
+                self._seat(seat)
+            seen, _ = env.reset(options={"reset_mask": over, "episode_id": self._ids})
+            if tell is not None:
+                tell(len(self._found), len(self._numbers))
+        return [self._found[number] for number in self._numbers]
+
+    def _seat(self, seat: int) -> None:
+        """Give a seat the next episode; where there is none its last one stays, and is waited."""
+        self._actions[seat] = []
+        if self._next == len(self._numbers):
+            self._episodes[seat] = None
+            return
+        self._playing[seat] = number = self._numbers[self._next]
+        episode = self._dataset[number]
+        self._next += 1
+        self._episodes[seat], self._ids[seat] = episode, episode.episode_id
+        self._player.start(seat, episode)
+
+    def _ended(self, seat: int, infos: Mapping[str, Any]) -> None:
+        episode = self._episodes[seat]
+        if episode is None:
+            return
+        said = {name: column[seat] for name, column in infos["metrics"].items() if name[0] != "_"}
+        self._found[self._playing[seat]] = result_of(episode, said, self._actions[seat])

@@ -1,0 +1,184 @@
+"""Rows that bound every column: the dataset's expert, a planner that never interacts, chance."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from internav_data.evaluation.evaluate import episode_generator
+from internav_data.records.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.random import Generator
+    from numpy.typing import NDArray
+
+    from internav_data.dataset import Dataset
+    from internav_data.evaluation.evaluate import Player
+    from internav_data.navigation import Lattice
+    from internav_data.records import Episode
+
+    Node = tuple[int, int]
+    Plan = Callable[[Episode], Sequence[int]]
+
+ORACLES: Final = ("expert", "planner", "random")
+ACTIONS: Final = 12
+AHEAD, LEFT, RIGHT, DONE = 0, 1, 2, 11
+_DIRECTIONS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))
+_TURNS: Final[tuple[tuple[int, ...], ...]] = ((), (LEFT,), (LEFT, LEFT), (RIGHT,))
+"""What turns the agent by so many quarters, counter-clockwise."""
+
+
+def oracle(name: str, dataset: Dataset[Episode]) -> Player:
+    """Return one of `ORACLES` for a dataset.
+
+    Raises
+    ------
+    UsageError
+        There is no such oracle, or the dataset has no experts.
+    """
+    if name == "random":
+        return RandomPlayer()
+    if name == "planner":
+        return ScriptedPlayer(name, planner_of(dataset))
+    if name == "expert":
+        expert = dataset.to_table(["expert"]).column("expert")
+        if len(expert) and expert.null_count == len(expert):
+            raise UsageError(
+                f"{dataset.path}: no episode has an expert (the dataset is of a version without, "
+                "or was made so); generate it anew, or evaluate planner and random alone"
+            )
+        return ScriptedPlayer(name, expert_actions)
+    raise UsageError(f"no oracle is called {name!r}; there are {', '.join(ORACLES)}")
+
+
+class ScriptedPlayer:
+    """Knows at an episode's start what it will do.
+
+    Parameters
+    ----------
+    name
+        Of its row.
+    plan
+        The actions for an episode; Done follows where they end without it.
+    """
+
+    image_size = 1  # it does not look
+
+    def __init__(self, name: str, plan: Plan) -> None:
+        self.name = name
+        self._plan = plan
+        self._left: list[deque[int]] = []
+
+    def begin(self, count: int, seed: int) -> None:  # noqa: ARG002 - nothing is random here
+        """See `Player`."""
+        self._left = [deque() for _ in range(count)]
+
+    def start(self, seat: int, episode: Episode) -> None:
+        """See `Player`."""
+        self._left[seat] = deque(self._plan(episode))
+
+    def act(self, observations: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:  # noqa: ARG002
+        """See `Player`."""
+        return np.array([left.popleft() if left else DONE for left in self._left], np.int64)
+
+
+class RandomPlayer:
+    """Takes each of the twelve actions with the same chance, Done included."""
+
+    name = "random"
+    image_size = 1
+
+    def __init__(self) -> None:
+        self._seed = 0
+        self._draws: list[Generator | None] = []
+
+    def begin(self, count: int, seed: int) -> None:
+        """See `Player`."""
+        self._seed, self._draws = seed, [None] * count
+
+    def start(self, seat: int, episode: Episode) -> None:
+        """See `Player`."""
+        self._draws[seat] = episode_generator(self._seed, episode)
+
+    def act(self, observations: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:  # noqa: ARG002
+        """See `Player`."""
+        drawn = [DONE if draw is None else int(draw.integers(ACTIONS)) for draw in self._draws]
+        return np.array(drawn, np.int64)
+
+
+def expert_actions(episode: Episode) -> Sequence[int]:
+    """Return the stored expert's actions; of an episode without one, Done alone: a failure."""
+    return (DONE,) if episode.expert is None else episode.expert.actions
+
+
+def planner_of(dataset: Dataset[Episode]) -> Plan:
+    """Return what plans the shortest way on the lattice, things as they lie, touching none."""
+    from internav_data.envs.source import open_source  # noqa: PLC0415 - the camera's kernels
+    from internav_data.world import World  # noqa: PLC0415
+
+    source = open_source(dataset)  # houses are those of environments in this process
+
+    def plan(episode: Episode) -> Sequence[int]:
+        stage = source.place(episode).stage
+        world = World.of_episode(stage, episode, dataset.assets)
+        start, goal = (world.i, world.j), world.goal
+        if world.lattice.distance(start, goal) is None:
+            goal = nearest(world.lattice, stage.lattice, start, goal)
+        return [*shortest(world.lattice, (*start, world.quarter), goal), DONE]
+
+    return plan
+
+
+def nearest(lattice: Lattice, clear: Lattice, start: Node, goal: Node) -> Node:
+    """Return the node within reach from which the goal would be fewest steps, were all clear.
+
+    Ties: the fewest steps to walk there, then i, then j.
+    """
+    walk, rest = lattice.distances(*start), clear.distances(*goal)
+    nodes = np.argwhere((walk >= 0) & (rest >= 0))
+    if not len(nodes):
+        return start
+    i, j = nodes[:, 0], nodes[:, 1]
+    best = nodes[np.lexsort((j, i, walk[i, j], rest[i, j]))[0]]
+    return int(best[0]), int(best[1])
+
+
+def shortest(lattice: Lattice, start: tuple[int, int, int], goal: Node) -> list[int]:
+    """Return actions along a shortest way, and of all such with the fewest turns.
+
+    Parameters
+    ----------
+    lattice
+        Things as they lie.
+    start
+        Node i, j and quarter turn.
+    goal
+        A node that can be reached from there.
+    """
+    steps = lattice.distances(*goal)
+    reached: dict[tuple[int, int, int], list[int]] = {start: []}
+    for left in range(int(steps[start[0], start[1]]) - 1, -1, -1):
+        ahead: dict[tuple[int, int, int], list[int]] = {}
+        for (i, j, quarter), actions in reached.items():
+            for heading, (di, dj) in enumerate(_DIRECTIONS):
+                if not _leads(lattice, steps, (i, j), (di, dj), left):
+                    continue
+                there = (i + di, j + dj, heading)
+                longer = [*actions, *_TURNS[(heading - quarter) % 4], AHEAD]
+                if there not in ahead or len(longer) < len(ahead[there]):
+                    ahead[there] = longer
+        reached = ahead
+    return min(reached.values(), key=len)
+
+
+def _leads(
+    lattice: Lattice, steps: NDArray[np.int32], node: Node, way: tuple[int, int], left: int
+) -> bool:
+    """Whether a step can be taken, and leaves so many."""
+    i, j = node[0] + way[0], node[1] + way[1]
+    inside = 0 <= i < steps.shape[0] and 0 <= j < steps.shape[1]
+    return inside and int(steps[i, j]) == left and lattice.edge_free(*node, *way)

@@ -1,0 +1,303 @@
+"""What an evaluation leaves behind for people: Markdown, JSON and one HTML page.
+
+A run's log rows, read forgivingly: one JSON object a line, of numbers by name.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+from internav_data.core.files import write_atomically
+from internav_data.evaluation.metrics import GROUPS, MEASURES
+from internav_data.evaluation.statements import as_json as differences_json
+from internav_data.evaluation.statements import fairness, sentences
+from internav_data.evaluation.statistics import by_method, check_comparable
+from internav_data.evaluation.tables import (
+    as_json,
+    cell,
+    heading,
+    markdown,
+    table_3,
+    table_4,
+    table_5,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from internav_data.dataset import Dataset
+    from internav_data.evaluation.archive import Evaluation
+    from internav_data.evaluation.metrics import EpisodeResult
+    from internav_data.evaluation.statements import Methods
+    from internav_data.evaluation.tables import Table
+    from internav_data.records import Episode
+    from internav_data.views.page import Page
+
+
+BYTES_AT_MOST: Final = 256_000_000
+STEPS: Final = ("step", "steps", "environment_steps")
+"""Names of the horizontal axis, the first one that a row has."""
+FIRST: Final = ("success", "validation", "return", "reward", "spl", "sts")
+"""What is shown first: names that hold these words."""
+CURVES_AT_MOST: Final = 24
+
+Series = dict[str, list[tuple[float, float]]]
+
+
+def find_log(run: Path) -> Path | None:
+    """Return a run's log, a .jsonl file in its folder; None without one."""
+    found = sorted(path for path in run.glob("*.jsonl") if path.is_file())
+    return found[0] if found else None
+
+
+def read_log(path: Path) -> Series:
+    """Return each number of a log against the steps; lines that are no rows are passed over."""
+    series: Series = {}
+    if path.stat().st_size > BYTES_AT_MOST:
+        return series
+    with path.open(encoding="utf-8", errors="replace") as lines:
+        for line in lines:
+            row = _row(line)
+            step = next((row[name] for name in STEPS if name in row), None)
+            if step is None:
+                continue
+            for name, value in row.items():
+                if name not in STEPS:
+                    series.setdefault(name, []).append((step, value))
+    return series
+
+
+def shown_first(names: Sequence[str]) -> list[str]:
+    """Return the names to show, the telling ones first."""
+
+    def rank(name: str) -> tuple[int, str]:
+        places = [k for k, word in enumerate(FIRST) if word in name.lower()]
+        return (places[0] if places else len(FIRST)), name
+
+    return sorted(names, key=rank)[:CURVES_AT_MOST]
+
+
+def _row(line: str) -> Mapping[str, float]:
+    try:
+        said: Any = json.loads(line)
+    except (ValueError, RecursionError):
+        return {}
+    return _numbers(said) if isinstance(said, dict) else {}
+
+
+def _numbers(said: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
+    found: dict[str, float] = {}
+    for name, value in said.items():
+        if isinstance(value, dict) and not prefix:
+            found |= _numbers(value, f"{name}/")
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            try:
+                number = float(value)
+            except OverflowError:
+                continue
+            if math.isfinite(number):
+                found[f"{prefix}{name}"] = number
+    return found
+
+
+PICTURES_EACH: Final = 2
+"""Of the best, the median and the worst episodes."""
+_PIXELS: Final = 560
+
+
+def methods_of(evaluations: Sequence[Evaluation]) -> Methods:
+    """Return evaluations by row, checked to be comparable; an oracle counts once.
+
+    Raises
+    ------
+    UsageError
+        They are not of the same episodes, or one is there twice.
+    """
+    kept: list[Evaluation] = []
+    oracles: set[str] = set()
+    for each in evaluations:
+        if each.about.oracle:
+            if each.about.name in oracles:
+                continue
+            oracles.add(each.about.name)
+        kept.append(each)
+    check_comparable(kept)
+    return by_method(kept)
+
+
+def tables_of(methods: Methods) -> list[Table]:
+    """Return the paper's tables that these methods have something to say in."""
+    ablations = table_4(methods)
+    return [table_3(methods), *([ablations] if ablations else []), table_5(methods)]
+
+
+def text_of(methods: Methods) -> str:
+    """Return tables and what is said beside them, as Markdown."""
+    about = next(iter(methods.values()))[0].about
+    sampled = "likeliest actions" if about.greedy else "sampled actions"
+    head = (
+        f"Split {about.split}, dataset {about.dataset}, at most {about.max_steps} steps, "
+        f"evaluation seed {about.seed}, {sampled}.\n"
+    )
+    parts = [head, *(markdown(table) for table in tables_of(methods))]
+    headings, rows = fairness(methods)
+    if rows:
+        lines = [headings, ["---"] * len(headings), *rows]
+        parts += ["### What each was given\n"]
+        parts += ["\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"]
+    said = "\n".join(f"- {line}" for line in sentences(methods))
+    return "\n".join([*parts, "### What this can tell\n", said, ""])
+
+
+def data_of(methods: Methods) -> dict[str, Any]:
+    """Return the same as plain data."""
+    return {
+        "format": 1,
+        "tables": [as_json(table) for table in tables_of(methods)],
+        "figures": {name: _all_figures(found) for name, found in methods.items()},
+        "differences": differences_json(methods),
+        "sentences": sentences(methods),
+    }
+
+
+def _all_figures(found: Sequence[Evaluation]) -> dict[str, Any]:
+    """Return every figure of every group, in no table or in one: value, half interval, seeds."""
+    figures: dict[str, Any] = {}
+    for group in GROUPS:
+        cells = {name: cell(found, group, name) for name in MEASURES}
+        figures[group] = {
+            name: {"value": each.value, "half": each.half, "seeds": each.seeds}
+            for name, each in cells.items()
+        }
+    return figures
+
+
+def write_texts(folder: Path, methods: Methods) -> None:
+    """Write `tables.md` and `tables.json`."""
+    write_atomically(folder / "tables.md", text_of(methods).encode())
+    said = json.dumps(data_of(methods), indent=2, ensure_ascii=False, allow_nan=False)
+    write_atomically(folder / "tables.json", (said + "\n").encode())
+
+
+def write_page(
+    path: Path,
+    methods: Methods,
+    dataset: Dataset[Episode] | None = None,
+    logs: Mapping[str, Series] | None = None,
+) -> None:
+    """Write the HTML report.
+
+    Parameters
+    ----------
+    path
+        Where to.
+    methods
+        What to report on.
+    dataset
+        Whose episodes they are: best, median and worst ones are drawn; none without it.
+    logs
+        Training logs by name of a run, for curves.
+    """
+    from internav_data.views.page import Page  # noqa: PLC0415 - OpenCV
+
+    about = next(iter(methods.values()))[0].about
+    page = Page("camp-eval: " + ", ".join(methods))
+    page.words(
+        f"Split {about.split}, dataset {about.dataset}; at most {about.max_steps} steps; "
+        f"evaluation seed {about.seed}; {'likeliest' if about.greedy else 'sampled'} actions."
+    )
+    for table in tables_of(methods):
+        _add_table(page, table)
+    headings, given = fairness(methods)
+    if given:
+        page.heading("What each was given")
+        page.table((), headings, [("", row) for row in given])
+    page.heading("What this can tell")
+    for line in sentences(methods):
+        page.words(line)
+    if logs:
+        _add_curves(page, logs)
+    if dataset is not None:
+        for name, found in methods.items():
+            page.heading(f"Best, median and worst episodes of {name}")
+            page.pictures(_pictures(found[0].results, dataset))
+    page.write(path)
+
+
+def picked(
+    results: Sequence[EpisodeResult], each: int = PICTURES_EACH
+) -> list[tuple[str, EpisodeResult]]:
+    """Return the best, the median and the worst episodes: by success, SPL, then distance."""
+    order = sorted(results, key=lambda r: (-r.success, -r.spl, r.distance_m, r.episode_id))
+    count = len(order)
+    middle = max(0, (count - each) // 2)
+    places = [("best", range(each)), ("median", range(middle, middle + each))]
+    places += [("worst", range(count - each, count))]
+    found: dict[int, str] = {}
+    for word, numbers in places:
+        for k in numbers:
+            if 0 <= k < count:
+                found.setdefault(k, word)
+    return [(found[k], order[k]) for k in sorted(found)]
+
+
+def episodes_by_id(dataset: Dataset[Episode], wanted: Sequence[str]) -> dict[str, Episode]:
+    """Return some episodes of a dataset."""
+    ids: list[str] = dataset.to_table(["episode_id"]).column("episode_id").to_pylist()
+    numbers = [k for k, name in enumerate(ids) if name in set(wanted)]
+    return {episode.episode_id: episode for episode in dataset.__getitems__(numbers)}
+
+
+def push_model_of(dataset: Dataset[Episode]) -> Any:  # noqa: ANN401 - PushModel, from JSON
+    """Return how the dataset's pushes are answered."""
+    return dataset.manifest.config.get("episodes", {}).get("push_model", "force")
+
+
+def _add_table(page: Page, table: Table) -> None:
+    page.heading(table.title)
+    spans = [(f"{name} (n = {count})", len(table.columns)) for name, count in table.groups]
+    headings = ["", *(heading(name) for _ in table.groups for name in table.columns)]
+    rows = [(row.source, [row.name, *(each.text for each in row.cells)]) for row in table.rows]
+    page.table(spans, headings, rows)
+    for note in table.notes:
+        page.words(note, note=True)
+
+
+def _add_curves(page: Page, logs: Mapping[str, Series]) -> None:
+    from internav_data.views.curves import Curve, curves_svg  # noqa: PLC0415
+
+    page.heading("Training")
+    names = {name for series in logs.values() for name in series}
+    pictures = []
+    for name in shown_first(sorted(names)):
+        found = [Curve(run, tuple(series[name])) for run, series in logs.items() if name in series]
+        pictures.append(curves_svg(name, "environment steps", found))
+    page.curves(pictures)
+
+
+def _pictures(results: Sequence[EpisodeResult], dataset: Dataset[Episode]) -> list[Any]:
+    from internav_data.views.trajectories import draw_trajectory  # noqa: PLC0415
+
+    chosen = picked(results)
+    episodes = episodes_by_id(dataset, [result.episode_id for _, result in chosen])
+    pictures = []
+    for word, result in chosen:
+        episode = episodes[result.episode_id]
+        image = draw_trajectory(
+            dataset.scene(episode.scene_id), episode, dataset.assets, result.actions,
+            pixels=_PIXELS, model=push_model_of(dataset),
+        )  # fmt: skip
+        end = "success" if result.success else f"failed, {result.distance_m:.2f} m away"
+        pictures.append(
+            (
+                image,
+                (
+                    f"{word}: {result.episode_id}, {result.mode}: {end}, {result.steps} steps, "
+                    f"SPL {result.spl:.2f}, STS {result.sts:.2f}"
+                ),
+            )
+        )
+    return pictures

@@ -1,0 +1,231 @@
+"""What the figures of several runs can tell, and what they cannot.
+
+Between methods, training seeds are the unit: intervals by Student's t on the seeds' means. A
+bootstrap over scenes alone knows nothing of how another seed would have come out, and finds
+false winners in a third to a half of null comparisons; here it only speaks of fixed checkpoints.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from internav_data.evaluation.metrics import GROUPS, MEASURES
+from internav_data.records import Purpose, generator
+from internav_data.records.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from internav_data.evaluation.archive import Evaluation
+    from internav_data.evaluation.metrics import EpisodeResult
+
+    Floats = NDArray[np.float64]
+
+CONFIDENCE: Final = 0.95
+POWER: Final = 0.8
+DRAWS: Final = 4000
+"""Of the bootstrap."""
+_BOOTSTRAP: Final = 2
+"""Where the seeds table has attempts."""
+_TWO: Final = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A mean and where it may lie; without bounds where one value says nothing of the spread."""
+
+    mean: float
+    low: float | None
+    high: float | None
+    count: int
+    """Of seeds, or of scenes."""
+
+    @property
+    def half(self) -> float | None:
+        """Half its width."""
+        return None if self.low is None or self.high is None else (self.high - self.low) / 2.0
+
+    @property
+    def excludes_zero(self) -> bool:
+        """Whether both bounds lie on the same side of 0."""
+        return self.low is not None and self.high is not None and self.low * self.high > 0.0
+
+
+def t_quantile(share: float, freedom: float) -> float:
+    """Return the quantile of Student's t."""
+    from scipy.special import stdtrit  # noqa: PLC0415 - tables without intervals need none
+
+    return float(stdtrit(freedom, share))
+
+
+def deviation(values: Sequence[float]) -> float:
+    """Return the standard deviation of a sample of two or more."""
+    mean = math.fsum(values) / len(values)
+    return math.sqrt(math.fsum((v - mean) ** 2 for v in values) / (len(values) - 1))
+
+
+def seed_interval(values: Sequence[float]) -> Interval:
+    """Return the 95 % t interval of a mean over seeds."""
+    count, mean = len(values), math.fsum(values) / len(values)
+    if count < _TWO:
+        return Interval(mean, None, None, count)
+    half = t_quantile((1.0 + CONFIDENCE) / 2.0, count - 1) * deviation(values) / math.sqrt(count)
+    return Interval(mean, mean - half, mean + half, count)
+
+
+def seed_difference(first: Sequence[float], second: Sequence[float]) -> Interval:
+    """Return the 95 % interval of mean(first) - mean(second), by Welch's t over seeds.
+
+    Seeds of two methods are not paired: the same number draws other networks.
+    """
+    mean = math.fsum(first) / len(first) - math.fsum(second) / len(second)
+    count = min(len(first), len(second))
+    if count < _TWO:
+        return Interval(mean, None, None, count)
+    a, b = (deviation(values) ** 2 / len(values) for values in (first, second))
+    if a + b == 0.0:
+        return Interval(mean, mean, mean, count)
+    freedom = (a + b) ** 2 / (a**2 / (len(first) - 1) + b**2 / (len(second) - 1))
+    half = t_quantile((1.0 + CONFIDENCE) / 2.0, freedom) * math.sqrt(a + b)
+    return Interval(mean, mean - half, mean + half, count)
+
+
+@dataclass(frozen=True, slots=True)
+class Resolution:
+    """What two methods of so many seeds each can be told apart by."""
+
+    seeds: int
+    deviation: float
+    """Between the seeds of a method."""
+    half: float
+    """Half of the difference's 95 % interval: smaller differences look like none."""
+    found: float
+    """A true difference of this size is found four times in five."""
+
+
+def resolution(seeds: int, spread: float) -> Resolution | None:
+    """Return what can be told apart at a deviation between seeds; None with fewer than two."""
+    if seeds < _TWO:
+        return None
+    freedom, error = 2 * (seeds - 1), spread * math.sqrt(2.0 / seeds)
+    half = t_quantile((1.0 + CONFIDENCE) / 2.0, freedom) * error
+    return Resolution(seeds, spread, half, half + t_quantile(POWER, freedom) * error)
+
+
+def pooled_deviation(groups: Sequence[Sequence[float]]) -> float | None:
+    """Return the deviation between seeds, pooled over methods; None where nobody has two."""
+    freedom = sum(len(values) - 1 for values in groups)
+    if freedom < 1:
+        return None
+    squares = [deviation(v) ** 2 * (len(v) - 1) for v in groups if len(v) >= _TWO]
+    return math.sqrt(math.fsum(squares) / freedom)
+
+
+def scene_interval(
+    results: Sequence[EpisodeResult], measure: str, other: Sequence[EpisodeResult] | None = None
+) -> Interval | None:
+    """Return the 95 % bootstrap interval over scenes, for fixed checkpoints alone.
+
+    Parameters
+    ----------
+    results
+        Of one checkpoint.
+    measure
+        One of `MEASURES`.
+    other
+        Of a second one, on the same episodes: the interval is that of `results` minus `other`.
+
+    Returns
+    -------
+    Interval or None
+        None where the figure is not defined, or there is a single scene.
+    """
+    names = sorted({result.scene_id for result in results})
+    sums = [_scene_sums(each, measure, names) for each in (results, other) if each is not None]
+    if len(names) < _TWO or any(s[1].sum() == 0.0 for s in sums):
+        return None
+    rng = generator(0, Purpose.EVALUATION, attempt=_BOOTSTRAP)
+    weights = rng.multinomial(len(names), np.full(len(names), 1.0 / len(names)), DRAWS)
+    ones = np.ones((1, len(names)))
+    drawn, whole = (_figure(w, sums) for w in (weights.astype(np.float64), ones))
+    drawn = drawn[np.isfinite(drawn)]
+    if not len(drawn):
+        return None
+    tail = (1.0 - CONFIDENCE) / 2.0
+    low, high = np.quantile(drawn, [tail, 1.0 - tail]).tolist()
+    return Interval(float(whole[0]), low, high, len(names))
+
+
+def _figure(weights: Floats, sums: Sequence[tuple[Floats, Floats]]) -> Floats:
+    """Return the figure (or difference of two) for each row of scenes' weights."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        figures: list[Floats] = [(weights @ above) / (weights @ below) for above, below in sums]
+    return figures[0] if len(figures) == 1 else figures[0] - figures[1]
+
+
+def _scene_sums(
+    results: Sequence[EpisodeResult], measure: str, names: Sequence[str]
+) -> tuple[Floats, Floats]:
+    """Numerators and denominators by scene, (scenes,) each."""
+    row = {name: k for k, name in enumerate(names)}
+    above, below = np.zeros(len(names)), np.zeros(len(names))
+    for result in results:
+        a, b = MEASURES[measure].part(result)
+        above[row[result.scene_id]] += a
+        below[row[result.scene_id]] += b
+    return above, below
+
+
+def check_comparable(evaluations: Sequence[Evaluation]) -> None:
+    """Refuse evaluations that did not play the same episodes in the same way.
+
+    Raises
+    ------
+    UsageError
+        Names the first that differs, and by what; or one that is there twice.
+    """
+    first = evaluations[0]
+    known = {name: getattr(first.about, name) for name in ("dataset", "split", "max_steps")}
+    ids = [result.episode_id for result in first.results]
+    greedy = next((e.about.greedy for e in evaluations if not e.about.oracle), False)
+    seen: set[tuple[str, int | None]] = set()
+    for each in evaluations:
+        name = each.about.name
+        for key, value in known.items():
+            if getattr(each.about, key) != value:
+                raise UsageError(
+                    f"{name}: {key} is {getattr(each.about, key)!r}, that of {first.about.name} is "
+                    f"{value!r}; evaluate both alike"
+                )
+        if [result.episode_id for result in each.results] != ids:
+            raise UsageError(f"{name} and {first.about.name} played other episodes (--limit?)")
+        if not each.about.oracle and each.about.greedy != greedy:
+            raise UsageError(f"{name}: --greedy must be given for all runs, or for none")
+        key_of = (name, each.about.training_seed)
+        if key_of in seen:
+            raise UsageError(f"{name}: training seed {each.about.training_seed} is there twice")
+        seen.add(key_of)
+
+
+def by_method(evaluations: Sequence[Evaluation]) -> Mapping[str, list[Evaluation]]:
+    """Return evaluations by the name of their row, in the order in which names first come."""
+    groups: dict[str, list[Evaluation]] = {}
+    for each in evaluations:
+        groups.setdefault(each.about.name, []).append(each)
+    return groups
+
+
+def figures(evaluations: Sequence[Evaluation], group: str, measure: str) -> list[float]:
+    """Return the figure of each evaluation that has one: one value a seed."""
+    found = []
+    for each in evaluations:
+        value = MEASURES[measure].of(r for r in each.results if GROUPS[group](r))
+        if value is not None:
+            found.append(value)
+    return found

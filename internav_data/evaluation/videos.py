@@ -1,0 +1,84 @@
+"""Films of evaluated episodes: camera, map, and bars of what led to each action."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from internav_data.dataset import load_dataset
+from internav_data.evaluation.evaluate import Settings, evaluate
+from internav_data.evaluation.report import episodes_by_id, picked, push_model_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+    from pathlib import Path
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from internav_data.dataset import Dataset
+    from internav_data.evaluation.evaluate import Player
+    from internav_data.evaluation.metrics import EpisodeResult
+    from internav_data.evaluation.policies import Note
+    from internav_data.records import Episode
+
+SIZE: Final = 320
+FPS: Final = 6.0
+
+
+class _Noting:
+    """Plays as another does, and keeps what led to each action."""
+
+    def __init__(self, player: Player) -> None:
+        self.name, self.image_size = player.name, player.image_size
+        self.ids = getattr(player, "ids", False)
+        self._player = player
+        self.steps: list[list[Note]] = []
+
+    def begin(self, count: int, seed: int) -> None:
+        self._player.begin(count, seed)
+
+    def start(self, seat: int, episode: Episode) -> None:
+        self._player.start(seat, episode)
+
+    def act(self, observations: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
+        actions = self._player.act(observations)
+        notes = getattr(self._player, "notes", None)
+        if notes is not None:
+            self.steps.append(notes(0))
+        return actions
+
+
+def films(
+    folder: Path,
+    player: Player,
+    results: Sequence[EpisodeResult],
+    dataset: Dataset[Episode],
+    settings: Settings,
+    kind: str = "gif",
+) -> Iterator[Path]:
+    """Film the best, the median and the worst episode of an evaluation.
+
+    Each is played once more, alone, with the same random numbers, to see what led to each action.
+
+    Yields
+    ------
+    The files, each once it is written.
+    """
+    from internav_data.views import Replay, write_video  # noqa: PLC0415 - OpenCV
+    from internav_data.views.bars import Bars, bars_panel  # noqa: PLC0415
+
+    for word, result in picked(results, each=1):
+        only = load_dataset(dataset.path, dataset.split, [("episode_id", "=", result.episode_id)])
+        noting = _Noting(player)
+        alone = Settings(settings.seed, batch=1, max_steps=settings.max_steps)
+        (again,) = evaluate(noting, only, alone)
+        (episode,) = episodes_by_id(only, [result.episode_id]).values()
+        steps = [[Bars(*note) for note in notes] for notes in noting.steps]
+        panel = bars_panel(steps, SIZE) if any(steps) else None
+        replay = Replay.of(
+            only.scene(episode.scene_id), episode, only.assets, again.actions,
+            title=player.name, model=push_model_of(only),
+        )  # fmt: skip
+        path = folder / f"{word}-{result.episode_id.replace('/', '-')}.{kind}"
+        write_video(path, replay.frames(size=SIZE, fps=FPS, panel=panel), FPS)
+        yield path

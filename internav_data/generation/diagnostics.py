@@ -1,0 +1,190 @@
+"""What this machine has for generating: for `doctor` and `warmup`."""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import shutil
+import sys
+import time
+from dataclasses import dataclass
+from importlib import metadata, util
+from pathlib import Path
+from typing import Literal
+
+State = Literal["good", "warning", "bad"]
+
+WHEELS_UP_TO = (3, 11)
+"""pybullet 3.2.7 has wheels up to CPython 3.11; elsewhere it compiles for 5-9 minutes."""
+PACKAGES = {
+    "numpy": "",
+    "pyarrow": "",
+    "click": "generate",
+    "numba": "generate",
+    "networkx": "generate",
+    "opencv-python-headless": "generate",
+    "platformdirs": "generate",
+    "pybullet": "generate",
+    "scipy": "generate",
+    "shapely": "generate",
+    "trimesh": "generate",
+    "coacd": "meshes",
+}
+"""What is needed, and the extra that brings it; meshes only for assets of one's own."""
+BYTES_AN_EPISODE = 1000
+PAPER_EPISODES = 595_500
+GIB = 1 << 30
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One thing looked at."""
+
+    name: str
+    state: State
+    found: str
+    remedy: str
+    """What to do about it; empty when it is good."""
+
+
+def examine(out: Path) -> list[Check]:
+    """Return everything looked at, in a fixed order."""
+    return [
+        _python(),
+        _platform(),
+        *(_package(name, extra) for name, extra in PACKAGES.items()),
+        _cores(),
+        _memory(),
+        _disk(out),
+        _numba_cache(),
+        *_solutions(),
+    ]
+
+
+def _python() -> Check:
+    found = platform.python_version()
+    if sys.version_info[:2] <= WHEELS_UP_TO:
+        return Check("Python", "good", found, "")
+    return Check(
+        "Python",
+        "warning",
+        found,
+        "pybullet has wheels up to Python 3.11 only: pip compiles it for 5-9 minutes and needs "
+        "a C++ compiler; with Python 3.11 it installs in seconds",
+    )
+
+
+def _platform() -> Check:
+    found = f"{platform.system()} {platform.machine()}"
+    if platform.system() == "Linux":
+        return Check("platform", "good", found, "")
+    return Check("platform", "warning", found, "tested on Linux only; use a container or WSL")
+
+
+def _package(name: str, extra: str) -> Check:
+    install = f"pip install 'internav-data[{extra}]'" if extra else "pip install internav-data"
+    try:
+        found = metadata.version(name)
+    except metadata.PackageNotFoundError:
+        state: State = "warning" if extra == "meshes" else "bad"
+        use = "needed only for meshes of your own: " if extra == "meshes" else ""
+        return Check(name, state, "missing", use + install)
+    wanted = _wanted(name)
+    if wanted and _numbers(found) < _numbers(wanted):
+        return Check(name, "bad", f"{found}, older than {wanted}", f"{install} --upgrade")
+    return Check(name, "good", found, "")
+
+
+def _wanted(name: str) -> str:
+    """Return the least version that our own metadata asks for, empty for any."""
+    try:
+        requirements = metadata.requires("internav-data") or []
+    except metadata.PackageNotFoundError:
+        return ""
+    for requirement in requirements:
+        match = re.match(r"([A-Za-z0-9_.-]+)[^;]*?>=\s*([0-9.]+)", requirement)
+        if match and match[1].lower() == name:
+            return match[2]
+    return ""
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    return tuple(int(number) for number in re.findall(r"\d+", version)[:3])
+
+
+def _cores() -> Check:
+    count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return Check("cores", "good", f"{count}, so many workers by default", "")
+
+
+def _memory() -> Check:
+    pages, size = os.sysconf("SC_PHYS_PAGES"), os.sysconf("SC_PAGE_SIZE")
+    total = pages * size / GIB
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+    if total >= cores:
+        return Check("memory", "good", f"{total:.1f} GiB", "")
+    remedy = f"a worker takes up to 1 GB: use --workers {max(1, int(total))}"
+    return Check("memory", "warning", f"{total:.1f} GiB for {cores} cores", remedy)
+
+
+def _disk(out: Path) -> Check:
+    folder = out.absolute()
+    while not folder.exists():
+        folder = folder.parent
+    free = shutil.disk_usage(folder).free
+    found = f"{free / GIB:.1f} GiB free at {folder}"
+    if not os.access(folder, os.W_OK):
+        return Check("disk", "bad", f"{folder} cannot be written", "choose another folder")
+    # Unfinished work and the shards made from it lie side by side for a while.
+    if free < 2 * PAPER_EPISODES * BYTES_AN_EPISODE:
+        remedy = "the paper's 12,000 scenes take about 1.2 GB while they are made"
+        return Check("disk", "warning", found, remedy)
+    return Check("disk", "good", found, "")
+
+
+def _numba_cache() -> Check:
+    name = "numba cache"
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    spec = util.find_spec("internav_data")
+    places = list(spec.submodule_search_locations or ()) if spec else []
+    folder = Path(chosen) if chosen else Path(places[0]) / "geometry"
+    while not folder.exists():
+        folder = folder.parent
+    if os.access(folder, os.W_OK):
+        return Check(name, "good", "writable", "")
+    return Check(
+        name,
+        "warning",
+        f"{folder} cannot be written: kernels may be compiled again in every run",
+        "set NUMBA_CACHE_DIR to a folder of yours, then run `internav-gen warmup`",
+    )
+
+
+def _solutions() -> list[Check]:
+    """Look at the pushes kept on disk; nothing where a package is missing, which is told above."""
+    try:
+        from internav_data.physics import result_cache as solutions  # noqa: PLC0415 - imported when used
+    except ImportError:
+        return []
+    name = "solved pushes"
+    folder = solutions.cache_folder()
+    if folder is None:
+        return [Check(name, "good", f"none kept: {solutions.FOLDER_VARIABLE} is empty", "")]
+    path = folder / solutions.FILE_NAME
+    if solutions.Solutions(folder).is_open:
+        mb, most = path.stat().st_size / 1e6, solutions.BYTES_AT_MOST / 1e6
+        return [Check(name, "good", f"{mb:.0f} of at most {most:.0f} MB at {path}", "")]
+    remedy = f"set {solutions.FOLDER_VARIABLE} to a folder of yours, or to nothing to keep none"
+    return [Check(name, "warning", f"{path} cannot be written: none are kept", remedy)]
+
+
+def warm_up() -> float:
+    """Make a small scene, so that every kernel it needs is compiled and cached; return seconds."""
+    from internav_data.catalog import catalogue  # noqa: PLC0415
+    from internav_data.generation.config import GenerationConfig  # noqa: PLC0415 - as above
+    from internav_data.generation.scenes import build_scene  # noqa: PLC0415 - as above
+
+    began = time.perf_counter()
+    build_scene(0, GenerationConfig(), catalogue(), episodes=2)
+    return time.perf_counter() - began

@@ -1,0 +1,237 @@
+"""The physics engine of a process, with a memory that all processes of a user share.
+
+What it is asked about is plain data, and the answer depends on that alone: it is kept on disk
+(`solutions`). On free ground a thing settles and slides the same way in every house; and training
+asks again what generating has asked before.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import math
+import platform
+import struct
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import metadata
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from internav_data.physics.scene import Motion, Rest
+from internav_data.physics.sweep import PATH_POSE_BYTES
+from internav_data.records import Pose
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from internav_data.physics.result_cache import Solutions
+    from internav_data.physics.scene import Engine, Setting, Shove
+    from internav_data.records import Asset
+
+_PACKAGE: Final = "internav_data"
+_SOLVERS: Final = ("internav_data.geometry", "internav_data.physics")
+"""Packages that solutions come from: none is believed once a file that they import has changed."""
+_LIBRARIES: Final = ("pybullet", "numpy", "numba", "llvmlite")
+"""Libraries that they come from; an installed one's RECORD holds the digests of all its files."""
+_REST: Final = struct.Struct("<7d3d?")
+"""Pose; seconds, penetration, reach; at rest."""
+_MOTION: Final = struct.Struct("<d?H")
+"""Seconds, at rest, how many bodies move."""
+_MOVER: Final = struct.Struct("<7d8dI")
+"""Pose, sweep, bytes of the path; the paths themselves follow."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Remembering:
+    """An engine that is asked only what neither this process nor another one has had solved."""
+
+    engine: Engine
+    solutions: Solutions
+    origin: str
+    """What the answers depend on besides the question: engine, rules, machine."""
+
+    @property
+    def name(self) -> str:
+        """Name of the engine."""
+        return self.engine.name
+
+    @property
+    def build(self) -> str:
+        """Version and build of the engine."""
+        return self.engine.build
+
+    def settle(self, setting: Setting) -> Rest:
+        """Let the first body of the setting fall until it rests."""
+        if not self.solutions.is_open:
+            return self.engine.settle(setting)
+        key = self._key("settle", setting)
+        known = _read_rest(self.solutions.get(key))
+        if known is None:
+            known = self.engine.settle(setting)
+            self.solutions.put(key, _write_rest(known))
+        return known
+
+    def push(self, setting: Setting, shove: Shove) -> Motion:
+        """Push the first body of the setting along +x."""
+        if not self.solutions.is_open:
+            return self.engine.push(setting, shove)
+        key = self._key(repr(shove), setting)
+        known = _read_motion(self.solutions.get(key), sum(b.moves for b in setting.bodies))
+        if known is None:
+            known = self.engine.push(setting, shove)
+            self.solutions.put(key, _write_motion(known))
+        return known
+
+    def _key(self, what: str, setting: Setting) -> bytes:
+        bodies = ((_digest(b.asset), b.pose, b.moves) for b in setting.bodies)
+        asked = (self.origin, what, setting.column, *bodies)
+        return hashlib.sha256(repr(asked).encode()).digest()
+
+
+@lru_cache(maxsize=8192)
+def _digest(asset: Asset) -> str:
+    return hashlib.sha256(repr(asset).encode()).hexdigest()
+
+
+def _numbers(pose: Pose) -> tuple[float, ...]:
+    return (pose.x, pose.y, pose.z, *pose.quaternion)
+
+
+def _write_rest(rest: Rest) -> bytes:
+    numbers = (rest.seconds, rest.penetration_m, rest.reach_m)
+    return _REST.pack(*_numbers(rest.pose), *numbers, rest.at_rest)
+
+
+def _read_rest(value: bytes | None) -> Rest | None:
+    if value is None or len(value) != _REST.size:
+        return None
+    x, y, z, a, b, c, d, *numbers, at_rest = _REST.unpack(value)
+    if not all(map(math.isfinite, (x, y, z, a, b, c, d, *numbers))):
+        return None
+    seconds, penetration_m, reach_m = numbers
+    return Rest(Pose(x, y, z, (a, b, c, d)), seconds, at_rest, penetration_m, reach_m)
+
+
+def _write_motion(motion: Motion) -> bytes:
+    movers = zip(motion.poses, motion.sweeps, motion.paths, strict=True)
+    return b"".join((
+        _MOTION.pack(motion.seconds, motion.at_rest, len(motion.poses)),
+        *(_MOVER.pack(*_numbers(pose), *sweep, len(path)) for pose, sweep, path in movers),
+        *motion.paths,
+    ))  # fmt: skip
+
+
+def _read_motion(value: bytes | None, movers: int) -> Motion | None:
+    """Read a motion of so many bodies; None where it is none."""
+    at = _MOTION.size + movers * _MOVER.size
+    if value is None or len(value) < at:
+        return None
+    seconds, at_rest, count = _MOTION.unpack_from(value)
+    rows = list(_MOVER.iter_unpack(value[_MOTION.size : at]))
+    if count != movers or not all(math.isfinite(n) for n in (seconds, *chain(*rows))):
+        return None
+    poses, sweeps, paths = [], [], []
+    for x, y, z, qx, qy, qz, qw, a, b, c, d, e, f, g, h, size in rows:
+        poses.append(Pose(x, y, z, (qx, qy, qz, qw)))
+        sweeps.append((a, b, c, d, e, f, g, h))
+        paths.append(value[at : at + size])
+        at += size
+    if len(value) != at or not all(path and len(path) % PATH_POSE_BYTES == 0 for path in paths):
+        return None
+    return Motion(tuple(poses), tuple(sweeps), tuple(paths), seconds, at_rest)
+
+
+def solver_modules(root: Path, start: tuple[str, ...] = _SOLVERS) -> dict[str, Path]:
+    """Return the modules that solutions come from, found by walking imports.
+
+    Parameters
+    ----------
+    root : Path
+        Directory that holds the package `internav_data`.
+    start : tuple of str
+        Packages to begin at: all of their modules count, and every module of ours that one of
+        these imports, at its top or inside a function. Imports for type checkers do not count.
+
+    Returns
+    -------
+    dict of str to Path
+        Source file by dotted module name, ascending.
+    """
+    waiting = list(start)
+    for package in start:
+        folder = root.joinpath(*package.split("."))
+        waiting += [
+            ".".join(file.relative_to(root).with_suffix("").parts)
+            for file in folder.rglob("*.py")
+            if file.name != "__init__.py"
+        ]
+    found: dict[str, Path] = {}
+    while waiting:
+        name = waiting.pop()
+        file = _source_of(root, name)
+        if file is None or name in found:
+            continue
+        found[name] = file
+        waiting += [name.rpartition(".")[0], *_imported(file)]
+    return dict(sorted(found.items()))
+
+
+def _source_of(root: Path, name: str) -> Path | None:
+    """Return the file of one of our modules; None where a name is no module."""
+    if name.split(".", maxsplit=1)[0] != _PACKAGE:
+        return None
+    stem = root.joinpath(*name.split("."))
+    files = (stem.with_suffix(".py"), stem / "__init__.py")
+    return next((file for file in files if file.is_file()), None)
+
+
+def _imported(file: Path) -> list[str]:
+    """Return what a file imports when it runs: modules, and names that may be modules."""
+
+    def walk(node: ast.AST) -> Iterator[str]:
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
+            return
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module is not None:
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        for child in ast.iter_child_nodes(node):
+            yield from walk(child)
+
+    return list(walk(ast.parse(file.read_bytes())))
+
+
+def code_digest(root: Path, start: tuple[str, ...] = _SOLVERS) -> str:
+    """Return the sha256 (hex) over names and sources of `solver_modules`."""
+    code = hashlib.sha256()
+    for name, file in solver_modules(root, start).items():
+        source = file.read_bytes()
+        code.update(f"{name} {len(source)} ".encode() + source)
+    return code.hexdigest()
+
+
+_CODE: Final = code_digest(Path(__file__).parents[2])
+"""Of the files as they were imported: they may change while a process lives."""
+
+
+@lru_cache(maxsize=1)
+def origin(build: str) -> str | None:
+    """Return what answers depend on besides the question; None where that cannot be told.
+
+    Another build of a library, and a processor with other instructions, may round otherwise.
+    """
+    from llvmlite.binding import get_host_cpu_features, get_host_cpu_name  # noqa: PLC0415 - heavy
+
+    try:
+        libraries = [metadata.distribution(name).read_text("RECORD") for name in _LIBRARIES]
+    except metadata.PackageNotFoundError:
+        return None
+    if None in libraries:
+        return None
+    records = hashlib.sha256("".join(map(str, libraries)).encode()).hexdigest()
+    system = f"{platform.system()} {'-'.join(platform.libc_ver())} {platform.python_version()}"
+    processor = f"{platform.machine()} {get_host_cpu_name()} {get_host_cpu_features().flatten()}"
+    return f"{build}, {_CODE}, {records}, {system}, {processor}"

@@ -1,0 +1,177 @@
+"""Bullet as the physics engine: one client a process, a scene of plain data at each call."""
+
+from __future__ import annotations
+
+import atexit
+import math
+import os
+import shutil
+import tempfile
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from internav_data.geometry import centre_of_mass, multiply, rotation_matrix
+from internav_data.physics.engines.bullet_scene import RULES, STEP_S, Builder, pybullet
+from internav_data.physics.scene import Motion, Rest
+from internav_data.physics.sweep import radius_m, trail_of
+from internav_data.records import Pose
+
+if TYPE_CHECKING:
+    from internav_data.physics.scene import Setting, Shove
+    from internav_data.records import Asset
+
+
+REST_SPEED = 0.001
+"""m/s."""
+REST_SPIN = 0.01
+"""rad/s."""
+SHIFT_M = 10.0 * REST_SPEED * STEP_S
+"""What came farther than this in one step is not slow: its speed need not be asked."""
+REST_STEPS = 10
+"""A thing is at rest once it was slow for this many steps running."""
+SETTLE_LIMIT_S = 1.0
+CREEP_STEPS = 24
+CREEP_M = REST_SPEED * CREEP_STEPS * STEP_S
+"""At rest is also what came no farther in 0.1 s than the rest speed allows: 0.1 mm, 1 mrad."""
+CREEP_RAD = REST_SPIN * CREEP_STEPS * STEP_S
+PUSH_LIMIT_S = 5.0
+"""From letting go; what still rolls then stays where it is."""
+_ASLEEP = (
+    pybullet.ACTIVATION_STATE_ENABLE_SLEEPING
+    | pybullet.ACTIVATION_STATE_ENABLE_WAKEUP
+    | pybullet.ACTIVATION_STATE_SLEEP
+)
+
+
+@dataclass(slots=True, eq=False)
+class Bullet:
+    """The engine of `internav_data.physics.scene.Engine`, on one DIRECT client."""
+
+    _builder: Builder
+    name: str = "bullet"
+    build: str = field(default_factory=lambda: f"pybullet {version('pybullet')}, rules {RULES}")
+
+    def settle(self, setting: Setting) -> Rest:
+        """Let the first body fall until at rest, one second at most."""
+        ids = self._builder.build(setting)
+        body = setting.bodies[0]
+        radius = radius_m(body.asset)
+        start, start_turn = pybullet.getBasePositionAndOrientation(ids[0], self._builder.client)
+        reach, calm, steps = 0.0, 0, 0
+        limit = round(SETTLE_LIMIT_S / STEP_S)
+        while steps < limit and calm < REST_STEPS:
+            pybullet.stepSimulation(self._builder.client)
+            steps += 1
+            speed, spin = pybullet.getBaseVelocity(ids[0], self._builder.client)
+            slow = math.hypot(*speed) < REST_SPEED and math.hypot(*spin) < REST_SPIN
+            calm = calm + 1 if slow else 0
+            now, turn = pybullet.getBasePositionAndOrientation(ids[0], self._builder.client)
+            shift = math.hypot(now[0] - start[0], now[1] - start[1])
+            reach = max(reach, shift + radius * _angle(start_turn, turn))
+        return Rest(
+            pose=self._pose(ids[0], body.asset),
+            seconds=steps * STEP_S,
+            at_rest=calm >= REST_STEPS,
+            penetration_m=self._penetration(ids[0]),
+            reach_m=reach,
+        )
+
+    def push(self, setting: Setting, shove: Shove) -> Motion:
+        """Push the first body along +x, let it go, and wait until all that moves is at rest."""
+        ids = self._builder.build(setting)
+        client = self._builder.client
+        moving = [k for k, body in enumerate(setting.bodies) if body.moves]
+        pushes_left = round(shove.seconds / STEP_S)
+        limit = pushes_left + round(PUSH_LIMIT_S / STEP_S)
+        trails = [trail_of(setting.bodies[k].asset, limit) for k in moving]
+        movers = [(ids[k], trail) for k, trail in zip(moving, trails, strict=True)]
+        for mover, _ in movers[1:]:
+            # What is not touched neither trembles nor costs time; a touch wakes it.
+            pybullet.changeDynamics(mover, -1, activationState=_ASLEEP, physicsClientId=client)
+        for mover, trail in movers:
+            trail.follow(*pybullet.getBasePositionAndOrientation(mover, client))
+        gain = shove.force_n / setting.bodies[0].asset.mass_kg * STEP_S
+        calm, steps, rests = 0, 0, False
+        while steps < limit and not rests:
+            if pushes_left:
+                pushes_left = self._shove(ids[0], shove, gain, pushes_left)
+            pybullet.stepSimulation(client)
+            steps += 1
+            slow = not pushes_left
+            for mover, trail in movers:
+                shift = trail.follow(*pybullet.getBasePositionAndOrientation(mover, client))
+                slow = slow and shift < SHIFT_M and self._slow(mover)
+            calm = calm + 1 if slow else 0
+            rests = calm >= REST_STEPS
+            if steps % CREEP_STEPS == 0:
+                # What only trembles is at rest too; what has not yielded to a constant push
+                # by now never will.
+                crept = [trail.crept(CREEP_M, CREEP_RAD) for trail in trails]
+                rests = rests or not any(crept)
+        return Motion(
+            poses=tuple(self._pose(ids[k], setting.bodies[k].asset) for k in moving),
+            sweeps=tuple(trail.octagon for trail in trails),
+            paths=tuple(trail.path for trail in trails),
+            seconds=steps * STEP_S,
+            at_rest=rests,
+        )
+
+    def _slow(self, identity: int) -> bool:
+        """Whether a body's speed and spin are those of one at rest."""
+        speed, spin = pybullet.getBaseVelocity(identity, self._builder.client)
+        return math.hypot(*speed) < REST_SPEED and math.hypot(*spin) < REST_SPIN
+
+    def _shove(self, identity: int, shove: Shove, gain: float, pushes_left: int) -> int:
+        """Push for one step; returns how many steps of pushing are left."""
+        speed, spin = pybullet.getBaseVelocity(identity, self._builder.client)
+        if speed[0] + gain >= shove.speed_m_s:
+            # The last impulse: just what is missing.
+            missing = (shove.speed_m_s, speed[1], speed[2])
+            pybullet.resetBaseVelocity(identity, missing, spin, self._builder.client)
+            return 0
+        middle, _ = pybullet.getBasePositionAndOrientation(identity, self._builder.client)
+        force = (shove.force_n, 0.0, 0.0)
+        pybullet.applyExternalForce(
+            identity, -1, force, middle, pybullet.WORLD_FRAME, self._builder.client
+        )
+        return pushes_left - 1
+
+    def _pose(self, identity: int, asset: Asset) -> Pose:
+        """Pose of the asset's frame; Bullet reports that of the centre of mass."""
+        position, turn = pybullet.getBasePositionAndOrientation(identity, self._builder.client)
+        offset = rotation_matrix(turn) @ centre_of_mass(asset)
+        x, y, z = (float(p - o) for p, o in zip(position, offset, strict=True))
+        return Pose(x, y, z, (turn[0], turn[1], turn[2], turn[3]))
+
+    def _penetration(self, identity: int) -> float:
+        client = self._builder.client
+        contacts: Any = pybullet.getContactPoints(bodyA=identity, physicsClientId=client)
+        depths = [-contact[8] for contact in contacts]
+        return max(0.0, *depths) if depths else 0.0
+
+
+def _angle(first: tuple[float, ...], second: tuple[float, ...]) -> float:
+    """Angle between two orientations, radians."""
+    inverse = (-first[0], -first[1], -first[2], first[3])
+    x, y, z, w = multiply(inverse, (second[0], second[1], second[2], second[3]))
+    return 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), abs(w))
+
+
+def bullet() -> Bullet:
+    """Return this process's Bullet: connected at first use, its files removed at exit."""
+    return _of_process(os.getpid())
+
+
+@cache  # a forked process has its own: two of them would write each other's files
+def _of_process(pid: int) -> Bullet:
+    folder = Path(tempfile.mkdtemp(prefix="internav-"))
+    atexit.register(_remove, folder, pid)
+    return Bullet(Builder(pybullet.connect(pybullet.DIRECT), folder))
+
+
+def _remove(folder: Path, pid: int) -> None:
+    if pid == os.getpid():
+        shutil.rmtree(folder, ignore_errors=True)

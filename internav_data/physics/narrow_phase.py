@@ -1,0 +1,226 @@
+"""Touch: what a moving body really comes near, part by part along its path (numba kernels).
+
+Octagons say at once that most of a house is out of reach. Among furniture they say little: a chair
+that is pulled out from under a table overlaps it in the plane. Here parts are compared, by their
+plans and heights, at every pose of the path.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from internav_data.geometry import asset_corners, transform
+from internav_data.geometry.footprints import convex_hull
+from internav_data.geometry.headings import HEADINGS
+from internav_data.physics.sweep import about_middle
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from internav_data.physics.frames import Frame
+    from internav_data.records import Asset, Pose
+
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
+    Flags = NDArray[np.bool_]
+
+SIDES: Final = 32
+"""Sides of the prism round the agent's column: it stands out by 0.5 % of the radius at most."""
+
+
+class Outline(NamedTuple):
+    """The convex parts of a thing where it lies, as plans and heights, metres.
+
+    Shapes: vertices (n, 2), counter-clockwise plan after plan; starts (parts + 1,) int64 into
+    them; boxes (parts, 6): how far each part reaches along +x, +y, -x, -y, +z and -z.
+    """
+
+    vertices: Floats
+    starts: Ints
+    boxes: Floats
+
+
+@lru_cache(maxsize=8192)
+def outline_of(asset: Asset, pose: Pose) -> Outline:
+    """Outline of a thing where it lies; cached, read-only."""
+    corners, starts = asset_corners(asset)
+    placed = transform(corners, pose)
+    boxes = np.empty((len(starts), 6))
+    _boxes(placed, starts, boxes)
+    vertices, firsts = _plans(placed, starts)
+    return Outline(vertices, firsts, boxes[:-1].copy())
+
+
+def outline_of_column(x: float, y: float, radius: float, low: float, high: float) -> Outline:
+    """Outline of the prism round an upright cylinder, metres."""
+    out = radius / math.cos(math.pi / SIDES)
+    angles = [2.0 * math.pi * k / SIDES for k in range(SIDES)]
+    vertices = [(x + out * math.cos(a), y + out * math.sin(a)) for a in angles]
+    box = [x + radius, y + radius, radius - x, radius - y, high, -low]
+    return Outline(np.array(vertices), np.array([0, SIDES], dtype=np.int64), np.array([box]))
+
+
+@njit(cache=True)
+def _plans(corners: Floats, starts: Ints) -> tuple[Floats, Ints]:
+    """Plans of parts (n, 3) as one array of vertices and where each begins."""
+    vertices = np.empty((len(corners), 2))
+    firsts = np.zeros_like(starts)
+    count = 0
+    for part in range(len(starts) - 1):
+        hull = convex_hull(corners[starts[part] : starts[part + 1], :2].copy())
+        vertices[count : count + len(hull)] = hull
+        count += len(hull)
+        firsts[part + 1] = count
+    return vertices[:count].copy(), firsts
+
+
+@njit(cache=True)
+def _place(
+    pose: Floats,
+    corners: Floats,
+    turn: tuple[float, float],
+    shift: tuple[float, float],
+    out: Floats,
+) -> None:
+    """Corners (n, 3) of a body at a pose of its own frame, in the house."""
+    qx, qy, qz, qw = pose[3], pose[4], pose[5], pose[6]
+    s = 2.0 / (qx * qx + qy * qy + qz * qz + qw * qw)
+    a, b, c = 1.0 - s * (qy * qy + qz * qz), s * (qx * qy - qz * qw), s * (qx * qz + qy * qw)
+    d, e, f = s * (qx * qy + qz * qw), 1.0 - s * (qx * qx + qz * qz), s * (qy * qz - qx * qw)
+    g, h, i = s * (qx * qz - qy * qw), s * (qy * qz + qx * qw), 1.0 - s * (qx * qx + qy * qy)
+    for k in range(len(corners)):
+        u, v, w = corners[k, 0], corners[k, 1], corners[k, 2]
+        x, y = a * u + b * v + c * w + pose[0], d * u + e * v + f * w + pose[1]
+        out[k, 0] = turn[0] * x - turn[1] * y + shift[0]
+        out[k, 1] = turn[1] * x + turn[0] * y + shift[1]
+        out[k, 2] = g * u + h * v + i * w + pose[2]
+
+
+@njit(cache=True)
+def _boxes(corners: Floats, starts: Ints, out: Floats) -> None:
+    """Boxes (parts + 1, 6) of parts, and of all."""
+    parts = len(starts) - 1
+    out[:] = -math.inf
+    for part in range(parts):
+        for k in range(starts[part], starts[part + 1]):
+            x, y, z = corners[k, 0], corners[k, 1], corners[k, 2]
+            out[part, 0], out[part, 2] = max(out[part, 0], x), max(out[part, 2], -x)
+            out[part, 1], out[part, 3] = max(out[part, 1], y), max(out[part, 3], -y)
+            out[part, 4], out[part, 5] = max(out[part, 4], z), max(out[part, 5], -z)
+        for d in range(6):
+            out[parts, d] = max(out[parts, d], out[part, d])
+
+
+@njit(cache=True)
+def _apart(box: Floats, other: Floats, margin: float) -> bool:
+    """Whether two boxes keep more than a margin."""
+    for d in range(4):
+        if box[d] + other[(d + 2) % 4] < -margin:
+            return True
+    return box[4] + other[5] < -margin or box[5] + other[4] < -margin
+
+
+@njit(cache=True)
+def _sided(hull: Floats, other: Floats, margin: float) -> bool:
+    """Whether a side of a convex polygon keeps more than a margin from all of another one."""
+    count = len(hull)
+    for k in range(count):
+        following = k + 1 if k + 1 < count else 0
+        # Outwards, to the right of a counter-clockwise side.
+        nx, ny = hull[following, 1] - hull[k, 1], hull[k, 0] - hull[following, 0]
+        bound = nx * hull[k, 0] + ny * hull[k, 1] + margin * math.hypot(nx, ny)
+        beyond = True
+        for v in range(len(other)):
+            if nx * other[v, 0] + ny * other[v, 1] <= bound:
+                beyond = False
+                break
+        if beyond:
+            return True
+    return False
+
+
+@njit(cache=True)
+def _meets(
+    corners: Floats, starts: Ints, boxes: Floats, plan: Floats, box: Floats, margin: float
+) -> bool:
+    """Whether a placed body comes within a margin of one part of another."""
+    parts = len(starts) - 1
+    if _apart(boxes[parts], box, margin):
+        return False
+    for part in range(parts):
+        if _apart(boxes[part], box, margin):
+            continue
+        own = corners[starts[part] : starts[part + 1], :2]
+        if not _sided(plan, own, margin) and not _sided(convex_hull(own.copy()), plan, margin):
+            return True
+    return False
+
+
+@njit(cache=True)
+def _met(
+    path: NDArray[np.float32],
+    corners: Floats,
+    starts: Ints,
+    turn: tuple[float, float],
+    shift: tuple[float, float],
+    vertices: Floats,
+    firsts: Ints,
+    others: Floats,
+    owners: Ints,
+    margin: float,
+) -> Flags:
+    met = np.zeros(owners[-1] + 1, dtype=np.bool_)
+    placed, boxes = np.empty_like(corners), np.empty((len(starts), 6))
+    for k in range(len(path)):
+        _place(path[k].astype(np.float64), corners, turn, shift, placed)
+        _boxes(placed, starts, boxes)
+        for part in range(len(owners)):
+            if not met[owners[part]]:
+                plan = vertices[firsts[part] : firsts[part + 1]]
+                met[owners[part]] = _meets(placed, starts, boxes, plan, others[part], margin)
+    return met
+
+
+def met_on_path(
+    asset: Asset, path: bytes, frame: Frame, others: Sequence[Outline], margin: float
+) -> list[bool]:
+    """Which of some outlines a body comes within a margin of on its path.
+
+    Parameters
+    ----------
+    asset
+        What moves.
+    path
+        Its poses in a frame (`Motion.paths`).
+    frame
+        That frame.
+    others
+        Outlines in the house.
+    margin
+        Metres.
+    """
+    if not others:
+        return []
+    sizes = np.concatenate([np.diff(other.starts) for other in others])
+    owners = np.repeat(np.arange(len(others)), [len(other.boxes) for other in others])
+    _, starts = asset_corners(asset)
+    met: list[bool] = _met(
+        np.frombuffer(path, dtype=np.float32).reshape(-1, 7),
+        about_middle(asset),
+        starts,
+        HEADINGS[frame.heading],
+        (frame.x, frame.y),
+        np.concatenate([other.vertices for other in others]),
+        np.concatenate([[0], np.cumsum(sizes)]),
+        np.concatenate([other.boxes for other in others]),
+        owners,
+        margin,
+    ).tolist()
+    return met

@@ -1,0 +1,278 @@
+"""Push: where a thing and what it meets come to rest when somebody pushes it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final, Literal
+
+from internav_data.geometry import round_m
+from internav_data.physics.displacement import is_still, shift_m, tilt_deg
+from internav_data.physics.frames import Frame
+from internav_data.physics.kdop import grown
+from internav_data.physics.narrow_phase import met_on_path, outline_of, outline_of_column
+from internav_data.physics.registry import engine_of_this_process
+from internav_data.physics.scene import AGENT_HEIGHT_M, AGENT_LOW_M, Body, Column, Setting, Shove
+from internav_data.physics.sweep import extent_of
+from internav_data.records import Pose
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Container, Sequence
+
+    from internav_data.physics.kdop import Octagon
+    from internav_data.physics.scene import Engine, Motion
+    from internav_data.records import Asset, Quaternion, Vec2
+
+    Near = Callable[[Octagon], Sequence[tuple[int, Body]]]
+    """Bodies, with their keys in ascending order, that reach into an octagon of the house."""
+    Movers = tuple[tuple[int, Body], ...]
+    """Bodies that move besides what is pushed, with their keys."""
+
+PushModel = Literal["force", "kick"]
+SHOVES: Final[dict[PushModel, Shove]] = {
+    "force": Shove(force_n=200.0, speed_m_s=2.0, seconds=0.5),
+    "kick": Shove(force_n=math.inf, speed_m_s=2.0, seconds=0.5),
+}
+"""The paper's constant force, and the released code's 2 m/s for every mass."""
+SUCCESS_M: Final = 0.05
+"""What moved less was not pushed."""
+TOPPLED_DEG: Final = 45.0
+TOUCH_M: Final = 0.005
+"""Bodies this near may touch: the engine's hulls are thicker by a margin of 1 mm."""
+MEET_M: Final = 0.012
+"""What a body's kept poses come this near of may touch it: poses lie up to 1 cm apart, so what lies
+between them is missed by half of that at most."""
+AGENT_M: Final = 0.21
+"""Radius of the agent's column: nothing ends inside its disc of 0.2 m."""
+AGENT_LEAST_M: Final = 0.2005
+"""What already stands nearer than the column is not pressed away by it."""
+ROUNDS: Final = 8
+"""What was reached though it was left out joins the next round; the last one takes all within
+`FAR_M`."""
+FAR_M: Final = 4.0
+ON_M: Final = 0.2
+"""How far round what is met more may be met: a guess of how many things will move."""
+_HEIGHT_DIGITS: Final = 3
+"""What settled lies 0.9 or 1.0 mm high: one solution serves both."""
+_START_DIGITS: Final = 4
+"""Orientations of a free push are rounded to 0.1 mrad, which moves a corner by less than the 0.1 mm
+of stored positions: nearly equal ones share their solution."""
+
+_OWN: Final = Frame(0.0, 0.0, 0)
+
+Failure = Literal["", "too heavy", "something is in the way", "the agent is in the way"]
+
+
+@dataclass(frozen=True, slots=True)
+class Pushed:
+    """Where everything lies after a push, rounded as it will be stored.
+
+    It is the whole truth also where the push failed: whoever applies it decides what stays.
+    """
+
+    pose: Pose
+    displacement_m: float
+    """How far the thing's centre of mass moved in the plane."""
+    seconds: float
+    toppled: bool
+    moved: tuple[tuple[int, Pose], ...]
+    """Neighbours that moved: their keys, ascending, and new poses."""
+    success: bool
+    reason: Failure
+    at_rest: bool
+    """False when something still rolled after five seconds."""
+
+
+def push(
+    asset: Asset,
+    pose: Pose,
+    heading: int,
+    near: Near,
+    agent: Vec2 | None = None,
+    *,
+    agent_gap_m: float = math.inf,
+    model: PushModel = "force",
+) -> Pushed:
+    """Push a thing along one of the house's four headings.
+
+    Solved in its own frame: the thing at the origin, the push along +x. Where nothing reaches into
+    what it sweeps on free ground, the free solution (once per asset, orientation relative to the
+    push and height) is moved into place.
+
+    Parameters
+    ----------
+    asset, pose
+        What is pushed, and where it lies.
+    heading
+        0, 1, 2, 3: along +x, +y, -x, -y.
+    near
+        Gathers what else reaches into an octagon, without the thing itself.
+    agent
+        Where the agent stands; None without it.
+    agent_gap_m
+        Least distance from the agent's axis to anything that can move.
+    model
+        "force" or "kick".
+
+    """
+    shove = SHOVES[model]
+    frame = Frame(pose.x, pose.y, heading)
+    start = _start(frame, pose)
+    motion = free = _push_alone(asset, start, shove, engine_of_this_process())
+    movers: Movers = ()
+    failure: Failure = "too heavy"
+
+    def moves() -> bool:
+        return shift_m(asset, pose, frame.leave(motion.poses[0])) >= SUCCESS_M
+
+    # What is too heavy alone is not lighter among others, nor freer beside the agent.
+    known = _met(frame, near, (asset,), free) if moves() else {}
+    if known:
+        failure = "something is in the way"
+        motion, movers = _push_among(asset, start, frame, near, None, shove, known)
+    column = _column(frame, agent, agent_gap_m)
+    if column is not None and moves() and _meets(column, (asset, *_assets(movers)), motion):
+        # Only now: what never comes near the agent is solved once, wherever it stands.
+        failure = "the agent is in the way"
+        motion, movers = _push_among(asset, start, frame, near, column, shove, known)
+    return _judged(asset, pose, frame, motion, movers, failure)
+
+
+def crowd(asset: Asset, pose: Pose, heading: int, near: Near, model: PushModel = "force") -> int:
+    """Count the things that may be moved besides what is pushed: what a push will cost to solve.
+
+    Parameters as in `push`.
+    """
+    frame = Frame(pose.x, pose.y, heading)
+    free = _push_alone(asset, _start(frame, pose), SHOVES[model], engine_of_this_process())
+    if shift_m(asset, pose, frame.leave(free.poses[0])) < SUCCESS_M:
+        return 0
+
+    def loose(octagon: Octagon) -> list[tuple[int, Body]]:
+        return [pair for pair in near(octagon) if pair[1].moves]
+
+    known = _met(frame, loose, (asset,), free)
+    for body in list(known.values()):
+        known.update(loose(grown(extent_of(body.asset, body.pose).octagon, ON_M)))
+    return len(known)
+
+
+def _start(frame: Frame, pose: Pose) -> Pose:
+    return Pose(0.0, 0.0, round(pose.z, _HEIGHT_DIGITS), _coarse(frame.enter(pose).quaternion))
+
+
+@lru_cache(maxsize=32768)
+def _push_alone(asset: Asset, start: Pose, shove: Shove, engine: Engine) -> Motion:
+    return engine.push(Setting((Body(asset, start, moves=True),)), shove)
+
+
+@lru_cache(maxsize=4096)
+def _push_in(setting: Setting, shove: Shove, engine: Engine) -> Motion:
+    """Push in a scene; what failed changed nothing and is likely to be tried again."""
+    return engine.push(setting, shove)
+
+
+def _push_among(
+    asset: Asset,
+    start: Pose,
+    frame: Frame,
+    near: Near,
+    column: Column | None,
+    shove: Shove,
+    known: dict[int, Body],
+) -> tuple[Motion, Movers]:
+    """Push among what is touched: solved anew until nothing left out is.
+
+    What turns out to be touched joins `known`.
+    """
+    engine = engine_of_this_process()
+    for left in reversed(range(ROUNDS)):
+        around = [(key, known[key]) for key in sorted(known)]
+        movers = tuple(pair for pair in around if pair[1].moves)
+        others = [pair for pair in around if not pair[1].moves]
+        bodies = (
+            Body(body.asset, frame.enter(body.pose), body.moves) for _, body in (*movers, *others)
+        )
+        setting = Setting((Body(asset, start, moves=True), *bodies), column)
+        motion = _push_in(setting, shove, engine)
+        met = _met(frame, near, (asset, *_assets(movers)), motion, known)
+        if not met:
+            break
+        known.update(met)
+        if left == 1:
+            for sweep in motion.sweeps:
+                known.update(near(grown(frame.leave_octagon(sweep), FAR_M)))
+    return motion, movers
+
+
+def _assets(movers: Movers) -> tuple[Asset, ...]:
+    return tuple(body.asset for _, body in movers)
+
+
+def _met(
+    frame: Frame,
+    near: Near,
+    moving: Sequence[Asset],
+    motion: Motion,
+    known: Container[int] = (),
+) -> dict[int, Body]:
+    """Gather what is not known yet and may be touched by what moves."""
+    found: dict[int, Body] = {}
+    for asset, sweep, path in zip(moving, motion.sweeps, motion.paths, strict=True):
+        around = near(grown(frame.leave_octagon(sweep), MEET_M))
+        asked = [pair for pair in around if pair[0] not in known and pair[0] not in found]
+        outlines = [outline_of(body.asset, body.pose) for _, body in asked]
+        met = met_on_path(asset, path, frame, outlines, MEET_M)
+        found.update(pair for pair, touched in zip(asked, met, strict=True) if touched)
+    return found
+
+
+def _judged(
+    asset: Asset,
+    pose: Pose,
+    frame: Frame,
+    motion: Motion,
+    movers: Movers,
+    failure: Failure,
+) -> Pushed:
+    """Move a motion from the thing's own frame into the house, round it, and judge it."""
+    end = frame.leave(motion.poses[0])
+    far = round_m(shift_m(asset, pose, end))
+    moved = []
+    for (key, body), after in zip(movers, motion.poses[1:], strict=True):
+        there = frame.leave(after)
+        if not is_still(body.pose, there):
+            moved.append((key, there))
+    success = far >= SUCCESS_M
+    return Pushed(
+        pose=end,
+        displacement_m=far,
+        seconds=round(motion.seconds, 6),
+        toppled=tilt_deg(pose.quaternion, end.quaternion) > TOPPLED_DEG,
+        moved=tuple(moved),
+        success=success,
+        reason="" if success else failure,
+        at_rest=motion.at_rest,
+    )
+
+
+def _coarse(quaternion: Quaternion) -> Quaternion:
+    x, y, z, w = (round(q, _START_DIGITS) + 0.0 for q in quaternion)
+    return x, y, z, w
+
+
+def _column(frame: Frame, agent: Vec2 | None, gap: float) -> Column | None:
+    if agent is None:
+        return None
+    x, y = frame.enter_point(agent)
+    return Column(x, y, min(AGENT_M, max(AGENT_LEAST_M, round_m(gap))))
+
+
+def _meets(column: Column, moving: Sequence[Asset], motion: Motion) -> bool:
+    """Whether anything that moves comes near the agent's column."""
+    agent = outline_of_column(column.x, column.y, column.radius_m, AGENT_LOW_M, AGENT_HEIGHT_M)
+    return any(
+        any(met_on_path(asset, path, _OWN, [agent], MEET_M))
+        for asset, path in zip(moving, motion.paths, strict=True)
+    )

@@ -1,0 +1,119 @@
+"""Settle: where a spawned thing comes to rest, and whether it may stay there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from internav_data.geometry import multiply, rotation_matrix, round_m, round_quaternion
+from internav_data.physics.registry import engine_of_this_process
+from internav_data.physics.scene import UPRIGHT, Body, Setting
+from internav_data.records import Pose
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from internav_data.physics.scene import Engine, Rest
+    from internav_data.records import Asset
+
+DROP_M = 0.01
+"""Height above the floor from which a thing is let go."""
+MAX_SHIFT_M = 0.05
+MAX_TILT_DEG = 5.0
+MAX_PENETRATION_M = 0.002
+MARGIN_M = 0.001
+"""What counts as out of reach keeps this much more distance than the thing ever moved."""
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """Where a thing came to rest, rounded as it will be stored, and the certificate."""
+
+    pose: Pose
+    seconds: float
+    penetration_m: float
+    refusal: str
+    """Why it may not stay: empty when it may."""
+
+
+def settle(
+    asset: Asset,
+    pose: Pose,
+    clearance_m: float,
+    neighbours: Callable[[], Sequence[Body]],
+) -> Settled:
+    """Let a thing fall 1 cm onto the floor at an upright pose.
+
+    The problem is solved in the thing's own frame. Where nothing lies within `clearance_m` of
+    its footprint and it never moves that far, it falls as if alone: that is solved once per asset
+    and moved into place.
+
+    Parameters
+    ----------
+    asset, pose
+        What to let go, and where; z is the floor it will stand on.
+    clearance_m
+        Distance in the plane from its footprint to everything else, metres.
+    neighbours
+        Gathers what can be touched, things and walls; called only when the free fall reaches
+        farther than the clearance.
+
+    """
+    engine = engine_of_this_process()
+    rest = _settle_alone(asset, engine)
+    if rest.reach_m + MARGIN_M > clearance_m:
+        rest = engine.settle(_setting(asset, pose, neighbours()))
+    return _judged(pose, rest)
+
+
+@lru_cache(maxsize=8192)
+def _settle_alone(asset: Asset, engine: Engine) -> Rest:
+    return engine.settle(Setting((Body(asset, _START, moves=True),)))
+
+
+_START = Pose(0.0, 0.0, DROP_M, UPRIGHT)
+
+
+def _setting(asset: Asset, pose: Pose, neighbours: Sequence[Body]) -> Setting:
+    bodies = (Body(b.asset, _seen_from(pose, b.pose), moves=False) for b in neighbours)
+    return Setting((Body(asset, _START, moves=True), *bodies))
+
+
+def _seen_from(frame: Pose, pose: Pose) -> Pose:
+    """Pose of a neighbour in the frame of an upright thing, rounded."""
+    x, y, z, w = frame.quaternion
+    back = (-x, -y, -z, w)
+    dx, dy, dz = pose.x - frame.x, pose.y - frame.y, pose.z - frame.z
+    px, py, pz = (row[0] * dx + row[1] * dy + row[2] * dz for row in rotation_matrix(back))
+    turned = round_quaternion(multiply(back, pose.quaternion))
+    return Pose(round_m(px), round_m(py), round_m(pz), turned)
+
+
+def _judged(pose: Pose, rest: Rest) -> Settled:
+    """Move a rest from the thing's own frame into the house, round it, and judge it."""
+    shift = rest.pose
+    dx, dy, dz = (
+        row[0] * shift.x + row[1] * shift.y + row[2] * shift.z
+        for row in rotation_matrix(pose.quaternion)
+    )
+    settled = Pose(
+        round_m(pose.x + dx),
+        round_m(pose.y + dy),
+        round_m(pose.z + dz),
+        round_quaternion(multiply(pose.quaternion, shift.quaternion)),
+    )
+    tilt = math.degrees(
+        math.acos(max(-1.0, min(1.0, float(rotation_matrix(shift.quaternion)[2, 2]))))
+    )
+    refusal = ""
+    if not rest.at_rest:
+        refusal = "did not come to rest"
+    elif math.hypot(shift.x, shift.y) > MAX_SHIFT_M:
+        refusal = "moved too far"
+    elif tilt > MAX_TILT_DEG:
+        refusal = "tilted too far"
+    elif rest.penetration_m > MAX_PENETRATION_M:
+        refusal = "sank in too deep"
+    return Settled(settled, round(rest.seconds, 6), round(rest.penetration_m, 6), refusal)

@@ -1,0 +1,151 @@
+"""What the expert plans over: what closes the lattice for good, and who blocks the rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from internav_data.navigation import SPACING_M, grid
+from internav_data.planner.cost_to_go import descend, field
+from internav_data.records.agent import CLEARANCE_M
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from internav_data.world import Item, Stage, World
+
+    Costs = NDArray[np.int32]
+    Ints = NDArray[np.int64]
+    Flags = NDArray[np.uint8]
+
+THINGS_AT_MOST: Final = 62
+"""Bits of a mask; things beyond, the farthest from the start and the goal, count as fixed."""
+PICK_PRICE: Final = 1
+PUSH_PRICE: Final = 2
+FURNITURE_PRICE: Final = 2
+DROP_PRICE: Final = 2
+"""What moving a thing out of the way costs at a guess. A low one searches more and finds more."""
+EVERYTHING: Final = (1 << THINGS_AT_MOST) - 1
+"""All movable things banned: the lattice as it lies."""
+
+
+@lru_cache(maxsize=8)
+def _closed(stage: Stage) -> Flags:
+    """(3, nodes) uint8: what is closed with every movable thing away; cached, read-only."""
+    nx, ny = stage.lattice.shape
+    blockers = np.zeros((3, nx, ny), dtype=np.int32)
+    corners = np.ascontiguousarray(stage.house.outline, dtype=np.float64)
+    grid.close_outside(blockers, corners, SPACING_M)
+    plans = stage.footprints
+    grid.mark(blockers, plans.vertices, plans.offsets, SPACING_M, CLEARANCE_M, 1)
+    flags: Flags = (blockers.reshape(3, -1) > 0).astype(np.uint8)
+    return flags
+
+
+@lru_cache(maxsize=2048)
+def _marks(item: Item, nx: int, ny: int) -> Ints:
+    """Which nodes and edges a thing blocks, as indices into a flat (3, nx, ny)."""
+    blockers = np.zeros((3, nx, ny), dtype=np.int32)
+    plan = item.footprint
+    grid.mark(blockers, plan.vertices, plan.offsets, SPACING_M, CLEARANCE_M, 1)
+    return np.flatnonzero(blockers).astype(np.int64)
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """A search's fixed part: which things have a bit, and what is closed for good."""
+
+    ny: int
+    shape: tuple[int, int]
+    fixed: Flags
+    """(3, nodes)."""
+    things: tuple[int, ...]
+    """Index of the thing of each bit."""
+    goals: Ints
+    """The poses at the goal."""
+
+    @staticmethod
+    def of(world: World) -> Ground:
+        """Gather what no action of a world can change."""
+        nx, ny = world.stage.lattice.shape
+        movable: list[int] = []
+        lasting: list[int] = []
+        for k, item in enumerate(world.items):
+            able = item.asset.pushable or item.asset.pickable
+            (movable if able else lasting).append(k)
+        ends = (world.position, world.goal_point)
+        first = len(world.stage.items)
+        # Obstacles first, then what is nearest to either end.
+        ranked = sorted(
+            movable,
+            key=lambda k: (k < first, round(min(world.away(k, *end) for end in ends), 6), k),
+        )
+        fixed = _closed(world.stage).copy()
+        flat = fixed.reshape(-1)
+        for k in (*lasting, *ranked[THINGS_AT_MOST:]):
+            flat[_marks(world.items[k], nx, ny)] = 1
+        goal = 4 * (world.goal[0] * ny + world.goal[1])
+        goals = np.arange(goal, goal + 4, dtype=np.int64)
+        return Ground(ny, (nx, ny), fixed, tuple(ranked[:THINGS_AT_MOST]), goals)
+
+    def masks(self, world: World) -> Ints:
+        """(3, nodes) int64: who blocks what, as things lie."""
+        masks = np.zeros(self.fixed.shape, dtype=np.int64)
+        flat = masks.reshape(-1)
+        for bit, k in enumerate(self.things):
+            item = world.items[k]
+            if item.pose is not None:
+                flat[_marks(item, *self.shape)] |= 1 << bit
+        return masks
+
+    def prices(self, world: World) -> Ints:
+        """(62,) int64: what moving each thing costs at a guess; picking needs an empty hand."""
+        prices = np.zeros(THINGS_AT_MOST, dtype=np.int64)
+        full = DROP_PRICE if world.held >= 0 else 0
+        furniture = len(world.stage.items)
+        for bit, k in enumerate(self.things):
+            pickable = world.items[k].asset.pickable
+            prices[bit] = PICK_PRICE + full if pickable else PUSH_PRICE
+            # It stands in groups and against walls, where pushes are slow to solve and seldom help.
+            prices[bit] += FURNITURE_PRICE if k < furniture else 0
+        return prices
+
+    def pose(self, world: World) -> int:
+        """Return the number of the agent's pose."""
+        return 4 * (world.i * self.ny + world.j) + world.quarter
+
+    def costs(self, masks: Ints, banned: int, prices: Ints, until: int = -1) -> Costs:
+        """Cost from every pose to the goal, Done left out; `until` as in `field`."""
+        costs: Costs = field(self.fixed, masks, banned, prices, self.ny, self.goals, until)
+        return costs
+
+    def way(
+        self, masks: Ints, banned: int, prices: Ints, costs: Costs, pose: int
+    ) -> tuple[Ints, Ints]:
+        """Poses to the goal down a field, and the things entered on each step."""
+        poses, entered = descend(self.fixed, masks, banned, prices, self.ny, costs, pose)
+        return poses, entered
+
+    def reach(self, masks: Ints, pose: int) -> tuple[Costs, Costs]:
+        """Cost from a pose to every pose, things as they lie; and the same field turned round.
+
+        To go from a to b is to go from b to a facing the other way.
+        """
+        seeds = np.array([turned_round(pose)], dtype=np.int64)
+        none = np.zeros(THINGS_AT_MOST, dtype=np.int64)
+        back: Costs = field(self.fixed, masks, EVERYTHING, none, self.ny, seeds, -1)
+        return back.reshape(-1, 4)[:, [2, 3, 0, 1]].reshape(-1), back
+
+    def walk(self, masks: Ints, back: Costs, pose: int) -> list[int]:
+        """Poses from where `reach` began to a pose."""
+        none = np.zeros(THINGS_AT_MOST, dtype=np.int64)
+        poses, _ = descend(self.fixed, masks, EVERYTHING, none, self.ny, back, turned_round(pose))
+        return [turned_round(p) for p in reversed(poses.tolist())]
+
+
+def turned_round(pose: int) -> int:
+    """Return the pose on the same node that faces the other way."""
+    return 4 * (pose // 4) + (pose + 2) % 4

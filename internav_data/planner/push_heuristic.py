@@ -1,0 +1,97 @@
+"""Guess which pushes clear a way, by sliding plans over the floor: a screen, not the truth."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from internav_data.geometry import Polygons, clearance
+from internav_data.geometry.headings import HEADINGS
+from internav_data.navigation import SPACING_M, grid
+from internav_data.navigation.grid import EAST, NODE, NORTH
+from internav_data.physics.kdop import grown, octagon_of_rectangle
+from internav_data.physics.push import SHOVES
+from internav_data.records.agent import CLEARANCE_M
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from internav_data.world import World
+
+    Ints = NDArray[np.int64]
+
+STEP_M: Final = 0.15
+"""How finely a slide is tried for what stands in its way."""
+GRAVITY: Final = 9.81
+
+
+def slide_m(world: World, thing: int) -> float:
+    """How far a thing slides on free ground when pushed, metres: Coulomb's law."""
+    asset, shove = world.items[thing].asset, SHOVES[world.model]
+    brake = asset.friction * GRAVITY
+    gain = shove.force_n / asset.mass_kg - brake
+    if gain <= 0.0:
+        return 0.0
+    speed = min(shove.speed_m_s, gain * shove.seconds)
+    return speed * speed / 2.0 * (1.0 / gain + 1.0 / brake)
+
+
+def marks_on(poses: Sequence[int], nodes: int) -> Ints:
+    """Nodes and edges that a way of poses uses, as indices into a flat (3, nodes)."""
+    here = np.array(poses, dtype=np.int64)
+    place, quarter = here // 4, here[:-1] % 4
+    steps = place[:-1] != place[1:]
+    edge = np.minimum(place[:-1], place[1:])[steps]
+    row = np.where(quarter[steps] % 2 == 0, EAST, NORTH)
+    return np.unique(np.concatenate([NODE * nodes + place, row * nodes + edge]))
+
+
+def clearing(world: World, thing: int, way: Ints, shape: tuple[int, int]) -> tuple[bool, ...]:
+    """Whether a push along each of the four headings of the house may clear a way of a thing.
+
+    Parameters
+    ----------
+    world
+        As things lie.
+    thing
+        An item that can be pushed and is not held.
+    way
+        Indices into a flat (3, nx, ny), from `marks_on`.
+    shape
+        nx, ny.
+    """
+    far = slide_m(world, thing)
+    plan = world.items[thing].footprint
+    low, high = plan.vertices.min(axis=0) - far, plan.vertices.max(axis=0) + far
+    round_it = grown(octagon_of_rectangle(*low.tolist(), *high.tolist()), 0.0)
+    movable = [k for k, _ in world.near(round_it, thing) if k < len(world.items)]
+    solid = [world.stage.footprints, *(world.items[k].footprint for k in movable)]
+    out = []
+    for heading in range(4):
+        there = _slid(plan, HEADINGS[heading], far, solid)
+        blockers = np.zeros((3, *shape), dtype=np.int32)
+        grid.mark(blockers, there.vertices, there.offsets, SPACING_M, CLEARANCE_M, 1)
+        out.append(not blockers.reshape(-1)[way].any())
+    return tuple(out)
+
+
+def _slid(
+    plan: Polygons, ahead: tuple[float, float], far: float, solid: Sequence[Polygons]
+) -> Polygons:
+    """Move a plan as far along a heading as it goes before it runs into something."""
+    there, went = plan, 0.0
+    before = [clearance(plan, other, 1.0) for other in solid]
+    while went < far:
+        went = min(far, went + STEP_M)
+        moved = Polygons(plan.vertices + went * np.array(ahead), plan.offsets)
+        # What touches from the start does not hinder a push away from it.
+        if any(
+            clearance(moved, other, 1.0) <= 0.0 < gap
+            for other, gap in zip(solid, before, strict=True)
+        ):
+            break
+        there = moved
+    return there

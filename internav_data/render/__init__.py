@@ -1,0 +1,1 @@
+"""The camera: meshes of houses and assets, a rasteriser, culling, shading."""

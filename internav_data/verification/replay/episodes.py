@@ -1,0 +1,45 @@
+"""Plays one episode again: settling, outcomes, expert."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from internav_data.physics import engine_of_this_process, solving_anew
+from internav_data.verification.replay.experts import check_expert
+from internav_data.verification.replay.outcomes import check_outcomes
+from internav_data.verification.replay.settling import check_settling
+
+if TYPE_CHECKING:
+    from internav_data.records import Episode
+    from internav_data.verification.findings import Collector
+    from internav_data.verification.replay.checked_scene import Theatre
+
+
+def replay_episode(theatre: Theatre, episode: Episode, report: Collector) -> None:
+    """Judge the physics of an episode whose geometry is true: every scene solved anew.
+
+    What cannot be judged is counted among the report's notes.
+    """
+    with solving_anew():
+        _replay(theatre, episode, report)
+
+
+def _replay(theatre: Theatre, episode: Episode, report: Collector) -> None:
+    name = episode.episode_id
+
+    def expect(holds: object, predicate: str, expected: object, got: object) -> bool:
+        return report.expect(holds, predicate, expected, got, name)
+
+    engine = engine_of_this_process()
+    made = f"{episode.physics.engine} of {episode.physics.build}"
+    here = f"{engine.name} of {engine.build}"
+    if made != here:
+        report.notes[f"made by {made}, checked by {here}: results may differ"] += 1
+    check_settling(theatre, episode, expect)
+    if any(obstacle.outcomes is None for obstacle in episode.obstacles):
+        report.notes["no outcomes stored: not checked"] += 1
+    check_outcomes(theatre, episode, expect)
+    if episode.expert is None:
+        report.notes["no expert stored: not checked"] += 1
+    check_expert(theatre, episode, expect)
+    report.counts["replayed"] += 1

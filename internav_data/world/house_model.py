@@ -1,0 +1,151 @@
+"""A house as worlds share it: what never moves, and where its movable furniture stands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from internav_data.geometry import Polygons, footprint, wall_footprints
+from internav_data.navigation import SPACING_M, Lattice, WayFinder
+from internav_data.physics.kdop import NOWHERE, octagon_of_rectangle
+from internav_data.physics.scene import Body, wall_body
+from internav_data.physics.sweep import extent_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+    from internav_data.physics.kdop import Octagon
+    from internav_data.records import Asset, House, Pose, Vec2
+
+    Floats = NDArray[np.float64]
+
+WAYS_KEPT: Final = 16
+"""Any-angle graphs kept a house: one for each set of furniture that was moved."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Item:
+    """A thing that can move: where it lies, or that it is held."""
+
+    asset: Asset
+    pose: Pose | None
+    """None while it is held."""
+    footprint: Polygons
+    octagon: Octagon
+    low_m: float
+    high_m: float
+
+    @staticmethod
+    def at(asset: Asset, pose: Pose | None) -> Item:
+        """Put an asset somewhere, or into a hand."""
+        if pose is None:
+            return Item(asset, None, Polygons.of([]), NOWHERE, np.inf, -np.inf)
+        extent = extent_of(asset, pose)
+        return Item(
+            asset, pose, footprint(asset, pose), extent.octagon, extent.low_m, extent.high_m
+        )
+
+
+def is_movable(asset: Asset) -> bool:
+    """Things of the obstacle types that can be pushed or picked up, furniture included."""
+    return asset.spawnable and (asset.pushable or asset.pickable)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stage:
+    """What all worlds in a house share. Nothing in it is ever changed."""
+
+    house: House
+    fixed: tuple[Body, ...]
+    """Walls, then things that never move; rugs and their like left out."""
+    octagons: Floats
+    """How far each of `fixed` reaches in the plane, (n, 8)."""
+    walls: Polygons
+    footprints: Polygons
+    """Of all that is fixed, walls first."""
+    items: tuple[Item, ...]
+    """Furniture that can move, in the house's order."""
+    thing_ids: tuple[int, ...]
+    """Which thing of the house each item is."""
+    lattice: Lattice
+    """With all furniture in its place; never changed."""
+    handles: tuple[int, ...]
+    """The lattice's handles of `items`."""
+    _ways: dict[tuple[int, ...], WayFinder] = field(default_factory=dict)
+
+    @staticmethod
+    def of(house: House) -> Stage:
+        """Prepare a house for any number of worlds."""
+        bodies = [wall_body(wall) for wall in house.walls]
+        octagons = [octagon_of_rectangle(w.x_min, w.y_min, w.x_max, w.y_max) for w in house.walls]
+        walls = wall_footprints(house.walls)
+        plans, items, thing_ids = [walls], [], []
+        for thing in house.things:
+            asset = house.assets[thing.asset_id]
+            if is_movable(asset):
+                items.append(Item.at(asset, thing.pose))
+                thing_ids.append(thing.thing_id)
+            elif asset.blocks:
+                bodies.append(Body(asset, thing.pose, moves=False))
+                octagons.append(extent_of(asset, thing.pose).octagon)
+                plans.append(footprint(asset, thing.pose))
+        footprints = Polygons.joined(plans)
+        lattice = Lattice.of_polygons(footprints, house.outline)
+        handles = tuple(lattice.add(item.footprint) for item in items)
+        return Stage(
+            house=house,
+            fixed=tuple(bodies),
+            octagons=np.array(octagons, dtype=np.float64).reshape(-1, 8),
+            walls=walls,
+            footprints=footprints,
+            items=tuple(items),
+            thing_ids=tuple(thing_ids),
+            lattice=lattice,
+            handles=handles,
+        )
+
+    def ways(self, displaced: tuple[int, ...] = ()) -> WayFinder:
+        """Any-angle ways among all furniture but some items (indices, ascending)."""
+        finder = self._ways.get(displaced)
+        if finder is None:
+            left = (item.footprint for k, item in enumerate(self.items) if k not in displaced)
+            finder = WayFinder.of_polygons(Polygons.joined([self.footprints, *left]))
+            if len(self._ways) >= WAYS_KEPT:
+                # The oldest goes, but never the one with all furniture in its place.
+                del self._ways[next(key for key in self._ways if key)]
+            self._ways[displaced] = finder
+        return finder
+
+    def clear_m(self, here: Vec2, goal: Vec2) -> float | None:
+        """Any-angle distance with all furniture in its place and no obstacle.
+
+        Where the agent stands off the clear ground (furniture was moved away there), that of the
+        nearest clear node plus the straight distance to it.
+        """
+        clear = self.ways()
+        if clear.can_stand(here):
+            return clear.distance(here, goal)
+        steps = self.lattice.distances(*_node(goal))
+        nodes = np.argwhere(steps >= 0)
+        if not len(nodes):
+            return None
+        x, y = SPACING_M * nodes[:, 0] - here[0], SPACING_M * nodes[:, 1] - here[1]
+        # The first of equally near ones, in order of i, then j.
+        best = int(np.argmin(np.round(x * x + y * y, 9)))
+        there = (SPACING_M * int(nodes[best, 0]), SPACING_M * int(nodes[best, 1]))
+        way = clear.distance(there, goal)
+        straight = float(np.sqrt(x[best] * x[best] + y[best] * y[best]))
+        return None if way is None else way + straight
+
+
+def _node(point: Vec2) -> tuple[int, int]:
+    return round(point[0] / SPACING_M), round(point[1] / SPACING_M)
+
+
+def octagon_rows(items: Iterable[Item]) -> Floats:
+    """Octagons of items, (n, 8)."""
+    return np.array([item.octagon for item in items], dtype=np.float64).reshape(-1, 8)

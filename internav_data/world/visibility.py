@@ -1,0 +1,157 @@
+"""Sight: whether the agent sees a thing within its reach (numba kernels)."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from internav_data.geometry.planar import point_polygon_distance
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from internav_data.geometry import Polygons
+    from internav_data.world.occlusion import Shell
+
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
+
+REACH_M: Final = 1.25
+"""A visibility point farther from the agent's axis, in the plane, cannot be acted on."""
+CAMERA_M: Final = 1.575
+"""Height of the camera on the agent's axis."""
+SLACK: Final = 1e-9
+"""Share of a ray: what it only touches does not hide what is behind."""
+
+
+@njit(cache=True)
+def _hidden(eye: Floats, point: Floats, planes: Floats, starts: Ints, skip: int) -> bool:
+    """Whether a convex part other than `skip` obstructs the segment from the eye to a point."""
+    dx, dy, dz = point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]
+    for part in range(len(starts) - 1):
+        if part == skip:
+            continue
+        enter, leave = 0.0, 1.0
+        for k in range(starts[part], starts[part + 1]):
+            a, b, c = planes[k, 0], planes[k, 1], planes[k, 2]
+            slope = a * dx + b * dy + c * dz
+            height = planes[k, 3] - (a * eye[0] + b * eye[1] + c * eye[2])
+            if slope > 0.0:
+                leave = min(leave, height / slope)
+            elif slope < 0.0:
+                enter = max(enter, height / slope)
+            elif height < 0.0:
+                leave = -1.0
+            if enter + SLACK >= leave:
+                break
+        if enter + SLACK < leave:
+            return True
+    return False
+
+
+@njit(cache=True)
+def _in_view(
+    eye: Floats, point: Floats, ahead_x: float, ahead_y: float, cos_down: float, sin_down: float
+) -> bool:
+    """Whether a point lies in the camera's view, 90 degrees wide and high, and within reach."""
+    dx, dy, dz = point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]
+    if dx * dx + dy * dy > REACH_M * REACH_M:
+        return False
+    level = dx * ahead_x + dy * ahead_y
+    side = dx * ahead_y - dy * ahead_x
+    depth = level * cos_down - dz * sin_down
+    up = level * sin_down + dz * cos_down
+    return depth > 0.0 and abs(side) <= depth and abs(up) <= depth
+
+
+@njit(cache=True)
+def _seen(
+    eye: Floats,
+    view: tuple[float, float, float, float],
+    points: Floats,
+    owners: Ints,
+    first: int,
+    planes: Floats,
+    starts: Ints,
+) -> bool:
+    for k in range(len(points)):
+        if _in_view(eye, points[k], *view) and not _hidden(
+            eye, points[k], planes, starts, first + owners[k]
+        ):
+            return True
+    return False
+
+
+@njit(cache=True)
+def _axis_distance(x: float, y: float, vertices: Floats, offsets: Ints) -> float:
+    best = math.inf
+    for k in range(len(offsets) - 1):
+        best = min(best, point_polygon_distance(x, y, vertices, offsets[k], offsets[k + 1]))
+    return best
+
+
+def axis_distance(x: float, y: float, polygons: Polygons) -> float:
+    """Distance from a point of the floor to the nearest of some polygons, inf without any."""
+    return float(_axis_distance(x, y, polygons.vertices, polygons.offsets))
+
+
+class View(NamedTuple):
+    """Where the camera is and looks."""
+
+    eye: Floats
+    """(3,) metres."""
+    ahead_x: float
+    ahead_y: float
+    cos_down: float
+    sin_down: float
+
+
+_DOWN: Final = {
+    # Written out: a right angle's third has exact sines.
+    -30: (math.sqrt(0.75), -0.5),
+    0: (1.0, 0.0),
+    30: (math.sqrt(0.75), 0.5),
+    60: (0.5, math.sqrt(0.75)),
+}
+
+
+def view_from(x: float, y: float, ahead: tuple[float, float], horizon_deg: int) -> View:
+    """Return the view of an agent that stands at (x, y) and looks so far down."""
+    return View(np.array([x, y, CAMERA_M]), *ahead, *_DOWN[horizon_deg])
+
+
+class Screen:
+    """Everything near the agent that can hide something, gathered once for several questions."""
+
+    def __init__(self, shells: Sequence[Shell]) -> None:
+        self._shells = shells
+        planes = [shell.planes for shell in shells]
+        counts = [0]
+        self._first = []
+        height = 0
+        for shell in shells:
+            self._first.append(len(counts) - 1)
+            counts += (shell.starts[1:] + height).tolist()
+            height += len(shell.planes)
+        self._planes: Floats = np.concatenate(planes) if planes else np.empty((0, 4))
+        self._starts: Ints = np.array(counts, dtype=np.int64)
+
+    def seen(self, view: View, place: int) -> bool:
+        """Whether the thing of one of the shells is seen and within reach."""
+        shell = self._shells[place]
+        return bool(
+            _seen(
+                view.eye,
+                (view.ahead_x, view.ahead_y, view.cos_down, view.sin_down),
+                shell.points,
+                shell.owners,
+                self._first[place],
+                self._planes,
+                self._starts,
+            )
+        )

@@ -1,0 +1,158 @@
+from __future__ import annotations
+
+import networkx as nx
+import numpy as np
+import pytest
+
+from internav_data.evaluation.evaluate import Settings, evaluate
+from internav_data.evaluation.metrics import summary
+from internav_data.evaluation.reference_policies import nearest, oracle, planner_of, shortest
+from internav_data.navigation import Lattice
+from internav_data.records.errors import UsageError
+from internav_data.world import Action, Stage, World
+
+STEPS = ((1, 0), (0, 1), (-1, 0), (0, -1))
+INTERACTIONS = set(range(Action.PUSH_AHEAD, Action.DROP + 1))
+
+
+@pytest.fixture(scope="module")
+def rows(played_data):
+    names = ("expert", "planner", "random")
+    return {name: evaluate(oracle(name, played_data), played_data) for name in names}
+
+
+def world_of(dataset, episode):
+    return World.of_episode(Stage.of(dataset.scene(episode.scene_id)), episode, dataset.assets)
+
+
+def test_the_expert_does_what_is_stored_and_solves_all(played_data, rows):
+    assert [r.actions for r in rows["expert"]] == [e.expert.actions for e in played_data]
+    values = summary(rows["expert"]).values
+    assert (values["success"], values["distance_m"], values["isr"]) == (1.0, 0.0, 1.0)
+    for result, episode in zip(rows["expert"], played_data, strict=True):
+        assert result.path_m == pytest.approx(episode.expert.path_m)
+
+
+def test_the_planner_touches_nothing_and_walks_the_shortest_way(played_data, rows):
+    assert {e.mode for e in played_data} == {"blocked", "lengthened"}
+    for result, episode in zip(rows["planner"], played_data, strict=True):
+        assert not INTERACTIONS & set(result.actions)
+        assert result.success == (episode.steps is not None)
+        if episode.steps is not None:
+            assert result.path_m == pytest.approx(0.25 * episode.steps)
+
+
+def test_where_cut_off_the_planner_walks_as_near_as_it_can(played_data, rows):
+    blocked = 0
+    for result, episode in zip(rows["planner"], played_data, strict=True):
+        if episode.steps is not None:
+            continue
+        blocked += 1
+        world = world_of(played_data, episode)
+        clear = world.stage.lattice.distances(*world.goal)
+        labels = world.lattice.components()
+        mine = labels[world.i, world.j]
+        reach = [clear[i, j] for i, j in np.argwhere(labels == mine) if clear[i, j] >= 0]
+        for action in result.actions:
+            world.step(action)
+        assert clear[world.i, world.j] == min(reach)
+        assert result.actions[-1] == Action.DONE
+    assert blocked
+
+
+def test_bounds_lie_as_they_should(rows):
+    """The planner bounds who does not interact; the expert all on the lattice."""
+    for group in ("all", "blocked", "non-interactive"):
+        expert, planner, chance = (summary(rows[name], group).values for name in rows)
+        for name in ("success", "spl", "sts"):
+            assert expert[name] >= planner[name] >= chance[name]
+        assert expert["distance_m"] <= planner["distance_m"] <= chance["distance_m"]
+
+
+def fewest_by_networkx(lattice, start, goal):
+    """Length and turns: Dijkstra over nodes and headings, a turn a millionth of a step."""
+    graph = nx.DiGraph()
+    for i, j in np.argwhere(lattice.free).tolist():
+        for q, (di, dj) in enumerate(STEPS):
+            for other in ((q + 1) % 4, (q + 3) % 4):
+                graph.add_edge((i, j, q), (i, j, other), weight=1e-6)
+            inside = 0 <= i + di < lattice.shape[0] and 0 <= j + dj < lattice.shape[1]
+            if inside and lattice.edge_free(i, j, di, dj):
+                graph.add_edge((i, j, q), (i + di, j + dj, q), weight=1.0)
+    found = nx.single_source_dijkstra_path_length(graph, start)
+    return min(cost for node, cost in found.items() if node[:2] == goal)
+
+
+def test_shortest_ways_have_the_fewest_turns(played_data):
+    turned = 0
+    for episode in played_data:
+        world = world_of(played_data, episode)
+        if world.steps() is None:
+            continue
+        start = (world.i, world.j, world.quarter)
+        actions = shortest(world.lattice, start, world.goal)
+        moves = actions.count(0)
+        turns = len(actions) - moves
+        best = fewest_by_networkx(world.lattice, start, world.goal)
+        assert moves + 1e-6 * turns == pytest.approx(best, abs=1e-9)
+        turned += turns
+    assert turned
+
+
+def test_ties_of_the_nearest_go_by_the_walk():
+    square = [(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)]
+    from internav_data.geometry import Polygons
+
+    clear = Lattice.of_polygons(Polygons.joined([]), square)
+    lattice = clear.copy()
+    wall = np.array([[0.95, -1.0], [1.05, -1.0], [1.05, 2.0], [0.95, 2.0]])
+    lattice.add(Polygons.of([wall]))
+    goal = (7, 2)
+    assert lattice.distance((1, 0), goal) is None
+    near = nearest(lattice, clear, (1, 0), goal)
+    assert lattice.distance((1, 0), near) is not None
+    assert near[1] == 2, "straight across from the goal"
+    assert shortest(lattice, (*near, 3), near) == [], "already there"
+
+
+def test_chance_is_even_and_of_the_episode(played_data, rows):
+    counts = np.bincount([a for r in rows["random"] for a in r.actions], minlength=12)
+    assert (counts > 0).all()
+    assert evaluate(oracle("random", played_data), played_data, Settings(batch=2)) == rows["random"]
+    player = oracle("random", played_data)
+    player.begin(1, 0)
+    drawn = []
+    for episode in list(played_data) * 50:
+        player.start(0, episode)
+        drawn += [int(player.act({})[0]) for _ in range(3)]
+    many = []
+    player.start(0, played_data[0])
+    many = [int(player.act({})[0]) for _ in range(12_000)]
+    expected = 1000.0
+    chi2 = ((np.bincount(many, minlength=12) - expected) ** 2 / expected).sum()
+    assert chi2 < 31.3, "99.9 % of even chances with 11 degrees of freedom"
+    assert drawn[:3] == drawn[len(played_data) * 3 : len(played_data) * 3 + 3], "keyed"
+
+
+def test_unknown_oracles_and_missing_experts(played_data, monkeypatch):
+    with pytest.raises(UsageError, match=r"expert, planner, random"):
+        oracle("best", played_data)
+    import pyarrow as pa
+
+    gone = pa.table({"expert": pa.nulls(3, pa.struct([("steps", pa.int32())]))})
+    monkeypatch.setattr(type(played_data), "to_table", lambda *_: gone)
+    with pytest.raises(UsageError, match=r"no episode has an expert.*planner and random"):
+        oracle("expert", played_data)
+
+
+def test_an_episode_without_expert_is_a_failure_not_a_gap(played_data):
+    from dataclasses import replace
+
+    from internav_data.evaluation.reference_policies import expert_actions
+
+    assert expert_actions(replace(played_data[0], expert=None)) == (Action.DONE,)
+
+
+def test_a_plan_is_the_same_every_time(played_data):
+    plan = planner_of(played_data)
+    assert [plan(e) for e in played_data] == [planner_of(played_data)(e) for e in played_data]

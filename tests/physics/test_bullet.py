@@ -1,0 +1,136 @@
+"""Bullet's world serves many scenes, and none of them is told from a scene in an empty world."""
+
+import os
+
+import numpy as np
+import pytest
+
+from internav_data.geometry import yaw_quaternion
+from internav_data.physics import Body, Column, Setting, wall_body
+from internav_data.physics.engines.bullet import Bullet, bullet
+from internav_data.physics.engines.bullet_scene import SCENES_A_WORLD, Builder, pybullet
+from internav_data.physics.push import SHOVES
+from internav_data.records import Asset, Part, Pose, Wall
+
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+
+
+def part(shape, centre, size):
+    return Part(shape, centre, size, UPRIGHT, (), (120, 90, 60), "wood")
+
+
+def asset(name, parts, mass_kg):
+    return Asset(name, name, (1.0, 1.0, 1.0), mass_kg, 0.5, True, True, True, True, tuple(parts))
+
+
+def table(name, width, mass_kg):
+    half = width / 2.0 - 0.05
+    legs = [
+        part("box", (x, y, 0.2), (0.05, 0.05, 0.4)) for x in (-half, half) for y in (-half, half)
+    ]
+    return asset(name, [*legs, part("box", (0.0, 0.0, 0.42), (width, width, 0.04))], mass_kg)
+
+
+THINGS = (
+    table("table", 0.8, 9.0),
+    table("stool", 0.35, 4.0),
+    asset("bin", [part("cylinder", (0.0, 0.0, 0.25), (0.3, 0.3, 0.5))], 3.0),
+    asset("ball", [part("sphere", (0.0, 0.0, 0.12), (0.24, 0.24, 0.24))], 0.6),
+)
+
+
+def scenes(count):
+    """Pushes and falls of one to four things, some beside a wall or the agent."""
+    rng = np.random.default_rng(7)
+    made = []
+    for k in range(count):
+        thing = THINGS[k % len(THINGS)]
+        around = [
+            Body(
+                THINGS[rng.integers(len(THINGS))],
+                Pose(0.75 * (n + 1), rng.uniform(-0.2, 0.2), 0.001, yaw_quaternion(15 * k)),
+                bool(rng.random() < 0.7),
+            )
+            for n in range(rng.integers(3))
+        ]
+        if rng.random() < 0.5:
+            around.append(wall_body(Wall(1.5, -2.0, 1.62, 2.0, 0.0, 2.6)))
+        column = Column(0.1, 0.85, 0.21) if rng.random() < 0.3 else None
+        start = Pose(0.0, 0.0, 0.001 if k % 5 else 0.01, yaw_quaternion(15 * (k % 24)))
+        made.append((Setting((Body(thing, start, moves=True), *around), column), k % 5 == 0))
+    return made
+
+
+def answer(engine, setting, falls):
+    return engine.settle(setting) if falls else engine.push(setting, SHOVES["force"])
+
+
+@pytest.fixture
+def fresh(tmp_path):
+    """Bullet with an empty world for every scene."""
+    client = pybullet.connect(pybullet.DIRECT)
+    yield Bullet(Builder(client, tmp_path, scenes_a_world=1))
+    pybullet.disconnect(client)
+
+
+def test_an_emptied_world_is_as_good_as_new(fresh):
+    asked = scenes(60)
+    expected = [answer(fresh, *scene) for scene in asked]
+    for seed in range(4):
+        for k in np.random.default_rng(seed).permutation(len(asked)):
+            assert answer(bullet(), *asked[k]) == expected[k]
+
+
+def test_what_an_interrupt_left_in_a_world_is_swept_away(fresh, monkeypatch):
+    asked = [setting for setting, falls in scenes(60) if not falls]
+    lone = next(setting for setting in asked if len(setting.bodies) == 1)
+    crowded = next(setting for setting in asked if len(setting.bodies) > 1)
+    expected = fresh.push(lone, SHOVES["force"])
+    real = Builder._place
+
+    def interrupted(self, *args, **where):
+        real(self, *args, **where)
+        self._bodies.pop()
+        raise KeyboardInterrupt
+
+    for _ in range(2):
+        # A thing stands where the next scene's would go, and nobody knows its number.
+        monkeypatch.setattr(Builder, "_place", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            bullet().push(crowded, SHOVES["force"])
+        monkeypatch.setattr(Builder, "_place", real)
+        assert bullet().push(lone, SHOVES["force"]) == expected
+
+
+def test_a_world_is_given_up_before_it_leaks_much(monkeypatch):
+    begun = []
+    real = Builder._begin
+    monkeypatch.setattr(Builder, "_begin", lambda self: begun.append(real(self)))
+    engine = bullet()
+    lone = Setting((Body(THINGS[2], Pose(0.0, 0.0, 0.001, UPRIGHT), moves=True),))
+    for _ in range(3 * SCENES_A_WORLD):
+        engine._builder.build(lone)
+    assert len(begun) == 3
+    assert pybullet.getNumBodies(engine._builder.client) == 1 + len(lone.bodies)
+
+
+def test_what_a_users_own_client_sets_changes_nothing():
+    asked = [setting for setting, falls in scenes(30) if not falls]
+    expected = [bullet().push(setting, SHOVES["force"]) for setting in asked]
+    client = pybullet.connect(pybullet.DIRECT)
+    # Bullet's own global, whichever client it is set by.
+    pybullet.setPhysicsEngineParameter(contactBreakingThreshold=0.02, physicsClientId=client)
+    answers = [bullet().push(setting, SHOVES["force"]) for setting in asked]
+    pybullet.disconnect(client)
+    assert answers == expected
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+def test_a_forked_process_has_a_client_and_files_of_its_own():
+    here = bullet()
+    child = os.fork()
+    if child == 0:
+        there = bullet()
+        os._exit(0 if there is not here and there._builder.folder != here._builder.folder else 1)
+    assert os.waitpid(child, 0)[1] == 0
+    assert here._builder.folder.is_dir()

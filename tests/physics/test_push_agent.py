@@ -1,0 +1,188 @@
+"""The agent beside a push: it matters only where something comes near it, and it is told so."""
+
+import itertools
+
+import pytest
+
+from internav_data.catalog import catalogue
+from internav_data.geometry import footprint, yaw_quaternion
+from internav_data.houses import HouseConfig, build_house
+from internav_data.physics import Body, push, wall_body
+from internav_data.physics.engines.bullet import Bullet
+from internav_data.physics.kdop import overlap
+from internav_data.physics.push import crowd
+from internav_data.physics.sweep import extent_of
+from internav_data.records import Asset, Part, Pose, Wall
+from internav_data.world import Action, Stage, World
+from internav_data.world.house_model import WAYS_KEPT
+from internav_data.world.visibility import axis_distance
+
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+AHEAD = ((1, 0), (0, 1), (-1, 0), (0, -1))
+
+
+def box(name, size, mass_kg=6.0):
+    part = Part("box", (0.0, 0.0, size[2] / 2), size, UPRIGHT, (), (120, 90, 60), "wood")
+    return Asset(name, name, size, mass_kg, 0.5, True, False, True, True, (part,))
+
+
+CRATE = box("beside the agent", (0.5, 0.4, 0.2))
+SMALL = box("small beside the agent", (0.3, 0.3, 0.2), 2.0)
+
+
+def among(*bodies):
+    extents = [extent_of(body.asset, body.pose).octagon for body in bodies]
+
+    def near(octagon):
+        return [(k, bodies[k]) for k, extent in enumerate(extents) if overlap(extent, octagon)]
+
+    return near
+
+
+def scene(heading):
+    """A crate, a thing that it runs into 0.3 m on, and a wall 1.5 m on that nothing reaches."""
+    dx, dy = AHEAD[heading]
+    other = Pose(3.0 + 0.7 * dx - 0.05 * dy, 4.0 + 0.7 * dy + 0.05 * dx, 0.001, UPRIGHT)
+    wall = wall_body(Wall(5.5, 0.0, 5.6, 8.0, 0.0, 2.6))
+    return Pose(3.0, 4.0, 0.001, yaw_quaternion(20)), among(Body(SMALL, other, moves=True), wall)
+
+
+@pytest.fixture
+def solved(monkeypatch):
+    """Settings that Bullet was asked about."""
+    asked = []
+    solve = Bullet.push
+
+    def watched(self, setting, shove):
+        asked.append(setting)
+        return solve(self, setting, shove)
+
+    monkeypatch.setattr(Bullet, "push", watched)
+    return asked
+
+
+@pytest.mark.parametrize("heading", range(4))
+def test_a_push_that_never_comes_near_the_agent_is_the_same_without_it(heading, solved):
+    pose, near = scene(heading)
+    without = push(CRATE, pose, heading, near)
+    assert without.success
+    assert without.moved
+    solved.clear()
+    dx, dy = AHEAD[heading]
+    for back, aside in itertools.product((0.6, 0.9, 1.2), (-0.6, 0.0, 0.6)):
+        agent = (3.0 - back * dx - aside * dy, 4.0 - back * dy + aside * dx)
+        assert push(CRATE, pose, heading, near, agent, agent_gap_m=back - 0.3) == without
+    assert solved == [], "no agent, no other scene"
+
+
+def test_an_agent_that_something_comes_near_takes_part(solved):
+    pose, near = scene(0)
+    without = push(CRATE, pose, 0, near)
+    ((_, there),) = without.moved
+    agent = (there.x + 0.3, there.y)  # what is run into would come to rest at its feet
+    solved.clear()
+    beside = push(CRATE, pose, 0, near, agent, agent_gap_m=0.22)
+    assert all(setting.column is not None for setting in solved)
+    assert solved
+    assert beside != without
+    ends = [(CRATE, beside.pose), *((SMALL, there) for _, there in beside.moved)]
+    assert all(axis_distance(*agent, footprint(*end)) > 0.2 for end in ends)
+
+
+@pytest.mark.parametrize("heading", range(4))
+def test_the_agent_is_named_where_it_alone_hinders(heading):
+    dx, dy = AHEAD[heading]
+    crate = box("square", (0.4, 0.4, 0.2))
+    pose, agent = Pose(3.0, 4.0, 0.001, UPRIGHT), (3.0 + 0.405 * dx, 4.0 + 0.405 * dy)
+    hindered = push(crate, pose, heading, among(), agent, agent_gap_m=0.205)
+    assert (hindered.success, hindered.reason) == (False, "the agent is in the way")
+    assert hindered.displacement_m < 0.02
+    assert push(crate, pose, heading, among()).success
+    # A wall that hinders by itself is named though the agent stands there too, behind the thing.
+    x, y = 3.0 + 0.265 * dx, 4.0 + 0.265 * dy
+    wall = wall_body(Wall(x - 0.06, y - 0.06, x + 0.06, y + 0.06, 0.0, 2.6))
+    behind = (3.0 - 0.405 * dx, 4.0 - 0.405 * dy)
+    walled = push(crate, pose, heading, among(wall), behind, agent_gap_m=0.205)
+    assert walled.reason == "something is in the way"
+    # And what cannot be moved at all is too heavy, whoever stands there.
+    heavy = box("heavy", (0.4, 0.4, 0.2), 500.0)
+    assert push(heavy, pose, heading, among(wall), agent, agent_gap_m=0.2).reason == "too heavy"
+
+
+def test_pulling_onto_the_agent_says_so_and_changes_nothing(hand_house):
+    crate = box("pulled", (0.6, 0.6, 0.3))
+    world = World(
+        Stage.of(hand_house), [(crate, Pose(3.51, 1.0, 0.0, UPRIGHT))], (12, 4, 0), (1, 1)
+    )
+    before = world.digest()
+    result = world.step(Action.PUSH_BACK)
+    assert (result.success, result.reason) == (False, "the agent is in the way")
+    assert result.target == world.obstacles[0]
+    assert world.digest() == before
+    assert world.step(Action.PUSH_AHEAD).success
+
+
+@pytest.mark.parametrize("side", range(4))
+@pytest.mark.parametrize("heading", range(4))
+def test_the_agent_does_not_lever_what_has_low_feet(heading, side):
+    # Its feet begin below 2 cm, where footprints leave them out: a column down to the floor stood
+    # on them, and the thing crept on top of it for up to five seconds.
+    telly = catalogue().assets["Television_05"]
+    pose = Pose(3.0, 4.0, 0.001, yaw_quaternion(45))
+    plan = footprint(telly, pose)
+    dx, dy = AHEAD[side]
+    far = next(
+        d for d in (0.2 + 0.001 * k for k in range(2000))
+        if axis_distance(3.0 + d * dx, 4.0 + d * dy, plan) >= 0.205
+    )  # fmt: skip
+    agent = (3.0 + far * dx, 4.0 + far * dy)
+    pushed = push(telly, pose, heading, among(), agent, agent_gap_m=axis_distance(*agent, plan))
+    assert pushed.at_rest
+    assert pushed.seconds < 1.5
+    assert axis_distance(*agent, footprint(telly, pushed.pose)) > 0.2 - 2e-3
+
+
+def test_a_crowd_is_what_may_be_moved():
+    pose = Pose(3.0, 4.0, 0.001, UPRIGHT)
+    row = [Body(SMALL, Pose(3.5, 3.7 + 0.31 * k, 0.001, UPRIGHT), moves=True) for k in range(3)]
+    wall = wall_body(Wall(3.0, 4.3, 4.0, 4.4, 0.0, 2.6))
+    assert crowd_of(pose, row, wall) == (3, 0)
+    assert crowd_of(pose, row[:1], wall) == (1, 0)
+    assert crowd_of(pose, [], wall) == (0, 0)
+    # What the first one met is driven on to: the neighbour's neighbour counts, the far one not.
+    behind = Body(SMALL, Pose(3.82, 4.0, 0.001, UPRIGHT), moves=True)
+    far = Body(SMALL, Pose(6.0, 4.0, 0.001, UPRIGHT), moves=True)
+    assert crowd_of(pose, [row[1], behind, far], wall) == (2, 0)
+    # What is too heavy meets nothing.
+    heavy = box("heavy crowd", (0.5, 0.4, 0.2), 500.0)
+    assert crowd_of(pose, row, wall, heavy) == (0, 0)
+
+
+def crowd_of(pose, loose, wall, asset=CRATE):
+    """Crowds of a push east and of one west."""
+    near = among(*loose, wall)
+    return crowd(asset, pose, 0, near), crowd(asset, pose, 2, near)
+
+
+def test_a_crowd_is_never_fewer_than_what_moves():
+    house = build_house(0, 6, HouseConfig(), catalogue())
+    stage = Stage.of(house)
+    world = World(stage, [], (4, 4, 0), (8, 8))
+    checked = 0
+    for index, heading in itertools.product(range(0, len(world.items), 2), range(4)):
+        if world.items[index].asset.pushable:
+            moved = world.pushed(index, heading, agent=False).moved
+            assert world.crowd(index, heading) >= len(moved)
+            checked += bool(moved)
+    assert checked
+
+
+def test_the_graph_with_all_furniture_is_kept():
+    stage = Stage.of(build_house(0, 6, HouseConfig(), catalogue()))
+    home = stage.ways()
+    sets = list(itertools.combinations(range(len(stage.items)), 2))[:20]
+    assert len(sets) == 20
+    graphs = [stage.ways(displaced) for displaced in sets]
+    assert stage.ways(()) is home
+    assert stage.ways(sets[-1]) is graphs[-1], "the latest are kept too"
+    assert len(stage._ways) == WAYS_KEPT

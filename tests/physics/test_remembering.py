@@ -1,0 +1,345 @@
+"""What is kept on disk is what was solved; whatever happens to the file, answers stay right."""
+
+import contextlib
+import math
+import shutil
+import sqlite3
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from internav_data.physics import Body, Motion, Rest, Setting, engine_of_this_process, solving_anew
+from internav_data.physics.cache import (
+    Remembering,
+    _read_motion,
+    _read_rest,
+    _write_motion,
+    _write_rest,
+    origin,
+)
+from internav_data.physics.engines.bullet import bullet
+from internav_data.physics.push import SHOVES
+from internav_data.physics.result_cache import FILE_NAME, Solutions
+from internav_data.records import Asset, Part, Pose
+
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+
+
+BOX = Asset(
+    asset_id="box",
+    type="box",
+    size=(0.4, 0.4, 0.3),
+    mass_kg=3.0,
+    friction=0.5,
+    pushable=True,
+    pickable=True,
+    spawnable=True,
+    blocks=True,
+    parts=(Part("box", (0.0, 0.0, 0.15), (0.4, 0.4, 0.3), UPRIGHT, (), (9, 9, 9), "wood"),),
+)
+
+
+LONE = Setting((Body(BOX, Pose(0.0, 0.0, 0.001, UPRIGHT), moves=True),))
+
+
+PAIR = Setting((*LONE.bodies, Body(BOX, Pose(0.7, 0.1, 0.001, UPRIGHT), moves=True)))
+
+
+SHOVE = SHOVES["force"]
+
+
+class Counting:
+    """An engine that counts what it is asked."""
+
+    name, build = "counting", "1"
+
+    def __init__(self):
+        self.asked = 0
+
+    def push(self, setting, shove):
+        self.asked += 1
+        return bullet().push(setting, shove)
+
+    def settle(self, setting):
+        self.asked += 1
+        return bullet().settle(setting)
+
+
+def remembering(folder, origin="here", engine=None):
+    return Remembering(engine or Counting(), Solutions(folder), origin)
+
+
+@pytest.mark.parametrize("setting", [LONE, PAIR], ids=["lone", "pair"])
+def test_a_later_process_reads_what_was_solved_to_the_last_bit(tmp_path, setting):
+    first = remembering(tmp_path)
+    pushed, settled = first.push(setting, SHOVE), first.settle(setting)
+    assert first.engine.asked == 2
+    first.solutions.flush()
+    later = remembering(tmp_path)
+    assert later.push(setting, SHOVE) == pushed == bullet().push(setting, SHOVE)
+    assert later.settle(setting) == settled == bullet().settle(setting)
+    assert later.engine.asked == 0
+
+
+def test_every_difference_in_what_is_asked_is_another_question(tmp_path):
+    engine = remembering(tmp_path)
+    body = LONE.bodies[0]
+    asked = [
+        (LONE, SHOVE),
+        (LONE, SHOVES["kick"]),
+        (PAIR, SHOVE),
+        (Setting((replace(body, asset=replace(BOX, friction=0.6)),)), SHOVE),
+        (Setting((replace(body, asset=replace(BOX, mass_kg=3.5)),)), SHOVE),
+        (Setting((replace(body, pose=Pose(0.0, 0.0, 0.001, (0.0, 0.0, 1.0, 0.0))),)), SHOVE),
+        (Setting((body, replace(PAIR.bodies[1], moves=False))), SHOVE),
+    ]
+    for setting, shove in asked:
+        engine.push(setting, shove)
+    engine.settle(LONE)
+    assert engine.engine.asked == len(asked) + 1
+    assert engine.solutions.count() == len(asked) + 1
+
+
+def test_other_rules_or_machines_are_not_believed(tmp_path):
+    first = remembering(tmp_path)
+    first.push(LONE, SHOVE)
+    first.solutions.flush()
+    later = remembering(tmp_path, origin="another processor")
+    later.push(LONE, SHOVE)
+    assert later.engine.asked == 1
+
+
+@pytest.mark.parametrize(
+    "part",
+    ["_CODE", "platform.python_version", "platform.libc_ver", "metadata.distribution"],
+)
+def test_whatever_answers_depend_on_is_in_the_origin(monkeypatch, part):
+    here = origin.__wrapped__(bullet().build)
+    assert origin.__wrapped__("pybullet 0, rules 0") != here == origin.__wrapped__(bullet().build)
+    other = {
+        "_CODE": "other code",
+        "platform.python_version": lambda: "3.99",
+        "platform.libc_ver": lambda: ("other", "1"),
+        "metadata.distribution": lambda name: Record(f"another build of {name}"),
+    }[part]
+    monkeypatch.setattr(f"internav_data.physics.cache.{part}", other)
+    assert origin.__wrapped__(bullet().build) not in (None, here)
+
+
+def test_every_module_that_physics_imports_is_in_the_digest(tmp_path):
+    module = sys.modules["internav_data.physics.cache"]
+    root = Path(module.__file__).parents[2]
+    found = module.solver_modules(root)
+    for name in ("physics.push", "physics.engines.bullet_scene", "geometry.obj", "records.poses"):
+        assert f"internav_data.{name}" in found
+    for file in found.values():
+        copied = tmp_path / file.relative_to(root)
+        copied.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(file, copied)
+    assert module.code_digest(tmp_path) == module._CODE
+    seen = {module._CODE}
+    for file in found.values():
+        copied = tmp_path / file.relative_to(root)
+        copied.write_text(copied.read_text() + "# changed\n")
+        seen.add(module.code_digest(tmp_path))
+    assert len(seen) == 1 + len(found)
+
+
+class Record:
+    def __init__(self, text):
+        self.text = text
+
+    def read_text(self, name):
+        return self.text if name == "RECORD" else None
+
+
+def test_where_a_build_cannot_be_told_nothing_is_kept(monkeypatch):
+    monkeypatch.setattr("internav_data.physics.cache.metadata.distribution", lambda _: Record(None))
+    assert origin.__wrapped__(bullet().build) is None
+    monkeypatch.undo()
+    monkeypatch.setattr("internav_data.physics.cache._LIBRARIES", ("no such library",))
+    assert origin.__wrapped__(bullet().build) is None
+
+
+finite = st.floats(allow_nan=False, allow_infinity=False, width=64)
+
+
+poses = st.builds(lambda *n: Pose(*n[:3], n[3:]), *[finite] * 7)
+
+
+paths = st.integers(1, 3).flatmap(lambda n: st.binary(min_size=28 * n, max_size=28 * n))
+
+
+motions = st.builds(
+    lambda movers, seconds, at_rest: Motion(
+        tuple(m[0] for m in movers),
+        tuple(m[1] for m in movers),
+        tuple(m[2] for m in movers),
+        seconds,
+        at_rest,
+    ),
+    st.lists(st.tuples(poses, st.tuples(*[finite] * 8), paths), min_size=1, max_size=4),
+    finite,
+    st.booleans(),
+)
+
+
+@given(motions)
+def test_motions_come_back_as_they_were(motion):
+    count, written = len(motion.poses), _write_motion(motion)
+    assert repr(_read_motion(written, count)) == repr(motion)  # tells -0.0 from 0.0
+    assert all(_read_motion(written[:k], count) is None for k in range(len(written)))
+    assert _read_motion(written + b"x", count) is None
+    assert _read_motion(written, count + 1) is None
+    assert _read_motion(written, count - 1) is None
+
+
+@given(motions, st.sampled_from([math.nan, math.inf, -math.inf]))
+def test_a_motion_that_is_not_finite_is_none(motion, number):
+    pose = replace(motion.poses[-1], y=number)
+    for wrong in (
+        replace(motion, poses=(*motion.poses[:-1], pose)),
+        replace(motion, seconds=number),
+        replace(motion, sweeps=((number, *motion.sweeps[0][1:]), *motion.sweeps[1:])),
+        replace(motion, paths=(*motion.paths[:-1], b"")),
+        replace(motion, paths=(*motion.paths[:-1], b"abc")),
+    ):
+        assert _read_motion(_write_motion(wrong), len(motion.poses)) is None
+
+
+@given(poses, finite, finite, finite, st.booleans())
+def test_rests_come_back_as_they_were(pose, seconds, penetration_m, reach_m, at_rest):
+    rest = Rest(pose, seconds, at_rest, penetration_m, reach_m)
+    assert repr(_read_rest(_write_rest(rest))) == repr(rest)
+    assert _read_rest(_write_rest(rest)[:-1]) is None
+    assert _read_rest(_write_rest(replace(rest, reach_m=math.nan))) is None
+
+
+@given(st.binary(max_size=400), st.integers(0, 3))
+def test_no_bytes_make_reading_fail(value, movers):
+    _read_motion(value, movers)
+    _read_rest(value)
+
+
+def kept(folder):
+    engine = remembering(folder)
+    motion = engine.push(LONE, SHOVE)
+    engine.solutions.flush()
+    return motion
+
+
+def rows(folder, *question):
+    with contextlib.closing(opened(folder)) as file:
+        return file.execute(*question).fetchall()
+
+
+def test_a_damaged_value_is_solved_anew(tmp_path):
+    motion = kept(tmp_path)
+    [(key, value)] = rows(tmp_path, "SELECT key, value FROM solutions")
+    for at in (0, 5, len(value) - 1):
+        damaged = bytearray(value)
+        damaged[at] ^= 1
+        rows(tmp_path, "UPDATE solutions SET value = ? WHERE key = ?", (bytes(damaged), key))
+        later = remembering(tmp_path)
+        assert later.push(LONE, SHOVE) == motion
+        assert later.engine.asked == 1
+    rows(tmp_path, "UPDATE solutions SET value = 'text'")
+    assert remembering(tmp_path).push(LONE, SHOVE) == motion
+
+
+@pytest.mark.parametrize("content", [b"", b"no database, but a text\n" * 400])
+def test_what_is_no_database_is_begun_anew(tmp_path, content):
+    (tmp_path / FILE_NAME).write_bytes(content)
+    motion = kept(tmp_path)
+    later = remembering(tmp_path)
+    assert later.push(LONE, SHOVE) == motion
+    assert later.engine.asked == 0
+
+
+@pytest.mark.parametrize(
+    "schema",
+    [
+        "CREATE TABLE solutions (name TEXT)",
+        """CREATE VIEW solutions AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i FROM n)
+        SELECT i AS key, i AS value FROM n""",
+        "CREATE TABLE something (else_ TEXT)",
+    ],
+)
+def test_another_database_is_begun_anew(tmp_path, schema):
+    rows(tmp_path, schema)
+    motion = kept(tmp_path)
+    later = remembering(tmp_path)
+    assert later.push(LONE, SHOVE) == motion
+    assert later.engine.asked == 0
+
+
+@pytest.mark.parametrize("where", [0.0, 0.3, 0.6])
+def test_a_file_damaged_anywhere_costs_no_answer_and_is_begun_anew(tmp_path, where):
+    engine = remembering(tmp_path)
+    motion = engine.push(LONE, SHOVE)
+    for k in range(200):
+        engine.solutions.put(bytes([k]) * 32, bytes(3000))
+    engine.solutions.flush()
+    path = tmp_path / FILE_NAME
+    with path.open("r+b") as file:
+        file.seek(int(where * path.stat().st_size))
+        file.write(b"\xff" * (path.stat().st_size - file.tell()))
+    asked = [bytes([k]) * 32 for k in range(200)]
+    for _ in range(2):
+        later = remembering(tmp_path)
+        assert {later.solutions.get(key) for key in asked} <= {None, bytes(3000)}
+        assert later.push(LONE, SHOVE) == engine.push(LONE, SHOVE) == motion
+    assert kept(tmp_path) == motion
+    assert remembering(tmp_path).solutions.count() >= 1
+
+
+def test_a_folder_that_cannot_be_made_keeps_nothing(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    engine = remembering(tmp_path / "file" / "below")
+    assert engine.push(LONE, SHOVE) == bullet().push(LONE, SHOVE)
+    assert engine.solutions.count() == 0
+
+
+def test_a_read_only_file_is_read(tmp_path):
+    kept(tmp_path)
+    engine = remembering(tmp_path)
+    engine.solutions._file.execute("PRAGMA query_only = ON")
+    engine.push(LONE, SHOVE)
+    assert engine.engine.asked == 0
+    engine.push(PAIR, SHOVE)
+    assert engine.solutions.count() == 1
+
+
+def test_a_writer_who_is_waited_for_in_vain_costs_no_answer(tmp_path, monkeypatch):
+    monkeypatch.setattr("internav_data.physics.result_cache._OPENING_S", 0.2)
+    motion = kept(tmp_path)
+    held = remembering(tmp_path)
+    with contextlib.closing(opened(tmp_path)) as other:
+        other.execute("BEGIN EXCLUSIVE")
+        shut_out = remembering(tmp_path)
+        for engine in (held, shut_out):
+            assert engine.push(LONE, SHOVE) == motion
+            engine.solutions.flush()
+    assert not shut_out.solutions.is_open
+    assert held.push(LONE, SHOVE) == remembering(tmp_path).push(LONE, SHOVE) == motion
+
+
+def opened(folder):
+    return sqlite3.connect(folder / FILE_NAME, isolation_level=None, timeout=0.1)
+
+
+def test_solving_anew_believes_nothing_that_is_kept(tmp_path, monkeypatch):
+    monkeypatch.setattr("internav_data.physics.registry.solutions", lambda: held)
+    held = Solutions(tmp_path)
+    engine = engine_of_this_process()
+    lie = replace(engine.push(LONE, SHOVE), seconds=123.0)
+    held.put(engine._key(repr(SHOVE), LONE), _write_motion(lie))
+    held.flush()
+    assert engine_of_this_process().push(LONE, SHOVE) == lie
+    with solving_anew():
+        assert engine_of_this_process().push(LONE, SHOVE) == bullet().push(LONE, SHOVE) != lie
+    assert engine_of_this_process().push(LONE, SHOVE) == lie

@@ -1,0 +1,125 @@
+"""Settling is a pure function, and what it says is what Bullet says in the whole scene."""
+
+import math
+import subprocess
+import sys
+
+import pytest
+
+from internav_data.geometry import asset_corners, transform, yaw_quaternion
+from internav_data.physics import Body, Setting, engine_of_this_process, settle, wall_body
+from internav_data.physics.settle import MAX_PENETRATION_M
+from internav_data.records import Asset, Part, Pose, Wall
+
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+
+
+def part(shape, centre, size, rotation=UPRIGHT):
+    return Part(shape, centre, size, rotation, (), (120, 90, 60), "wood")
+
+
+def asset(name, parts, mass_kg=10.0):
+    return Asset(name, name, (1.0, 1.0, 1.0), mass_kg, 0.6, True, False, True, True, tuple(parts))
+
+
+def chair():
+    legs = [
+        part("cylinder", (x, y, 0.215), (0.05, 0.05, 0.43))
+        for x in (-0.2, 0.2)
+        for y in (-0.2, 0.2)
+    ]
+    seat = part("box", (0.0, 0.0, 0.45), (0.5, 0.5, 0.04))
+    back = part("box", (0.0, 0.24, 0.68), (0.5, 0.02, 0.42))
+    return asset("chair", [*legs, seat, back])
+
+
+def nothing():
+    return ()
+
+
+def never():
+    raise AssertionError("neighbours were asked for")
+
+
+def test_a_chair_stays_where_it_was_put():
+    there = settle(chair(), Pose(3.0, 4.0, 0.0, yaw_quaternion(30)), 0.01, never)
+    assert there.refusal == ""
+    assert math.dist((there.pose.x, there.pose.y), (3.0, 4.0)) <= 1e-3
+    assert 0.0 <= there.pose.z <= 0.002
+    assert there.pose.quaternion[3] == pytest.approx(math.cos(math.radians(15)), abs=1e-4)
+    assert 0.04 < there.seconds < 1.0
+    assert 0.0 <= there.penetration_m <= MAX_PENETRATION_M
+
+
+def test_free_fall_takes_as_long_as_physics_says():
+    # 1 cm falls in sqrt(2 h / g) = 45 ms = 11 steps; then ten calm steps follow.
+    box = asset("box", [part("box", (0.0, 0.0, 0.2), (0.4, 0.4, 0.4))])
+    rest = engine_of_this_process().settle(
+        Setting((Body(box, Pose(0.0, 0.0, 0.01, UPRIGHT), moves=True),))
+    )
+    assert rest.seconds >= math.sqrt(2 * 0.01 / 9.81) + 9 / 240
+
+
+def test_what_leans_over_is_refused():
+    leaning = asset(
+        "leaning",
+        [
+            part("box", (0.0, 0.0, 0.05), (0.1, 0.1, 0.1)),
+            part("box", (0.3, 0.0, 0.6), (0.6, 0.2, 0.2)),
+            part("box", (0.0, 0.0, 0.35), (0.05, 0.05, 0.5)),
+        ],
+    )
+    assert settle(leaning, Pose(1.0, 1.0, 0.0, UPRIGHT), 0.01, nothing).refusal
+
+
+def test_what_sinks_into_a_wall_is_pushed_out_and_refused():
+    wall = wall_body(Wall(3.2, 0.0, 3.32, 8.0, 0.0, 2.6))
+    there = settle(chair(), Pose(3.0, 4.0, 0.0, UPRIGHT), 0.0, lambda: (wall,))
+    assert there.refusal
+
+
+def test_a_neighbour_out_of_reach_changes_nothing():
+    pose = Pose(3.0, 4.0, 0.0, yaw_quaternion(45))
+    wall = wall_body(Wall(3.5, 0.0, 3.62, 8.0, 0.0, 2.6))
+    alone = settle(chair(), pose, 0.01, never)
+    beside = settle(chair(), pose, 0.0, lambda: (wall,))
+    assert alone == beside
+
+
+def test_same_answer_in_a_fresh_process_and_after_any_history():
+    script = (
+        "import sys; sys.path.insert(0, 'tests/physics'); from test_settle import *\n"
+        "n = int(sys.argv[1])\n"
+        "for k in range(n): settle(asset(f'b{k}', [part('box', (0, 0, .1 + k / 50), "
+        "(.2, .3, .2 + k / 25))]), Pose(0, 0, 0, UPRIGHT), 0.0, nothing)\n"
+        "e = engine_of_this_process()\n"
+        "print(repr(e.settle(Setting((Body(chair(), Pose(0, 0, .01, UPRIGHT), True),)))))"
+    )
+    answers = {
+        subprocess.run(
+            [sys.executable, "-c", script, str(n)], check=True, capture_output=True, text=True
+        ).stdout
+        for n in (0, 0, 7)
+    }
+    assert len(answers) == 1
+    assert "Rest(" in answers.pop()
+
+
+def test_nothing_is_printed_by_importing_the_engine():
+    done = subprocess.run(
+        [sys.executable, "-c", "import internav_data.physics.engines.bullet"],
+        check=True,
+        capture_output=True,
+    )
+    assert done.stdout == b""
+    assert done.stderr == b""
+
+
+def test_assets_of_more_than_sixteen_parts_keep_them_all():
+    # Bullet's shape arrays drop the seventeenth: here it alone carries the rest.
+    parts = [part("box", (0.0, 0.0, 0.5 + 0.01 * k), (0.2, 0.2, 0.01)) for k in range(20)]
+    parts.append(part("box", (0.0, 0.0, 0.1), (0.5, 0.5, 0.2)))
+    there = settle(asset("stack", parts), Pose(0.0, 0.0, 0.0, UPRIGHT), 0.01, nothing)
+    assert there.refusal == ""
+    corners, _ = asset_corners(asset("stack", parts))
+    assert transform(corners, there.pose)[:, 2].min() == pytest.approx(0.001, abs=0.0011)

@@ -1,0 +1,153 @@
+"""What is kept on disk comes back whole or not at all, whoever else reads, writes or dies."""
+
+import contextlib
+import itertools
+import os
+import sqlite3
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from internav_data.physics.result_cache import FILE_NAME, Solutions, cache_folder
+
+
+def test_a_full_file_is_emptied(tmp_path, monkeypatch):
+    module = sys.modules["internav_data.physics.result_cache"]
+    monkeypatch.setattr(module, "BYTES_AT_MOST", 1_200_000)
+    held, counts = Solutions(tmp_path), []
+    for k in range(1000):
+        held.put(k.to_bytes(32, "little"), os.urandom(3000))
+        counts.append(held.count())
+    assert max(counts) > 100
+    assert sum(after < before for before, after in itertools.pairwise(counts)) >= 2
+    assert (tmp_path / FILE_NAME).stat().st_size <= 1_200_000
+    held.put(b"later", b"kept")
+    assert held.count() >= 1
+    assert Solutions(tmp_path).get(b"later") == b"kept"
+
+
+def test_values_beyond_any_use_are_not_kept(tmp_path):
+    held = Solutions(tmp_path)
+    held.put(b"k", bytes(5 << 20))
+    assert held.count() == 0
+
+
+def test_an_empty_file_that_another_holds_is_left_to_it(tmp_path, monkeypatch):
+    monkeypatch.setattr("internav_data.physics.result_cache._OPENING_S", 0.2)
+    with contextlib.closing(opened(tmp_path)) as other:
+        other.execute("BEGIN IMMEDIATE")
+        other.execute("CREATE TABLE other (name TEXT)")
+        assert not Solutions(tmp_path).is_open
+        other.execute("COMMIT")
+        assert other.execute("SELECT name FROM sqlite_schema").fetchall() == [("other",)]
+        assert (tmp_path / FILE_NAME).is_file()
+
+
+def opened(folder):
+    return sqlite3.connect(folder / FILE_NAME, isolation_level=None, timeout=0.1)
+
+
+def test_a_reader_in_the_way_of_a_commit_leaves_no_transaction_open(tmp_path):
+    held = Solutions(tmp_path)
+    held.put(b"first", b"1")
+    held.flush()
+    with contextlib.closing(opened(tmp_path)) as reader:
+        reader.execute("BEGIN")
+        reader.execute("SELECT * FROM solutions").fetchall()
+        held.put(b"second", b"2")
+        held.flush()
+        assert not held._file.in_transaction
+        reader.execute("COMMIT")
+    held.put(b"third", b"3")
+    held.flush()
+    assert Solutions(tmp_path).get(b"third") == b"3"
+
+
+def test_an_interrupt_while_writing_leaves_no_transaction_open(tmp_path, monkeypatch):
+    held = Solutions(tmp_path)
+    real = held._ask
+
+    def interrupted(question, *values):
+        if question.startswith("INSERT"):
+            raise KeyboardInterrupt
+        return real(question, *values)
+
+    monkeypatch.setattr(held, "_ask", interrupted)
+    held.put(b"first", b"1")
+    with pytest.raises(KeyboardInterrupt):
+        held.flush()
+    monkeypatch.undo()
+    assert not held._file.in_transaction
+    other = Solutions(tmp_path)
+    other.put(b"second", b"2")
+    assert other.count() == 1
+
+
+def test_what_was_put_is_known_before_it_is_written(tmp_path):
+    held = Solutions(tmp_path)
+    held.put(b"key", b"value")
+    assert held.get(b"key") == b"value"
+    assert Solutions(tmp_path).get(b"key") is None
+
+
+def test_several_processes_write_at_once(tmp_path):
+    script = (
+        "import sys; from pathlib import Path\n"
+        "from internav_data.physics.result_cache import Solutions\n"
+        "kept = Solutions(Path(sys.argv[1])); first = int(sys.argv[2])\n"
+        "for k in range(first, first + 300):\n"
+        "    kept.put(k.to_bytes(32, 'little'), k.to_bytes(4, 'little') * 700)\n"
+        "kept.flush()\n"
+    )
+    writers = [
+        subprocess.Popen([sys.executable, "-c", script, str(tmp_path), str(first)])
+        for first in (0, 200, 400)
+    ]
+    assert [writer.wait(60) for writer in writers] == [0, 0, 0]
+    found = Solutions(tmp_path)
+    # A writer gives up what it would have to wait for too long; what is there is whole.
+    assert 300 <= found.count() <= 700
+    for k in range(700):
+        assert found.get(k.to_bytes(32, "little")) in (None, k.to_bytes(4, "little") * 700)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+def test_a_forked_process_leaves_its_parents_file_alone(tmp_path):
+    held = Solutions(tmp_path)
+    held.put(b"parent" * 5, b"1")
+    child = os.fork()
+    if child == 0:
+        held.put(b"child" * 6, b"2")
+        held.flush()
+        os._exit(0 if held.get(b"parent" * 5) is None else 1)
+    assert os.waitpid(child, 0)[1] == 0
+    assert held.count() == 1
+    assert held.get(b"parent" * 5) == b"1"
+
+
+def test_where_solutions_are_kept_can_be_chosen(tmp_path, monkeypatch):
+    monkeypatch.setenv("INTERNAV_CACHE_DIR", str(tmp_path))
+    assert cache_folder() == tmp_path
+    monkeypatch.setenv("INTERNAV_CACHE_DIR", "")
+    assert cache_folder() is None
+    monkeypatch.delenv("INTERNAV_CACHE_DIR")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    folder = cache_folder()
+    assert folder is not None
+    assert folder.name == "internav"
+
+
+def test_a_user_without_a_home_keeps_nothing(monkeypatch):
+    monkeypatch.delenv("INTERNAV_CACHE_DIR")
+
+    def homeless(*_, **__):
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr("internav_data.physics.result_cache.user_cache_path", homeless)
+    assert cache_folder() is None
+    monkeypatch.setattr(
+        "internav_data.physics.result_cache.user_cache_path", lambda *_, **__: Path("~/.cache")
+    )
+    assert cache_folder() is None

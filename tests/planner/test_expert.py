@@ -1,0 +1,311 @@
+"""Every expert replays; hand-made houses get the plans that a person would make."""
+
+import hashlib
+import itertools
+import math
+import subprocess
+import sys
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+
+from internav_data.catalog import catalogue
+from internav_data.episodes import build_episodes
+from internav_data.houses import HouseConfig, build_house
+from internav_data.navigation import Lattice
+from internav_data.planner.cost_to_go import FAR
+from internav_data.planner.problem import EVERYTHING, Ground
+from internav_data.planner.search import expert_of, expert_of_episode, replay, solve
+from internav_data.records import Asset, House, Part, Pose, Room, Wall
+from internav_data.world import ACTION_COUNT, Action, Stage, World
+
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+HALF = 0.06
+HIGH = 2.6
+
+
+def block(asset_id, size, mass_kg, **flags):
+    part = Part("box", (0.0, 0.0, size[2] / 2), size, UPRIGHT, (), (150, 110, 70), "wood")
+    return Asset(
+        asset_id=asset_id,
+        type=asset_id.split("_", maxsplit=1)[0],
+        size=size,
+        mass_kg=mass_kg,
+        friction=0.6,
+        pushable=flags.get("pushable", False),
+        pickable=flags.get("pickable", False),
+        spawnable=True,
+        blocks=True,
+        parts=(part,),
+    )
+
+
+CRATE = block("Crate_0", (0.8, 0.8, 0.5), 12.0, pushable=True)
+PARCEL = block("Parcel_0", (0.8, 0.8, 0.5), 3.0, pickable=True)
+SAFE = block("Safe_0", (0.8, 0.8, 0.7), 900.0, pushable=True)
+PILLAR = block("Pillar_0", (0.8, 0.8, 1.5), 100.0)
+
+
+def room(width, depth, *inner):
+    """One room of width x depth metres; inner walls are (low x, low y, high x, high y)."""
+    sides = (
+        (-HALF, -HALF, width + HALF, HALF),
+        (-HALF, depth - HALF, width + HALF, depth + HALF),
+        (-HALF, HALF, HALF, depth - HALF),
+        (width - HALF, HALF, width + HALF, depth - HALF),
+    )
+    corners = ((0.0, 0.0), (width, 0.0), (width, depth), (0.0, depth))
+    return House(
+        scene_id="scene-000000",
+        scene=0,
+        seed=0,
+        split="train",
+        preset="paper",
+        outline=corners,
+        rooms=(Room(0, "living_room", corners, width * depth, HIGH, "oak", "white"),),
+        doors=(),
+        windows=(),
+        walls=tuple(Wall(*side, 0.0, HIGH) for side in (*sides, *inner)),
+        things=(),
+        materials=(),
+        room_graph=(),
+        area_m2=width * depth,
+        assets=MappingProxyType({}),
+    )
+
+
+def at(asset, x, y):
+    return asset, Pose(x, y, 0.0, UPRIGHT)
+
+
+CORRIDOR = Stage.of(room(6.0, 1.5))
+"""Three nodes wide: a block of 0.8 m in its middle leaves no way by."""
+HALL = Stage.of(room(6.0, 4.0))
+GAPS = Stage.of(room(5.0, 9.0, (2.44, 1.4, 2.56, 7.6)))
+"""Two halls and a wall between them: one way past its lower end, one past its upper end."""
+
+
+def fewest(world, bound, cap=60_000):
+    """Length of the shortest plan that is shorter than `bound`, else `bound`: plain breadth first.
+
+    Only states from which the goal may still be reached in time are kept: no plan can walk faster
+    than on a lattice without any movable thing.
+    """
+    bare = Lattice.of_polygons(world.stage.footprints, world.stage.house.outline)
+    ahead = bare.distances(*world.goal)
+    layer, known = [world], {world.digest()}
+    for spent in range(bound - 1):
+        following = []
+        for here, action in itertools.product(layer, range(ACTION_COUNT)):
+            there = here.copy()
+            if not there.step(action).success:
+                continue
+            if action == Action.DONE:
+                return spent + 1
+            if spent + 1 + ahead[there.i, there.j] + 1 >= bound:
+                continue
+            digest = there.digest()
+            if digest not in known:
+                known.add(digest)
+                following.append(there)
+        assert len(known) < cap
+        layer = following
+    return bound
+
+
+@pytest.fixture(scope="module")
+def episodes():
+    out = []
+    for scene in (0, 1, 2, 5):
+        house = build_house(0, scene, HouseConfig(), catalogue())
+        stage = Stage.of(house)
+        made = build_episodes(house, 8, catalogue().spawnable)
+        out += [(stage, episode) for episode in made]
+    return out
+
+
+def check(stage, episode):
+    """Solve; where there is an expert, hold every claim it makes against a fresh world."""
+    assets = catalogue().assets
+    expert = expert_of_episode(stage, episode, assets)
+    if expert is None:
+        return False
+    world = World.of_episode(stage, episode, assets)
+    results = [world.step(action) for action in expert.actions]
+    assert all(result.success for result in results)
+    assert (world.i, world.j) == (episode.goal.i, episode.goal.j)
+    assert expert.actions[-1] == Action.DONE
+    assert expert.steps == len(expert.actions) <= 500
+    assert set(expert.actions) <= set(range(ACTION_COUNT))
+    assert expert.path_m == 0.25 * expert.actions.count(Action.MOVE_AHEAD)
+    assert expert.picks == expert.actions.count(Action.PICKUP)
+    assert expert.pushes == sum(5 <= action <= 8 for action in expert.actions)
+    if episode.mode == "blocked":
+        assert expert.pushes + expert.picks > 0
+    return True
+
+
+def test_every_expert_replays(episodes):
+    solved = [check(stage, episode) for stage, episode in episodes]
+    assert sum(solved) >= 0.6 * len(solved)
+
+
+def test_what_is_not_blocked_is_solved(episodes):
+    for stage, episode in episodes:
+        if episode.mode == "lengthened":
+            assert expert_of_episode(stage, episode, catalogue().assets) is not None
+
+
+@pytest.mark.slow
+def test_a_thousand_experts_replay():
+    solved = []
+    for scene in range(100):
+        house = build_house(1, scene, HouseConfig(), catalogue())
+        stage = Stage.of(house)
+        made = build_episodes(house, 10, catalogue().spawnable)
+        solved += [check(stage, episode) for episode in made]
+    assert sum(solved) >= 700
+
+
+def test_a_box_in_a_corridor_is_pushed():
+    expert = expert_of(CORRIDOR, [at(CRATE, 2.5, 0.75)], (4, 3, 0), (14, 3))
+    assert expert is not None
+    assert expert.pushes >= 1
+    assert expert.picks == 0
+
+
+def test_a_parcel_in_a_corridor_is_picked_up():
+    expert = expert_of(CORRIDOR, [at(PARCEL, 2.5, 0.75)], (4, 3, 0), (14, 3))
+    assert expert is not None
+    assert (expert.pushes, expert.picks) == (0, 1)
+    # Ten moves, the pick, Done: nothing is wasted.
+    assert expert.steps == 12
+
+
+def test_two_parcels_need_an_empty_hand():
+    parcels = [at(PARCEL, 2.0, 0.75), at(PARCEL, 4.5, 0.75)]
+    expert = expert_of(CORRIDOR, parcels, (2, 3, 0), (22, 3))
+    if expert is not None:  # dropped in a corridor, a parcel may bar it again
+        assert expert.picks >= 2
+        assert Action.DROP in expert.actions
+    wide = [at(PARCEL, 2.5, 0.75), at(PARCEL, 2.5, 8.25)]
+    house = room(5.0, 9.0, (2.44, 1.4, 2.56, 7.6))
+    assert expert_of(Stage.of(house), wide, (4, 3, 0), (16, 3)) is not None
+
+
+def test_a_short_way_round_is_gone():
+    expert = expert_of(HALL, [at(CRATE, 3.0, 2.0)], (6, 5, 0), (18, 11))
+    assert expert is not None
+    assert (expert.pushes, expert.picks) == (0, 0)
+
+
+def test_a_long_way_round_is_not():
+    # The lower gap is barred; the upper one is open, 12 m longer.
+    expert = expert_of(GAPS, [at(PARCEL, 2.5, 0.75)], (4, 3, 0), (16, 3))
+    assert expert is not None
+    assert expert.picks == 1
+    assert expert.steps < 20
+
+
+def test_the_long_way_is_gone_where_nothing_can_be_moved():
+    for asset in (SAFE, PILLAR):
+        expert = expert_of(GAPS, [at(asset, 2.5, 0.75)], (4, 3, 0), (16, 3))
+        assert expert is not None
+        assert (expert.pushes, expert.picks) == (0, 0)
+        assert expert.path_m > 12.0
+
+
+@pytest.mark.parametrize("asset", [SAFE, PILLAR], ids=["too heavy", "fixed"])
+def test_what_cannot_be_moved_has_no_expert(asset):
+    assert expert_of(CORRIDOR, [at(asset, 2.5, 0.75)], (4, 3, 0), (14, 3)) is None
+
+
+def test_a_limit_is_kept():
+    obstacles = [at(PARCEL, 2.5, 0.75)]
+    assert expert_of(CORRIDOR, obstacles, (4, 3, 0), (14, 3), limit=12) is not None
+    assert expert_of(CORRIDOR, obstacles, (4, 3, 0), (14, 3), limit=11) is None
+
+
+@pytest.mark.parametrize(
+    ("stage", "obstacles", "start", "goal"),
+    [
+        (CORRIDOR, [at(PARCEL, 2.0, 0.75)], (4, 3, 0), (11, 3)),
+        (CORRIDOR, [at(PARCEL, 2.0, 0.75)], (4, 2, 1), (11, 4)),
+    ],
+)
+def test_plans_are_nearly_the_shortest(stage, obstacles, start, goal):
+    expert = expert_of(stage, obstacles, start, goal)
+    assert expert is not None
+    # No plan is shorter than ten elevenths of it.
+    bound = math.ceil(expert.steps / 1.1)
+    assert fewest(World(stage, obstacles, start, goal), bound) == bound
+
+
+def test_solving_changes_nothing_and_begins_anywhere(episodes):
+    stage, episode = next(pair for pair in episodes if pair[1].mode == "lengthened")
+    world = World.of_episode(stage, episode, catalogue().assets)
+    expert = solve(world)
+    before = world.digest()
+    assert solve(world) == expert
+    assert world.digest() == before
+    for action in expert.actions[: expert.steps // 2]:
+        world.step(action)
+    rest = solve(world)
+    assert rest is not None
+    assert rest.steps <= expert.steps - expert.steps // 2
+
+
+def test_replay_refuses_what_fails():
+    obstacles = [at(PARCEL, 2.5, 0.75)]
+
+    def world():
+        return World(CORRIDOR, obstacles, (4, 3, 0), (14, 3))
+
+    good = expert_of(CORRIDOR, obstacles, (4, 3, 0), (14, 3)).actions
+    assert replay(world(), good) is not None
+    assert replay(world(), good[:-1]) is None
+    assert replay(world(), ()) is None
+    assert replay(world(), tuple(a for a in good if a != Action.PICKUP)) is None
+
+
+def test_fields_count_what_the_lattice_counts(episodes):
+    for stage, episode in episodes[::5]:
+        world = World.of_episode(stage, episode, catalogue().assets)
+        ground = Ground.of(world)
+        masks = ground.masks(world)
+        reach, _ = ground.reach(masks, ground.pose(world))
+        nearest = reach.reshape(-1, 4).min(axis=1).reshape(ground.shape)
+        steps = world.lattice.distances(world.i, world.j)
+        assert np.array_equal(nearest < FAR, steps >= 0)
+        there = steps >= 0
+        assert (nearest[there] >= steps[there]).all()
+        costs = ground.costs(masks, EVERYTHING, ground.prices(world))
+        ahead = int(costs[ground.pose(world)])
+        assert (ahead < FAR) == (world.steps() is not None)
+        if ahead < FAR:
+            # There and back are equally far.
+            goal = 4 * (world.goal[0] * ground.ny + world.goal[1])
+            assert ahead == reach[goal : goal + 4].min()
+
+
+def experts():
+    """Digest of some experts; a pure function."""
+    house = build_house(0, 2, HouseConfig(), catalogue())
+    stage = Stage.of(house)
+    made = build_episodes(house, 4, catalogue().spawnable)
+    found = [expert_of_episode(stage, episode, catalogue().assets) for episode in made]
+    return hashlib.sha256(repr(found).encode()).hexdigest()
+
+
+def test_processes_agree(episodes):
+    code = f"import runpy; print(runpy.run_path({__file__!r})['experts']())"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == experts()
+
+
+def test_things_that_stand_apart_do_not_matter():
+    near = [at(PARCEL, 2.5, 0.75)]
+    far = [*near, at(block("Crate_1", (0.2, 0.2, 0.5), 2.0, pushable=True), 5.6, 0.3)]
+    alone = expert_of(CORRIDOR, near, (4, 3, 0), (14, 3))
+    assert expert_of(CORRIDOR, far, (4, 3, 0), (14, 3)).steps == alone.steps

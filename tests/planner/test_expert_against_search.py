@@ -1,0 +1,153 @@
+"""The expert against every plan there is, in small rooms where things have to be pushed.
+
+The search takes nothing from the expert: A* over true worlds, told apart by their digests; what
+lies ahead is counted on a lattice without any movable thing, rotations included, so that no plan
+can be cheaper. Looks are left out where the agent sees what it needs without them.
+"""
+
+import statistics
+from collections import defaultdict, deque
+
+import pytest
+
+from internav_data.navigation import Lattice
+from internav_data.planner.search import expert_of
+from internav_data.records import Asset, House, Part, Pose, Room, Wall
+from internav_data.world import Action, Stage, World
+
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+HALF = 0.06
+HIGH = 2.6
+AHEAD = ((1, 0), (0, 1), (-1, 0), (0, -1))
+ACTIONS = tuple(a for a in range(12) if a not in (Action.LOOK_DOWN, Action.LOOK_UP))
+WORLDS_AT_MOST = 30_000
+
+
+def block(name, size, mass_kg, **flags):
+    part = Part("box", (0.0, 0.0, size[2] / 2.0), size, UPRIGHT, (), (150, 110, 70), "wood")
+    return Asset(
+        name, name, size, mass_kg, 0.6, flags.get("pushable", True), flags.get("pickable", False),
+        True, True, (part,),
+    )  # fmt: skip
+
+
+CRATE = block("Crate_7", (0.8, 0.8, 0.5), 12.0)
+HEAVY = block("Chest_7", (0.8, 0.8, 0.5), 28.0)
+LONG = block("Bench_7", (0.4, 1.1, 0.4), 15.0)
+PARCEL = block("Parcel_7", (0.8, 0.8, 0.5), 3.0, pushable=False, pickable=True)
+
+
+def house(width, depth, *inner):
+    """One room; inner walls are (low x, low y, high x, high y)."""
+    sides = (
+        (-HALF, -HALF, width + HALF, HALF),
+        (-HALF, depth - HALF, width + HALF, depth + HALF),
+        (-HALF, HALF, HALF, depth - HALF),
+        (width - HALF, HALF, width + HALF, depth - HALF),
+    )
+    corners = ((0.0, 0.0), (width, 0.0), (width, depth), (0.0, depth))
+    return House(
+        scene_id="scene-000000", scene=0, seed=0, split="train", preset="paper", outline=corners,
+        rooms=(Room(0, "living_room", corners, width * depth, HIGH, "oak", "white"),), doors=(),
+        windows=(), walls=tuple(Wall(*side, 0.0, HIGH) for side in (*sides, *inner)), things=(),
+        materials=(), room_graph=(), area_m2=width * depth, assets={},
+    )  # fmt: skip
+
+
+CORRIDOR = Stage.of(house(6.0, 1.5))
+"""Three nodes wide."""
+WIDE = Stage.of(house(5.0, 2.25))
+DOOR = Stage.of(house(5.0, 3.0, (2.44, HALF, 2.56, 1.0), (2.44, 2.0, 2.56, 3.0 - HALF)))
+"""Two rooms and a gap of 1 m between them."""
+BEND = Stage.of(house(3.5, 3.5, (1.5, HALF, 3.5 - HALF, 2.0)))
+"""A corridor round a corner."""
+
+CASES = {
+    "a crate, straight on": (CORRIDOR, [(CRATE, 2.5, 0.75)], (4, 3, 0), (14, 3)),
+    "a crate, off the row": (CORRIDOR, [(CRATE, 2.4, 0.7)], (3, 2, 1), (13, 4)),
+    "a crate, not far to go": (CORRIDOR, [(CRATE, 2.2, 0.75)], (4, 3, 0), (10, 3)),
+    "turned away at first": (CORRIDOR, [(CRATE, 2.5, 0.75)], (5, 3, 2), (12, 3)),
+    "two crates in a row": (CORRIDOR, [(CRATE, 2.2, 0.75), (CRATE, 3.6, 0.75)], (4, 3, 0), (12, 3)),
+    "a parcel, a crate": (CORRIDOR, [(PARCEL, 2.2, 0.75), (CRATE, 3.6, 0.75)], (4, 3, 0), (12, 3)),
+    "a bench across": (WIDE, [(LONG, 2.4, 0.62), (LONG, 2.4, 1.73)], (4, 4, 0), (14, 4)),
+    "a crate in a door": (DOOR, [(CRATE, 2.5, 1.5)], (5, 6, 0), (15, 6)),
+    "beside a door": (DOOR, [(CRATE, 2.0, 1.5)], (3, 6, 0), (14, 6)),
+    "a chest behind a door": (DOOR, [(HEAVY, 3.05, 1.5)], (7, 6, 0), (15, 6)),
+    "a door, from aside": (DOOR, [(CRATE, 2.5, 1.5)], (6, 3, 1), (14, 8)),
+    "round the corner": (BEND, [(CRATE, 0.78, 2.2)], (3, 5, 1), (10, 11)),
+    "in the corner": (BEND, [(CRATE, 0.8, 2.75)], (3, 6, 1), (10, 11)),
+}  # fmt: skip
+FEW = ("a crate, off the row", "a crate, not far to go", "turned away at first", "beside a door")
+
+
+def distances(stage, goal):
+    """Actions to the goal from every pose of the lattice without any movable thing."""
+    bare = Lattice.of_polygons(stage.footprints, stage.house.outline)
+    far = {(*goal, quarter): 0 for quarter in range(4)}
+    queue = deque(far)
+    while queue:
+        i, j, quarter = here = queue.popleft()
+        di, dj = AHEAD[quarter]
+        before = [(i, j, (quarter + 1) % 4), (i, j, (quarter - 1) % 4)]
+        if bare.free[i - di, j - dj] and bare.edge_free(i - di, j - dj, di, dj):
+            before.append((i - di, j - dj, quarter))
+        for pose in before:
+            if pose not in far:
+                far[pose] = far[here] + 1
+                queue.append(pose)
+    return far
+
+
+def fewest(world, bound):
+    """Length of the shortest plan, `bound` where none is shorter; and how many worlds it took."""
+    ahead = distances(world.stage, world.goal)
+
+    def promise(spent, there):
+        return spent + ahead.get((there.i, there.j, there.quarter), bound) + 1
+
+    layers = defaultdict(list)
+    layers[promise(0, world)].append((0, world))
+    known = {world.digest(): 0}
+    for total in range(bound):
+        while layers[total]:
+            spent, here = layers[total].pop()
+            if known[here.digest()] < spent:
+                continue
+            for action in ACTIONS:
+                there = here.copy()
+                if not there.step(action).success:
+                    continue
+                if action == Action.DONE:
+                    return spent + 1, len(known)
+                promised, digest = promise(spent + 1, there), there.digest()
+                if promised < bound and known.get(digest, bound) > spent + 1:
+                    known[digest] = spent + 1
+                    layers[promised].append((spent + 1, there))
+        assert len(known) < WORLDS_AT_MOST
+    return bound, len(known)
+
+
+def compared(name):
+    """Steps of the expert, and of the best plan."""
+    stage, things, start, goal = CASES[name]
+    obstacles = [(asset, Pose(x, y, 0.001, UPRIGHT)) for asset, x, y in things]
+    expert = expert_of(stage, obstacles, start, goal)
+    assert expert is not None, name
+    best, worlds = fewest(World(stage, obstacles, start, goal), expert.steps)
+    return expert, best, worlds
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_pushes_are_planned_nearly_as_well_as_can_be(name):
+    expert, best, _ = compared(name)
+    assert expert.pushes
+    assert expert.steps <= 1.1 * best
+
+
+@pytest.mark.slow
+def test_experts_are_within_a_tenth_of_the_best_on_average():
+    ratios = {}
+    for name in CASES:
+        expert, best, _ = compared(name)
+        ratios[name] = expert.steps / best
+    assert statistics.fmean(ratios.values()) <= 1.1, ratios

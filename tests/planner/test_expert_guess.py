@@ -1,0 +1,81 @@
+"""The expert's screen of pushes: against Coulomb, and against what really happens."""
+
+import numpy as np
+import pytest
+
+from internav_data.catalog import catalogue
+from internav_data.houses import HouseConfig, build_house
+from internav_data.planner.cost_to_go import FAR, field
+from internav_data.planner.problem import EVERYTHING, Ground
+from internav_data.planner.push_heuristic import clearing, marks_on, slide_m
+from internav_data.world import Stage, World
+
+SIXES = range(0, 12, 3)
+
+
+@pytest.fixture(scope="module")
+def worlds():
+    stages = [Stage.of(build_house(0, scene, HouseConfig(), catalogue())) for scene in SIXES]
+    return [World(stage, [], (0, 0, 0), (4, 4)) for stage in stages]
+
+
+def pushables(world):
+    return [k for k, item in enumerate(world.items) if item.asset.pushable]
+
+
+def test_free_slides_are_guessed(worlds):
+    """What it runs into and how it turns are left out: what stays upright never slides farther."""
+    checked = 0
+    for world in worlds:
+        for thing in pushables(world):
+            before = world.items[thing].pose
+            for heading in range(4):
+                pushed = world.pushed(thing, heading, agent=False)
+                upright = abs(pushed.pose.z - before.z) < 0.01 and not pushed.toppled
+                if pushed.success and upright:
+                    assert pushed.displacement_m < 1.1 * slide_m(world, thing) + 0.1
+                    checked += pushed.displacement_m > 0.8 * slide_m(world, thing)
+    assert checked > 10
+
+
+def test_most_guesses_are_right(worlds):
+    """Ways straight over each thing: what the screen says of them, and what a push does."""
+    right = wrong = 0
+    for world in worlds:
+        nx, ny = world.stage.lattice.shape
+        ground = Ground.of(world)
+        for thing in pushables(world):
+            i, j = np.rint(world.items[thing].footprint.vertices.mean(axis=0) / 0.25).astype(int)
+            way = marks_on([4 * ((i + k) * ny + j) for k in range(-1, 2)], nx * ny)
+            bit = 1 << ground.things.index(thing)
+            for heading, clears in enumerate(clearing(world, thing, way, (nx, ny))):
+                there, pushed = world.copy(), world.pushed(thing, heading, agent=False)
+                if pushed.success:
+                    there.put([(thing, pushed.pose), *pushed.moved])
+                blocks = (ground.masks(there).reshape(-1)[way] & bit).any()
+                right += clears != blocks
+                wrong += clears == blocks
+    assert right + wrong > 100
+    assert right > 4 * wrong
+
+
+def test_a_field_that_stops_early_knows_the_way_down(worlds):
+    world = worlds[1]
+    ground = Ground.of(world)
+    masks, prices = ground.masks(world), ground.prices(world)
+    goals = ground.goals
+    whole = field(ground.fixed, masks, 0, prices, ground.ny, goals, -1)
+    poses = np.flatnonzero(whole < FAR)
+    assert len(poses) > 100
+    for pose in poses[:: len(poses) // 40].tolist():
+        part = field(ground.fixed, masks, 0, prices, ground.ny, goals, pose)
+        assert part[pose] == whole[pose]
+        below = whole <= whole[pose]
+        assert (part[below] == whole[below]).all()
+        first, second = (
+            ground.way(masks, 0, prices, costs, pose)[0].tolist() for costs in (part, whole)
+        )
+        assert first == second
+    cut_off = np.flatnonzero(whole == FAR)
+    closed = field(ground.fixed, masks, EVERYTHING, prices, ground.ny, goals, int(cut_off[0]))
+    assert closed[cut_off[0]] == FAR
