@@ -27,7 +27,7 @@ from internav_data.records import Pose
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from naive_bullet import Rest
+    from naive_bullet import SettleSolution
 
     from internav_data.records import Asset, House
 
@@ -283,7 +283,7 @@ class NaiveObstacle:
     """An obstacle at rest."""
 
     asset: Asset
-    rest: Rest
+    rest: SettleSolution
     shape: shapely.Geometry
 
 

@@ -26,7 +26,7 @@ import shapely
 from internav_data.catalog import catalogue
 from internav_data.geometry import Polygons, footprint, house_footprints, yaw_quaternion
 from internav_data.houses import HouseConfig, build_house
-from internav_data.navigation import CLEARANCE_M, SPACING_M, Lattice, WayFinder
+from internav_data.navigation import CLEARANCE_M, SPACING_M, Lattice, TangentGraph
 from internav_data.records import Pose, Purpose, generator
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def plain_way(solid: NDArray[Any], p: Vec2, q: Vec2) -> float | None:
         return None
 
 
-def spawned(ways: WayFinder, p: Vec2, q: Vec2, random: Generator) -> Polygons:
+def spawned(ways: TangentGraph, p: Vec2, q: Vec2, random: Generator) -> Polygons:
     """Strew some of the catalogue's obstacles along the way, as spawning does."""
     line = shapely.LineString(ways.path(p, q))
     things = catalogue().spawnable
@@ -121,7 +121,9 @@ def spawned(ways: WayFinder, p: Vec2, q: Vec2, random: Generator) -> Polygons:
     return Polygons.joined(groups)
 
 
-def questions(lattice: Lattice, ways: WayFinder, random: Generator) -> list[tuple[Any, Any, Any]]:
+def questions(
+    lattice: Lattice, ways: TangentGraph, random: Generator
+) -> list[tuple[Any, Any, Any]]:
     labels = lattice.components()
     nodes = np.argwhere(labels == np.bincount(labels[labels >= 0]).argmax())
     out = []
@@ -144,11 +146,11 @@ def way_times(
     times: dict[str, list[float]], polygons: Polygons, solid: NDArray[Any], asked: list[Any]
 ) -> int:
     """Time any-angle questions; the plain way, which takes long, answers one of each kind."""
-    ways = WayFinder(polygons)
+    ways = TangentGraph(polygons)
     clear_ms, way_ms, sealed_ms = [], [], []
     differ = 0
     for p, q, things in asked:
-        fresh = WayFinder(polygons)  # remembers nothing yet
+        fresh = TangentGraph(polygons)  # remembers nothing yet
         clear, way = [], ways.distance(p, q, things)
         clear_ms.append(best_ms(lambda c=clear, f=fresh, a=p, b=q: c.append(f.distance(a, b)), 1))
         sealed_ms.append(best_ms(lambda a=p, b=q, t=things: ways.sealed(a, b, t), 5))
@@ -185,7 +187,7 @@ def house_times(scene: int, seed: int) -> tuple[dict[str, list[float]], int]:
     house = build_house(seed, scene, HouseConfig(), catalogue())
     polygons = house_footprints(house)
     solid = np.array([shapely.Polygon(p) for p in polygons])
-    lattice, ways = Lattice.of(house), WayFinder.of(house)
+    lattice, ways = Lattice.of(house), TangentGraph.of(house)
     asked = questions(lattice, ways, generator(seed, Purpose.SPAWN, scene))
     graph = plain_lattice(solid, house, lattice.shape)
     _, q, things = asked[0]
@@ -212,7 +214,7 @@ def house_times(scene: int, seed: int) -> tuple[dict[str, list[float]], int]:
             best_ms(lambda: nx.single_source_shortest_path_length(graph, node), 3),
         ],
         "four obstacles come and go on the lattice": [best_ms(again, 9), best_ms(rebuilt, 2)],
-        "any-angle: prepare a house": [best_ms(lambda: WayFinder(polygons), 3)],
+        "any-angle: prepare a house": [best_ms(lambda: TangentGraph(polygons), 3)],
     }
     differ += way_times(times, polygons, solid, asked)
     return times, differ

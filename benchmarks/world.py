@@ -26,11 +26,11 @@ from internav_data.episodes.outcomes import outcomes_of
 from internav_data.geometry import yaw_quaternion
 from internav_data.houses import HouseConfig, build_house
 from internav_data.physics import push
-from internav_data.physics.cache import Remembering
+from internav_data.physics.cache import CachedEngine
 from internav_data.physics.engines.bullet import bullet
-from internav_data.physics.push import SHOVES, _push_alone, _push_in
-from internav_data.physics.result_cache import FOLDER_VARIABLE, Solutions
-from internav_data.physics.scene import UPRIGHT, Body, Setting
+from internav_data.physics.push import PUSH_SPECS, _push_alone, _push_in
+from internav_data.physics.result_cache import FOLDER_VARIABLE, ResultCache
+from internav_data.physics.scene import UPRIGHT, Body, PhysicsScene
 from internav_data.records import Pose
 from internav_data.world import Action, Stage, World
 
@@ -99,13 +99,17 @@ def free_pushes() -> tuple[dict[str, float], dict[str, float]]:
 def kept_pushes(folder: Path) -> dict[str, float]:
     """Free pushes that another process has solved and kept on disk."""
     pool = [asset for asset in catalogue().spawnable if asset.pushable][::3]
-    asked = [Setting((Body(asset, Pose(0.0, 0.0, 0.001, UPRIGHT), moves=True),)) for asset in pool]
-    first = Remembering(bullet(), Solutions(folder), "here")
+    asked = [
+        PhysicsScene((Body(asset, Pose(0.0, 0.0, 0.001, UPRIGHT), moves=True),)) for asset in pool
+    ]
+    first = CachedEngine(bullet(), ResultCache(folder), "here")
     for setting in asked:
-        first.push(setting, SHOVES["force"])
+        first.push(setting, PUSH_SPECS["force"])
     first.solutions.flush()
-    later = Remembering(bullet(), Solutions(folder), "here")
-    return summary([timed(lambda s=setting: later.push(s, SHOVES["force"])) for setting in asked])
+    later = CachedEngine(bullet(), ResultCache(folder), "here")
+    return summary(
+        [timed(lambda s=setting: later.push(s, PUSH_SPECS["force"])) for setting in asked]
+    )
 
 
 def pushes_in_houses(worlds: list[World]) -> dict[str, float]:

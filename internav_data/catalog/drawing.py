@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from internav_data.catalog.designs import DESIGNS
-from internav_data.catalog.sampling import Dice
+from internav_data.catalog.sampling import UniformSampler
 from internav_data.catalog.shapes import Sketch
 from internav_data.records import Asset, Purpose, generator
 
@@ -95,7 +95,7 @@ def draw_type(sheet: TypeSheet, place: int, *, spawnable: bool) -> tuple[Asset, 
     assets = []
     for k, size in enumerate(sizes):
         sketch = Sketch()
-        dice = Dice(generator(SEED, Purpose.CATALOG, scene=place, episode=k + 1))
+        dice = UniformSampler(generator(SEED, Purpose.CATALOG, scene=place, episode=k + 1))
         design(sketch, *size, dice)
         assets.append(
             Asset(

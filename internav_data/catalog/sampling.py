@@ -70,7 +70,7 @@ LINEN = Paint((240, 238, 232), "fabric")
 _BATCH = 64
 
 
-class Dice:
+class UniformSampler:
     """Uniform numbers only, drawn in batches: the same for any release of numpy's samplers."""
 
     def __init__(self, rng: Generator) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from internav_data.dataset.decode import from_table
 from internav_data.dataset.manifest import MANIFEST, Manifest, locate, open_file, read_manifest
 from internav_data.dataset.parquet import read_all
-from internav_data.dataset.row_group_cache import Shelf
+from internav_data.dataset.row_group_cache import RowGroupCache
 from internav_data.dataset.select import Filters, check_columns, matching_rows, read_columns
 from internav_data.dataset.stream import EpisodeStream
 from internav_data.dataset.tables import ASSETS, EPISODES, SCENES
@@ -89,7 +89,7 @@ class Dataset(Generic[E]):
             check_columns(columns, EPISODES)
         self._digest = hashlib.sha256((path / MANIFEST).read_bytes()).hexdigest()
         self._files = self.manifest.of("episodes", split)
-        self.shelf = Shelf(path, self._files, EPISODES, self.columns)
+        self.shelf = RowGroupCache(path, self._files, EPISODES, self.columns)
         self._houses: OrderedDict[str, House] = OrderedDict()
         for file in (*self.manifest.of("scenes"), *self.manifest.of("assets")):
             locate(path, file)
@@ -205,9 +205,9 @@ class Dataset(Generic[E]):
         return {asset.asset_id: asset for asset in from_table(table, ASSETS)}
 
     @functools.cached_property
-    def _scenes(self) -> tuple[Shelf, dict[str, int]]:
+    def _scenes(self) -> tuple[RowGroupCache, dict[str, int]]:
         files = self.manifest.of("scenes")
-        shelf = Shelf(self.path, files, SCENES, extra=lambda: {"assets": self.assets})
+        shelf = RowGroupCache(self.path, files, SCENES, extra=lambda: {"assets": self.assets})
         ids = read_columns(self.path, files, SCENES, ["scene_id"])["scene_id"].to_pylist()
         return shelf, {scene_id: row for row, scene_id in enumerate(ids)}
 

@@ -29,7 +29,7 @@ _OPEN_FILES = 64
 _CACHED_BYTES = 96 << 20
 
 
-class Shelf:
+class RowGroupCache:
     """The rows of one table in several files, numbered through, read a row group at a time.
 
     Holds open files and at most some 96 MiB of row groups. After a fork (a DataLoader's worker)

@@ -10,7 +10,7 @@ from internav_data.envs.tasks import (
     KINDS,
     STEP,
     SUCCESS,
-    Tally,
+    EpisodeStatistics,
     interaction_reward,
     metrics,
     move_reward,
@@ -113,7 +113,7 @@ class Play:
         self._length_m = episode.clear_m if start is None else self.clear_m
         self.start = None if start is None else (start[0], start[1], start[2] % 4)
         self.actions: list[int] = []
-        self.tally = Tally()
+        self.tally = EpisodeStatistics()
         self.success = self.over = False
         self.stale = True
         self.last: StepResult | None = None

@@ -22,7 +22,7 @@ KINDS: Final = {
 
 
 @dataclass(slots=True)
-class Tally:
+class EpisodeStatistics:
     """What is counted on the way."""
 
     moves: int = 0
@@ -36,7 +36,7 @@ class Tally:
 
 
 def metrics(
-    tally: Tally, *, success: bool, clear_m: float, steps: int, distance_m: float
+    tally: EpisodeStatistics, *, success: bool, clear_m: float, steps: int, distance_m: float
 ) -> dict[str, float | int | bool]:
     """Return the metrics of one finished episode: their means over episodes are the paper's.
 

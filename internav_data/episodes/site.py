@@ -14,7 +14,7 @@ from internav_data.world import Stage
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from internav_data.navigation import Lattice, WayFinder
+    from internav_data.navigation import Lattice, TangentGraph
     from internav_data.records import House, Vec2
 
 
@@ -29,7 +29,7 @@ class Site:
     """All that stands in the house, walls first."""
     lattice: Lattice
     """The stage's: of the house without obstacles. Never changed: copy it."""
-    ways: WayFinder
+    ways: TangentGraph
     """The stage's, all furniture in its place."""
     nodes: NDArray[np.int64]
     """Free nodes of the largest component, shape (n, 2), in order of i, then j."""

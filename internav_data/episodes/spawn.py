@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from internav_data.episodes.config import EpisodeConfig
     from internav_data.episodes.site import Site
     from internav_data.navigation import Lattice
-    from internav_data.physics import Settled
+    from internav_data.physics import SettleResult
     from internav_data.records import Asset, Mode, NodePath, Vec2
 
 YAW_STEP_DEG = 15
@@ -43,7 +43,7 @@ class Spawned:
     """An obstacle at rest: its footprint is the one that a reader of the file will derive."""
 
     asset: Asset
-    settled: Settled
+    settled: SettleResult
     segment: int
     footprint: Polygons
 

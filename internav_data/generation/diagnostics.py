@@ -172,7 +172,7 @@ def _solutions() -> list[Check]:
     if folder is None:
         return [Check(name, "good", f"none kept: {solutions.FOLDER_VARIABLE} is empty", "")]
     path = folder / solutions.FILE_NAME
-    if solutions.Solutions(folder).is_open:
+    if solutions.ResultCache(folder).is_open:
         mb, most = path.stat().st_size / 1e6, solutions.BYTES_AT_MOST / 1e6
         return [Check(name, "good", f"{mb:.0f} of at most {most:.0f} MB at {path}", "")]
     remedy = f"set {solutions.FOLDER_VARIABLE} to a folder of yours, or to nothing to keep none"

@@ -58,10 +58,10 @@ class Fatal:
 
 
 @dataclass(frozen=True, slots=True)
-class Bye:
+class WorkerExited:
     """The process is gone."""
 
     cause: str
 
 
-Message = Ready | Done | Failed | Fatal | Bye
+Message = Ready | Done | Failed | Fatal | WorkerExited

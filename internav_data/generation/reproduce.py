@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from internav_data.core.config import plain
 from internav_data.generation.run import identity_for
 from internav_data.generation.scenes import asset_folders, build_scene
-from internav_data.physics import solving_anew
+from internav_data.physics import cache_disabled
 from internav_data.records.errors import UsageError, ValidationError
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def made_again(config: GenerationConfig, scene: int, episode: int | None = None)
     if scene < 0 or (episode is not None and episode < 0):
         raise UsageError(f"scene is {scene} and episode is {episode}: both count from 0")
     known = catalogue(asset_folders(config))
-    with solving_anew():
+    with cache_disabled():
         built = build_scene(scene, config, known, None if episode is None else episode + 1)
     return Made(built.house, built.episodes, known.assets)
 

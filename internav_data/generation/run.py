@@ -35,7 +35,7 @@ from internav_data.generation.scenes import (
     asset_folders,
     scene_maker,
 )
-from internav_data.generation.worker_pool import Crew, Recipe
+from internav_data.generation.worker_pool import Recipe, WorkerPool
 from internav_data.houses.quota import room_count
 from internav_data.records import Pose
 from internav_data.records.errors import InternavError, QuarantineError, UsageError
@@ -119,7 +119,7 @@ def generate(
             done = _done_before(out, scenes)
             plan = _Plan(config, scenes, tuple(k for k in range(scenes) if k not in done))
             recipe = Recipe(setup, ScenePayload(config, assets, str(work)))
-            with Interrupts() as stop, Crew(workers or cores(), recipe, stop) as crew:
+            with Interrupts() as stop, WorkerPool(workers or cores(), recipe, stop) as crew:
                 _make(crew, plan, progress, work)
                 if stop():
                     raise InterruptedRunError(_interruption(out, progress), stop.signum)
@@ -213,7 +213,7 @@ class _Plan:
         return [*self.todo[:cut], *tail]
 
 
-def _make(crew: Crew, plan: _Plan, progress: Progress, work: Path) -> None:
+def _make(crew: WorkerPool, plan: _Plan, progress: Progress, work: Path) -> None:
     """Have the scenes made; those that cannot be are stored as quarantined."""
     before = plan.scenes - len(plan.todo)
     progress.begin(plan.scenes, before, sum(plan.expected(scene) for scene in plan.todo))

@@ -20,7 +20,7 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
-from internav_data.generation.messages import Bye, Done, Failed, Fatal, Ready
+from internav_data.generation.messages import Done, Failed, Fatal, Ready, WorkerExited
 from internav_data.records.errors import InternavError
 
 if TYPE_CHECKING:
@@ -111,11 +111,11 @@ class _Worker:
         self.send(task)
 
     def receive(self) -> Message:
-        """Return the next message, `Bye` when the process is gone."""
+        """Return the next message, `WorkerExited` when the process is gone."""
         try:
             message: Message = self.pipe.recv()
         except (EOFError, ConnectionResetError):
-            return Bye(self._obituary())
+            return WorkerExited(self._obituary())
         return message
 
     def _obituary(self) -> str:
@@ -150,7 +150,7 @@ def _cause(code: int, words: str) -> str:
     return f"its worker ended with code {code}" + (f": {words}" if words else "")
 
 
-class Crew:
+class WorkerPool:
     """Some workers that do tasks in any order; use it as a context manager."""
 
     def __init__(self, size: int, recipe: Recipe, stop: StopFlag = lambda: False) -> None:
@@ -227,14 +227,14 @@ class Crew:
                 worker.ready, self._false_starts = True, 0
             elif isinstance(message, Fatal):
                 raise message.error()
-            elif isinstance(message, Bye):
+            elif isinstance(message, WorkerExited):
                 yield from self._bury(worker, message, todo, deaths)
             else:
                 worker.busy = False
                 yield message
 
     def _bury(
-        self, worker: _Worker, message: Bye, todo: deque[Any], deaths: Counter[Any]
+        self, worker: _Worker, message: WorkerExited, todo: deque[Any], deaths: Counter[Any]
     ) -> Iterator[Any]:
         """Take a dead worker's task back, or give it up."""
         self._workers.remove(worker)

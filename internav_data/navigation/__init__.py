@@ -2,7 +2,7 @@
 
 from internav_data.navigation.lattice import Lattice
 from internav_data.navigation.rooms import PATHS_AT_MOST, node_paths, room_of, room_paths, rooms_of
-from internav_data.navigation.tangent_graph.shortest_path import WayFinder, keeps_clear
+from internav_data.navigation.tangent_graph.shortest_path import TangentGraph, keeps_clear
 from internav_data.records.agent import CLEARANCE_M, RADIUS_M, SPACING_M, TOLERANCE_M
 
 __all__ = [
@@ -12,7 +12,7 @@ __all__ = [
     "SPACING_M",
     "TOLERANCE_M",
     "Lattice",
-    "WayFinder",
+    "TangentGraph",
     "keeps_clear",
     "node_paths",
     "room_of",

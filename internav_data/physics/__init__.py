@@ -1,33 +1,33 @@
 """Physics as pure functions of plain data: settle, push, the engines behind them, their cache."""
 
-from internav_data.physics.push import Pushed, PushModel, push
-from internav_data.physics.registry import engine_of_this_process, solving_anew
+from internav_data.physics.push import PushModel, PushResult, push
+from internav_data.physics.registry import cache_disabled, engine_of_this_process
 from internav_data.physics.scene import (
+    AgentCollider,
     Body,
-    Column,
     Engine,
-    Motion,
-    Rest,
-    Setting,
-    Shove,
+    PhysicsScene,
+    PushSolution,
+    PushSpec,
+    SettleSolution,
     wall_body,
 )
-from internav_data.physics.settle import Settled, settle
+from internav_data.physics.settle import SettleResult, settle
 
 __all__ = [
+    "AgentCollider",
     "Body",
-    "Column",
     "Engine",
-    "Motion",
+    "PhysicsScene",
     "PushModel",
-    "Pushed",
-    "Rest",
-    "Setting",
-    "Settled",
-    "Shove",
+    "PushResult",
+    "PushSolution",
+    "PushSpec",
+    "SettleResult",
+    "SettleSolution",
+    "cache_disabled",
     "engine_of_this_process",
     "push",
     "settle",
-    "solving_anew",
     "wall_body",
 ]

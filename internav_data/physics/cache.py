@@ -19,15 +19,15 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from internav_data.physics.scene import Motion, Rest
+from internav_data.physics.scene import PushSolution, SettleSolution
 from internav_data.physics.sweep import PATH_POSE_BYTES
 from internav_data.records import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from internav_data.physics.result_cache import Solutions
-    from internav_data.physics.scene import Engine, Setting, Shove
+    from internav_data.physics.result_cache import ResultCache
+    from internav_data.physics.scene import Engine, PhysicsScene, PushSpec
     from internav_data.records import Asset
 
 _PACKAGE: Final = "internav_data"
@@ -44,11 +44,11 @@ _MOVER: Final = struct.Struct("<7d8dI")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Remembering:
+class CachedEngine:
     """An engine that is asked only what neither this process nor another one has had solved."""
 
     engine: Engine
-    solutions: Solutions
+    solutions: ResultCache
     origin: str
     """What the answers depend on besides the question: engine, rules, machine."""
 
@@ -62,7 +62,7 @@ class Remembering:
         """Version and build of the engine."""
         return self.engine.build
 
-    def settle(self, setting: Setting) -> Rest:
+    def settle(self, setting: PhysicsScene) -> SettleSolution:
         """Let the first body of the setting fall until it rests."""
         if not self.solutions.is_open:
             return self.engine.settle(setting)
@@ -73,7 +73,7 @@ class Remembering:
             self.solutions.put(key, _write_rest(known))
         return known
 
-    def push(self, setting: Setting, shove: Shove) -> Motion:
+    def push(self, setting: PhysicsScene, shove: PushSpec) -> PushSolution:
         """Push the first body of the setting along +x."""
         if not self.solutions.is_open:
             return self.engine.push(setting, shove)
@@ -84,7 +84,7 @@ class Remembering:
             self.solutions.put(key, _write_motion(known))
         return known
 
-    def _key(self, what: str, setting: Setting) -> bytes:
+    def _key(self, what: str, setting: PhysicsScene) -> bytes:
         bodies = ((_digest(b.asset), b.pose, b.moves) for b in setting.bodies)
         asked = (self.origin, what, setting.column, *bodies)
         return hashlib.sha256(repr(asked).encode()).digest()
@@ -99,22 +99,22 @@ def _numbers(pose: Pose) -> tuple[float, ...]:
     return (pose.x, pose.y, pose.z, *pose.quaternion)
 
 
-def _write_rest(rest: Rest) -> bytes:
+def _write_rest(rest: SettleSolution) -> bytes:
     numbers = (rest.seconds, rest.penetration_m, rest.reach_m)
     return _REST.pack(*_numbers(rest.pose), *numbers, rest.at_rest)
 
 
-def _read_rest(value: bytes | None) -> Rest | None:
+def _read_rest(value: bytes | None) -> SettleSolution | None:
     if value is None or len(value) != _REST.size:
         return None
     x, y, z, a, b, c, d, *numbers, at_rest = _REST.unpack(value)
     if not all(map(math.isfinite, (x, y, z, a, b, c, d, *numbers))):
         return None
     seconds, penetration_m, reach_m = numbers
-    return Rest(Pose(x, y, z, (a, b, c, d)), seconds, at_rest, penetration_m, reach_m)
+    return SettleSolution(Pose(x, y, z, (a, b, c, d)), seconds, at_rest, penetration_m, reach_m)
 
 
-def _write_motion(motion: Motion) -> bytes:
+def _write_motion(motion: PushSolution) -> bytes:
     movers = zip(motion.poses, motion.sweeps, motion.paths, strict=True)
     return b"".join((
         _MOTION.pack(motion.seconds, motion.at_rest, len(motion.poses)),
@@ -123,7 +123,7 @@ def _write_motion(motion: Motion) -> bytes:
     ))  # fmt: skip
 
 
-def _read_motion(value: bytes | None, movers: int) -> Motion | None:
+def _read_motion(value: bytes | None, movers: int) -> PushSolution | None:
     """Read a motion of so many bodies; None where it is none."""
     at = _MOTION.size + movers * _MOVER.size
     if value is None or len(value) < at:
@@ -140,7 +140,7 @@ def _read_motion(value: bytes | None, movers: int) -> Motion | None:
         at += size
     if len(value) != at or not all(path and len(path) % PATH_POSE_BYTES == 0 for path in paths):
         return None
-    return Motion(tuple(poses), tuple(sweeps), tuple(paths), seconds, at_rest)
+    return PushSolution(tuple(poses), tuple(sweeps), tuple(paths), seconds, at_rest)
 
 
 def solver_modules(root: Path, start: tuple[str, ...] = _SOLVERS) -> dict[str, Path]:

@@ -14,7 +14,7 @@ from internav_data.geometry.headings import TURNS, turned
 from internav_data.records import Pose
 
 if TYPE_CHECKING:
-    from internav_data.physics.kdop import Octagon
+    from internav_data.physics.kdop import Dop8
     from internav_data.records import Vec2
 
 
@@ -45,7 +45,7 @@ class Frame:
         x, y = turned(-self.heading, point[0] - self.x, point[1] - self.y)
         return round_m(x), round_m(y)
 
-    def leave_octagon(self, octagon: Octagon) -> Octagon:
+    def leave_octagon(self, octagon: Dop8) -> Dop8:
         """Octagon in the house."""
         first = -2 * self.heading
         a, b, c, d, e, f, g, h = (octagon[(first + k) % 8] for k in range(8))

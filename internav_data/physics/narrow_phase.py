@@ -198,7 +198,7 @@ def met_on_path(
     asset
         What moves.
     path
-        Its poses in a frame (`Motion.paths`).
+        Its poses in a frame (`PushSolution.paths`).
     frame
         That frame.
     others

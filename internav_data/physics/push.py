@@ -13,26 +13,33 @@ from internav_data.physics.frames import Frame
 from internav_data.physics.kdop import grown
 from internav_data.physics.narrow_phase import met_on_path, outline_of, outline_of_column
 from internav_data.physics.registry import engine_of_this_process
-from internav_data.physics.scene import AGENT_HEIGHT_M, AGENT_LOW_M, Body, Column, Setting, Shove
+from internav_data.physics.scene import (
+    AGENT_HEIGHT_M,
+    AGENT_LOW_M,
+    AgentCollider,
+    Body,
+    PhysicsScene,
+    PushSpec,
+)
 from internav_data.physics.sweep import extent_of
 from internav_data.records import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Container, Sequence
 
-    from internav_data.physics.kdop import Octagon
-    from internav_data.physics.scene import Engine, Motion
+    from internav_data.physics.kdop import Dop8
+    from internav_data.physics.scene import Engine, PushSolution
     from internav_data.records import Asset, Quaternion, Vec2
 
-    Near = Callable[[Octagon], Sequence[tuple[int, Body]]]
+    Near = Callable[[Dop8], Sequence[tuple[int, Body]]]
     """Bodies, with their keys in ascending order, that reach into an octagon of the house."""
     Movers = tuple[tuple[int, Body], ...]
     """Bodies that move besides what is pushed, with their keys."""
 
 PushModel = Literal["force", "kick"]
-SHOVES: Final[dict[PushModel, Shove]] = {
-    "force": Shove(force_n=200.0, speed_m_s=2.0, seconds=0.5),
-    "kick": Shove(force_n=math.inf, speed_m_s=2.0, seconds=0.5),
+PUSH_SPECS: Final[dict[PushModel, PushSpec]] = {
+    "force": PushSpec(force_n=200.0, speed_m_s=2.0, seconds=0.5),
+    "kick": PushSpec(force_n=math.inf, speed_m_s=2.0, seconds=0.5),
 }
 """The paper's constant force, and the released code's 2 m/s for every mass."""
 SUCCESS_M: Final = 0.05
@@ -65,7 +72,7 @@ Failure = Literal["", "too heavy", "something is in the way", "the agent is in t
 
 
 @dataclass(frozen=True, slots=True)
-class Pushed:
+class PushResult:
     """Where everything lies after a push, rounded as it will be stored.
 
     It is the whole truth also where the push failed: whoever applies it decides what stays.
@@ -93,7 +100,7 @@ def push(
     *,
     agent_gap_m: float = math.inf,
     model: PushModel = "force",
-) -> Pushed:
+) -> PushResult:
     """Push a thing along one of the house's four headings.
 
     Solved in its own frame: the thing at the origin, the push along +x. Where nothing reaches into
@@ -116,7 +123,7 @@ def push(
         "force" or "kick".
 
     """
-    shove = SHOVES[model]
+    shove = PUSH_SPECS[model]
     frame = Frame(pose.x, pose.y, heading)
     start = _start(frame, pose)
     motion = free = _push_alone(asset, start, shove, engine_of_this_process())
@@ -145,11 +152,11 @@ def crowd(asset: Asset, pose: Pose, heading: int, near: Near, model: PushModel =
     Parameters as in `push`.
     """
     frame = Frame(pose.x, pose.y, heading)
-    free = _push_alone(asset, _start(frame, pose), SHOVES[model], engine_of_this_process())
+    free = _push_alone(asset, _start(frame, pose), PUSH_SPECS[model], engine_of_this_process())
     if shift_m(asset, pose, frame.leave(free.poses[0])) < SUCCESS_M:
         return 0
 
-    def loose(octagon: Octagon) -> list[tuple[int, Body]]:
+    def loose(octagon: Dop8) -> list[tuple[int, Body]]:
         return [pair for pair in near(octagon) if pair[1].moves]
 
     known = _met(frame, loose, (asset,), free)
@@ -163,12 +170,12 @@ def _start(frame: Frame, pose: Pose) -> Pose:
 
 
 @lru_cache(maxsize=32768)
-def _push_alone(asset: Asset, start: Pose, shove: Shove, engine: Engine) -> Motion:
-    return engine.push(Setting((Body(asset, start, moves=True),)), shove)
+def _push_alone(asset: Asset, start: Pose, shove: PushSpec, engine: Engine) -> PushSolution:
+    return engine.push(PhysicsScene((Body(asset, start, moves=True),)), shove)
 
 
 @lru_cache(maxsize=4096)
-def _push_in(setting: Setting, shove: Shove, engine: Engine) -> Motion:
+def _push_in(setting: PhysicsScene, shove: PushSpec, engine: Engine) -> PushSolution:
     """Push in a scene; what failed changed nothing and is likely to be tried again."""
     return engine.push(setting, shove)
 
@@ -178,10 +185,10 @@ def _push_among(
     start: Pose,
     frame: Frame,
     near: Near,
-    column: Column | None,
-    shove: Shove,
+    column: AgentCollider | None,
+    shove: PushSpec,
     known: dict[int, Body],
-) -> tuple[Motion, Movers]:
+) -> tuple[PushSolution, Movers]:
     """Push among what is touched: solved anew until nothing left out is.
 
     What turns out to be touched joins `known`.
@@ -194,7 +201,7 @@ def _push_among(
         bodies = (
             Body(body.asset, frame.enter(body.pose), body.moves) for _, body in (*movers, *others)
         )
-        setting = Setting((Body(asset, start, moves=True), *bodies), column)
+        setting = PhysicsScene((Body(asset, start, moves=True), *bodies), column)
         motion = _push_in(setting, shove, engine)
         met = _met(frame, near, (asset, *_assets(movers)), motion, known)
         if not met:
@@ -214,7 +221,7 @@ def _met(
     frame: Frame,
     near: Near,
     moving: Sequence[Asset],
-    motion: Motion,
+    motion: PushSolution,
     known: Container[int] = (),
 ) -> dict[int, Body]:
     """Gather what is not known yet and may be touched by what moves."""
@@ -232,10 +239,10 @@ def _judged(
     asset: Asset,
     pose: Pose,
     frame: Frame,
-    motion: Motion,
+    motion: PushSolution,
     movers: Movers,
     failure: Failure,
-) -> Pushed:
+) -> PushResult:
     """Move a motion from the thing's own frame into the house, round it, and judge it."""
     end = frame.leave(motion.poses[0])
     far = round_m(shift_m(asset, pose, end))
@@ -245,7 +252,7 @@ def _judged(
         if not is_still(body.pose, there):
             moved.append((key, there))
     success = far >= SUCCESS_M
-    return Pushed(
+    return PushResult(
         pose=end,
         displacement_m=far,
         seconds=round(motion.seconds, 6),
@@ -262,14 +269,14 @@ def _coarse(quaternion: Quaternion) -> Quaternion:
     return x, y, z, w
 
 
-def _column(frame: Frame, agent: Vec2 | None, gap: float) -> Column | None:
+def _column(frame: Frame, agent: Vec2 | None, gap: float) -> AgentCollider | None:
     if agent is None:
         return None
     x, y = frame.enter_point(agent)
-    return Column(x, y, min(AGENT_M, max(AGENT_LEAST_M, round_m(gap))))
+    return AgentCollider(x, y, min(AGENT_M, max(AGENT_LEAST_M, round_m(gap))))
 
 
-def _meets(column: Column, moving: Sequence[Asset], motion: Motion) -> bool:
+def _meets(column: AgentCollider, moving: Sequence[Asset], motion: PushSolution) -> bool:
     """Whether anything that moves comes near the agent's column."""
     agent = outline_of_column(column.x, column.y, column.radius_m, AGENT_LOW_M, AGENT_HEIGHT_M)
     return any(

@@ -6,8 +6,8 @@ from contextlib import contextmanager
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from internav_data.physics.cache import Remembering, origin
-from internav_data.physics.result_cache import Solutions, solutions
+from internav_data.physics.cache import CachedEngine, origin
+from internav_data.physics.result_cache import ResultCache, solutions
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -18,7 +18,7 @@ _asked_anew = False
 
 
 @contextmanager
-def solving_anew() -> Iterator[None]:
+def cache_disabled() -> Iterator[None]:
     """Ask the engine itself for everything: what other processes left on disk is not believed."""
     global _asked_anew  # noqa: PLW0603 - belongs to the process, as the engine does
     before, _asked_anew = _asked_anew, True
@@ -37,6 +37,6 @@ def engine_of_this_process() -> Engine:
 
 
 @lru_cache(maxsize=1)
-def _remembering(engine: Engine, known: Solutions) -> Engine:
+def _remembering(engine: Engine, known: ResultCache) -> Engine:
     where = origin(engine.build)
-    return engine if where is None else Remembering(engine, known, where)
+    return engine if where is None else CachedEngine(engine, known, where)

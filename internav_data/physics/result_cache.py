@@ -47,7 +47,7 @@ def cache_folder() -> Path | None:
     return None
 
 
-class Solutions:
+class ResultCache:
     """Values under keys, both bytes; kept for as long as the file is.
 
     Parameters
@@ -165,13 +165,13 @@ def _checked(value: bytes) -> bytes:
     return zlib.crc32(value).to_bytes(_CHECK, "little")
 
 
-def solutions() -> Solutions:
+def solutions() -> ResultCache:
     """Return this process's view of the solutions; a forked process opens its own."""
     return _of_process(os.getpid())
 
 
 @cache  # not the last one only: what a forked process inherits must not be closed in it
-def _of_process(_pid: int) -> Solutions:
-    opened = Solutions(cache_folder())
+def _of_process(_pid: int) -> ResultCache:
+    opened = ResultCache(cache_folder())
     atexit.register(opened.flush)
     return opened

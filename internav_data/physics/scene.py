@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, Protocol
 from internav_data.records import Asset, Part, Pose
 
 if TYPE_CHECKING:
-    from internav_data.physics.kdop import Octagon
+    from internav_data.physics.kdop import Dop8
     from internav_data.records import Quaternion, Wall
 
 UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
@@ -28,7 +28,7 @@ class Body:
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class AgentCollider:
     """The agent's body: a fixed upright cylinder from `AGENT_LOW_M` to `AGENT_HEIGHT_M`."""
 
     x: float
@@ -37,14 +37,14 @@ class Column:
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class PhysicsScene:
     """A small scene: what can touch each other, everything else left out.
 
     Bodies enter the engine in this order, on a floor at z = 0.
     """
 
     bodies: tuple[Body, ...]
-    column: Column | None = None
+    column: AgentCollider | None = None
     """The agent, where it takes part."""
 
 
@@ -70,7 +70,7 @@ def wall_body(wall: Wall) -> Body:
 
 
 @dataclass(frozen=True, slots=True)
-class Rest:
+class SettleSolution:
     """How the first body of a setting came to rest."""
 
     pose: Pose
@@ -85,7 +85,7 @@ class Rest:
 
 
 @dataclass(frozen=True, slots=True)
-class Shove:
+class PushSpec:
     """How the first body of a setting is pushed, along +x at its centre of mass.
 
     A constant force until the body has the speed (the last impulse is scaled so that it has
@@ -98,12 +98,12 @@ class Shove:
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class PushSolution:
     """Where a push led the moving bodies of a setting, in their order."""
 
     poses: tuple[Pose, ...]
     """Not rounded: the caller moves them into place first."""
-    sweeps: tuple[Octagon, ...]
+    sweeps: tuple[Dop8, ...]
     """What each body's corners swept in the plane, its start included."""
     paths: tuple[bytes, ...]
     """Each body's poses on its way as float32 numbers, seven each: centre of mass, quaternion."""
@@ -127,10 +127,10 @@ class Engine(Protocol):
     def build(self) -> str:
         """Version and build of the engine, as stored in certificates."""
 
-    def settle(self, setting: Setting) -> Rest:
+    def settle(self, setting: PhysicsScene) -> SettleSolution:
         """Let the first body of the setting fall until it rests; the others stay."""
 
-    def push(self, setting: Setting, shove: Shove) -> Motion:
+    def push(self, setting: PhysicsScene, shove: PushSpec) -> PushSolution:
         """Push the first body along +x; bodies that move take part, the others stay."""
 
     def __hash__(self) -> int:

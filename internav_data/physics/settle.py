@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 from internav_data.geometry import multiply, rotation_matrix, round_m, round_quaternion
 from internav_data.physics.registry import engine_of_this_process
-from internav_data.physics.scene import UPRIGHT, Body, Setting
+from internav_data.physics.scene import UPRIGHT, Body, PhysicsScene
 from internav_data.records import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from internav_data.physics.scene import Engine, Rest
+    from internav_data.physics.scene import Engine, SettleSolution
     from internav_data.records import Asset
 
 DROP_M = 0.01
@@ -28,7 +28,7 @@ MARGIN_M = 0.001
 
 
 @dataclass(frozen=True, slots=True)
-class Settled:
+class SettleResult:
     """Where a thing came to rest, rounded as it will be stored, and the certificate."""
 
     pose: Pose
@@ -43,7 +43,7 @@ def settle(
     pose: Pose,
     clearance_m: float,
     neighbours: Callable[[], Sequence[Body]],
-) -> Settled:
+) -> SettleResult:
     """Let a thing fall 1 cm onto the floor at an upright pose.
 
     The problem is solved in the thing's own frame. Where nothing lies within `clearance_m` of
@@ -69,16 +69,16 @@ def settle(
 
 
 @lru_cache(maxsize=8192)
-def _settle_alone(asset: Asset, engine: Engine) -> Rest:
-    return engine.settle(Setting((Body(asset, _START, moves=True),)))
+def _settle_alone(asset: Asset, engine: Engine) -> SettleSolution:
+    return engine.settle(PhysicsScene((Body(asset, _START, moves=True),)))
 
 
 _START = Pose(0.0, 0.0, DROP_M, UPRIGHT)
 
 
-def _setting(asset: Asset, pose: Pose, neighbours: Sequence[Body]) -> Setting:
+def _setting(asset: Asset, pose: Pose, neighbours: Sequence[Body]) -> PhysicsScene:
     bodies = (Body(b.asset, _seen_from(pose, b.pose), moves=False) for b in neighbours)
-    return Setting((Body(asset, _START, moves=True), *bodies))
+    return PhysicsScene((Body(asset, _START, moves=True), *bodies))
 
 
 def _seen_from(frame: Pose, pose: Pose) -> Pose:
@@ -91,7 +91,7 @@ def _seen_from(frame: Pose, pose: Pose) -> Pose:
     return Pose(round_m(px), round_m(py), round_m(pz), turned)
 
 
-def _judged(pose: Pose, rest: Rest) -> Settled:
+def _judged(pose: Pose, rest: SettleSolution) -> SettleResult:
     """Move a rest from the thing's own frame into the house, round it, and judge it."""
     shift = rest.pose
     dx, dy, dz = (
@@ -116,4 +116,4 @@ def _judged(pose: Pose, rest: Rest) -> Settled:
         refusal = "tilted too far"
     elif rest.penetration_m > MAX_PENETRATION_M:
         refusal = "sank in too deep"
-    return Settled(settled, round(rest.seconds, 6), round(rest.penetration_m, 6), refusal)
+    return SettleResult(settled, round(rest.seconds, 6), round(rest.penetration_m, 6), refusal)

@@ -16,7 +16,7 @@ from internav_data.physics.kdop import widen
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from internav_data.physics.kdop import Octagon
+    from internav_data.physics.kdop import Dop8
     from internav_data.records import Asset, Pose, Quaternion, Vec3
 
     Floats = NDArray[np.float64]
@@ -27,7 +27,7 @@ KEPT_M: Final = 0.004
 _POSE: Final = 7
 """Numbers of a pose: the centre of mass and a quaternion."""
 PATH_POSE_BYTES: Final = 4 * _POSE
-"""Of each pose of a `Trail.path`."""
+"""Of each pose of a `SweepRecorder.path`."""
 _KEPT, _LATEST, _COUNT, _LENGTH = 8, 15, 22, 23
 """Where a trail's state holds the last pose kept, the latest pose and the count of those kept;
 the first eight numbers are the octagon's."""
@@ -83,7 +83,7 @@ def _follow(
 
 
 @dataclass(slots=True)
-class Trail:
+class SweepRecorder:
     """What a body has swept so far."""
 
     _corners: Floats
@@ -109,7 +109,7 @@ class Trail:
         return 2.0 * math.acos(min(1.0, turn)) > far_rad
 
     @property
-    def octagon(self) -> Octagon:
+    def octagon(self) -> Dop8:
         """Octagon round all of it."""
         a, b, c, d, e, f, g, h = self._state[:8].tolist()
         return a, b, c, d, e, f, g, h
@@ -122,19 +122,19 @@ class Trail:
         return poses.tobytes() + last.tobytes()
 
 
-def trail_of(asset: Asset, steps: int) -> Trail:
+def trail_of(asset: Asset, steps: int) -> SweepRecorder:
     """Begin an empty trail of at most so many steps."""
     state = np.zeros(_LENGTH)
     state[:8] = -math.inf
     kept = np.empty((steps + 1, _POSE), dtype=np.float32)
-    return Trail(about_middle(asset), radius_m(asset), state, kept)
+    return SweepRecorder(about_middle(asset), radius_m(asset), state, kept)
 
 
 @dataclass(frozen=True, slots=True)
 class Extent:
     """How far a thing reaches where it lies, metres."""
 
-    octagon: Octagon
+    octagon: Dop8
     low_m: float
     high_m: float
 

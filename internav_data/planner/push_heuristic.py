@@ -11,7 +11,7 @@ from internav_data.geometry.headings import HEADINGS
 from internav_data.navigation import SPACING_M, grid
 from internav_data.navigation.grid import EAST, NODE, NORTH
 from internav_data.physics.kdop import grown, octagon_of_rectangle
-from internav_data.physics.push import SHOVES
+from internav_data.physics.push import PUSH_SPECS
 from internav_data.records.agent import CLEARANCE_M
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ GRAVITY: Final = 9.81
 
 def slide_m(world: World, thing: int) -> float:
     """How far a thing slides on free ground when pushed, metres: Coulomb's law."""
-    asset, shove = world.items[thing].asset, SHOVES[world.model]
+    asset, shove = world.items[thing].asset, PUSH_SPECS[world.model]
     brake = asset.friction * GRAVITY
     gain = shove.force_n / asset.mass_kg - brake
     if gain <= 0.0:

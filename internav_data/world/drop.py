@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from internav_data.physics.kdop import Octagon
+    from internav_data.physics.kdop import Dop8
     from internav_data.physics.scene import Body
-    from internav_data.physics.settle import Settled
+    from internav_data.physics.settle import SettleResult
     from internav_data.records import Asset, Vec2
 
     Floats = NDArray[np.float64]
@@ -54,11 +54,11 @@ class Ground(NamedTuple):
     walls: Polygons
     solid: Sequence[Polygons]
     """Footprints of all that is fixed and of all that can move."""
-    bodies: Callable[[Octagon], Sequence[Body]]
+    bodies: Callable[[Dop8], Sequence[Body]]
     """Gathers what reaches into an octagon of the house."""
 
 
-def drop(asset: Asset, agent: Vec2, heading: int, ground: Ground) -> Settled | None:
+def drop(asset: Asset, agent: Vec2, heading: int, ground: Ground) -> SettleResult | None:
     """Try gap after gap at bearing after bearing; None where there is no room.
 
     The thing stands upright, turned as the agent is.
@@ -107,7 +107,7 @@ def _crosses(ax: float, ay: float, bx: float, by: float, vertices: Floats, offse
     return False
 
 
-def _let_go(asset: Asset, pose: Pose, agent: Vec2, ground: Ground) -> Settled | None:
+def _let_go(asset: Asset, pose: Pose, agent: Vec2, ground: Ground) -> SettleResult | None:
     reach = math.hypot(asset.size[0], asset.size[1]) / 2.0 + NEAR_M
     around = square_round(pose.x, pose.y, reach)
     settled = settle(asset, pose, ROOM_M, lambda: ground.bodies(around))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from internav_data.geometry import Polygons, footprint, wall_footprints
-from internav_data.navigation import SPACING_M, Lattice, WayFinder
+from internav_data.navigation import SPACING_M, Lattice, TangentGraph
 from internav_data.physics.kdop import NOWHERE, octagon_of_rectangle
 from internav_data.physics.scene import Body, wall_body
 from internav_data.physics.sweep import extent_of
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from internav_data.physics.kdop import Octagon
+    from internav_data.physics.kdop import Dop8
     from internav_data.records import Asset, House, Pose, Vec2
 
     Floats = NDArray[np.float64]
@@ -35,7 +35,7 @@ class Item:
     pose: Pose | None
     """None while it is held."""
     footprint: Polygons
-    octagon: Octagon
+    octagon: Dop8
     low_m: float
     high_m: float
 
@@ -75,7 +75,7 @@ class Stage:
     """With all furniture in its place; never changed."""
     handles: tuple[int, ...]
     """The lattice's handles of `items`."""
-    _ways: dict[tuple[int, ...], WayFinder] = field(default_factory=dict)
+    _ways: dict[tuple[int, ...], TangentGraph] = field(default_factory=dict)
 
     @staticmethod
     def of(house: House) -> Stage:
@@ -108,12 +108,12 @@ class Stage:
             handles=handles,
         )
 
-    def ways(self, displaced: tuple[int, ...] = ()) -> WayFinder:
+    def ways(self, displaced: tuple[int, ...] = ()) -> TangentGraph:
         """Any-angle ways among all furniture but some items (indices, ascending)."""
         finder = self._ways.get(displaced)
         if finder is None:
             left = (item.footprint for k, item in enumerate(self.items) if k not in displaced)
-            finder = WayFinder.of_polygons(Polygons.joined([self.footprints, *left]))
+            finder = TangentGraph.of_polygons(Polygons.joined([self.footprints, *left]))
             if len(self._ways) >= WAYS_KEPT:
                 # The oldest goes, but never the one with all furniture in its place.
                 del self._ways[next(key for key in self._ways if key)]

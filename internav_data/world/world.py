@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from internav_data.navigation import Lattice, WayFinder
-    from internav_data.physics.kdop import Octagon
-    from internav_data.physics.push import Pushed, PushModel
+    from internav_data.navigation import Lattice, TangentGraph
+    from internav_data.physics.kdop import Dop8
+    from internav_data.physics.push import PushModel, PushResult
     from internav_data.records import Asset, Episode, Pose, Vec2
 
 
@@ -164,7 +164,7 @@ def _drop(world: World, action: Action) -> StepResult:
     solid: list[Polygons] = [world.stage.footprints]
     solid += [world.items[k].footprint for k, _ in around if k < len(world.items)]
 
-    def bodies(octagon: Octagon) -> Sequence[Body]:
+    def bodies(octagon: Dop8) -> Sequence[Body]:
         return [body for _, body in world.near(octagon)]
 
     ground = Ground(world.stage.walls, solid, bodies)
@@ -338,7 +338,7 @@ class World:
         found = finder.way(self.position, self.goal_point, loose)
         return None if found is None else (round_m(found[0]), found[1])
 
-    def _loose(self) -> tuple[WayFinder, Polygons]:
+    def _loose(self) -> tuple[TangentGraph, Polygons]:
         """Finder of ways among what has not moved, and all else that stands in the way."""
         home = self.stage.items
         displaced = tuple(k for k, item in enumerate(home) if self.items[k] is not item)
@@ -371,7 +371,7 @@ class World:
                 return k
         return -1
 
-    def pushed(self, index: int, heading: int, *, agent: bool = True) -> Pushed:
+    def pushed(self, index: int, heading: int, *, agent: bool = True) -> PushResult:
         """Answer what pushing a thing along a heading of the house (0 … 3) would do."""
         item, pose = self._at(index)
         gap = math.inf
@@ -451,7 +451,7 @@ class World:
         east, _, north, _, west, _, south, _ = item.octagon
         return math.hypot(max(-west - x, 0.0, x - east), max(-south - y, 0.0, y - north))
 
-    def near(self, octagon: Octagon, skip: int = -1) -> list[tuple[int, Body]]:
+    def near(self, octagon: Dop8, skip: int = -1) -> list[tuple[int, Body]]:
         """Bodies that reach into an octagon: items by their index, then what is fixed."""
         bodies = []
         for k in touching(self._octagons, octagon):

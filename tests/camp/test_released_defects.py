@@ -75,9 +75,9 @@ def test_defect_3_cut_off_from_the_goal_is_a_failure_that_counts(fake, config):
 
 def test_defect_4_a_move_counts_once():
     """Pushes and looks after a move add nothing to the path."""
-    from internav_data.envs.tasks import Tally, metrics
+    from internav_data.envs.tasks import EpisodeStatistics, metrics
 
-    tally = Tally(moves=4)
+    tally = EpisodeStatistics(moves=4)
     tally.tried["push"] = tally.done["push"] = 7
     said = metrics(tally, success=True, clear_m=1.0, steps=12, distance_m=0.0)
     assert said["path_m"] == 1.0

@@ -14,7 +14,7 @@ from internav_data.envs import EnvState, InterNavVectorEnv
 from internav_data.envs.order import EpisodeOrder
 from internav_data.envs.source import FIELDS_KEPT, Places, open_source
 from internav_data.generation import generate, load_config
-from internav_data.navigation import WayFinder
+from internav_data.navigation import TangentGraph
 from internav_data.records.errors import CorruptDataError, UsageError
 from internav_data.world import Action, Stage, World
 
@@ -161,7 +161,7 @@ def test_metrics_agree_with_another_count(small):
     env.reset(options={"episode_id": episode.episode_id})
     house = dataset.scene(episode.scene_id)
     world = World.of_episode(Stage.of(house), episode, dataset.assets)
-    ways, goal = WayFinder.of(house), (episode.goal.x, episode.goal.y)
+    ways, goal = TangentGraph.of(house), (episode.goal.x, episode.goal.y)
     path, drops, total = 0.0, 0.0, 0.0
     chosen = [a for a in actions(11, 150).tolist() if a != Action.DONE]
     for action in chosen:

@@ -15,8 +15,8 @@ from internav_data.episodes.outcomes import outcomes_of
 from internav_data.episodes.spawn import NEAR_M
 from internav_data.geometry import asset_corners, footprint, house_footprints, transform
 from internav_data.houses import HouseConfig, build_house
-from internav_data.physics import Body, Setting, engine_of_this_process, wall_body
-from internav_data.physics.result_cache import Solutions
+from internav_data.physics import Body, PhysicsScene, engine_of_this_process, wall_body
+from internav_data.physics.result_cache import ResultCache
 from internav_data.physics.scene import UPRIGHT
 from internav_data.planner.search import replay
 from internav_data.records import Pose
@@ -44,7 +44,7 @@ def episodes(houses, pool):
 def test_what_is_kept_on_disk_changes_nothing(houses, pool, episodes, tmp_path, monkeypatch):
     counts = []
     for _ in range(2):
-        held = Solutions(tmp_path)
+        held = ResultCache(tmp_path)
         monkeypatch.setattr("internav_data.physics.registry.solutions", lambda held=held: held)
         assert build_episodes(houses[6], 6, pool) == episodes[6]
         counts.append(held.count())
@@ -193,7 +193,7 @@ def test_obstacles_stay_at_rest_in_a_whole_scene_of_bullet(houses, episodes):
             walls = [wall_body(w) for w in houses[1].walls]
             lifted = Pose(obstacle.x, obstacle.y, obstacle.z + 0.005, obstacle.quaternion)
             body = Body(assets[obstacle.asset_id], lifted, moves=True)
-            rest = engine.settle(Setting((body, *near, *walls)))
+            rest = engine.settle(PhysicsScene((body, *near, *walls)))
             assert rest.at_rest
             assert (
                 math.dist(
@@ -303,7 +303,9 @@ def test_settings_that_cannot_be_meant_are_refused(field, value):
 def test_all_spawnable_assets_settle(pool):
     engine = engine_of_this_process()
     for asset in pool[::7]:
-        rest = engine.settle(Setting((Body(asset, Pose(0.0, 0.0, 0.01, UPRIGHT), moves=True),)))
+        rest = engine.settle(
+            PhysicsScene((Body(asset, Pose(0.0, 0.0, 0.01, UPRIGHT), moves=True),))
+        )
         assert rest.at_rest, asset.asset_id
         assert math.hypot(rest.pose.x, rest.pose.y) < 0.05, asset.asset_id
         assert rest.penetration_m <= 0.002, asset.asset_id

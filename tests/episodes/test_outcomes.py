@@ -9,7 +9,7 @@ from internav_data.episodes import build_episodes
 from internav_data.episodes.outcomes import PICK, PUSHES, outcomes_of
 from internav_data.geometry import Polygons
 from internav_data.houses import HouseConfig, build_house
-from internav_data.navigation import Lattice, WayFinder
+from internav_data.navigation import Lattice, TangentGraph
 from internav_data.world import Stage, World
 
 
@@ -70,7 +70,7 @@ def test_distances_are_those_of_fresh_graphs(tables):
                 everything = Polygons.joined([world.stage.footprints, *loose])
                 fresh = Lattice.of_polygons(everything, world.stage.house.outline)
                 assert outcome.steps == fresh.distance(start, goal)
-                way = WayFinder.of_polygons(everything).distance(
+                way = TangentGraph.of_polygons(everything).distance(
                     (episode.start.x, episode.start.y), (episode.goal.x, episode.goal.y)
                 )
                 assert outcome.way_m == (None if way is None else pytest.approx(way, abs=2e-4))

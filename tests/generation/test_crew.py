@@ -5,12 +5,12 @@ import crew_stubs
 import pytest
 
 from internav_data.generation.messages import Done, Failed
-from internav_data.generation.worker_pool import CannotStartError, Crew, Recipe
+from internav_data.generation.worker_pool import CannotStartError, Recipe, WorkerPool
 from internav_data.records.errors import InternavError, UsageError
 
 
 def outcomes(recipe, tasks, size=2, **options):
-    with Crew(size, recipe, **options) as crew:
+    with WorkerPool(size, recipe, **options) as crew:
         return list(crew.run(tasks))
 
 
@@ -20,7 +20,7 @@ def test_all_tasks_are_done_once():
 
 
 def test_the_crew_takes_further_tasks():
-    with Crew(1, Recipe(crew_stubs.square, 0)) as crew:
+    with WorkerPool(1, Recipe(crew_stubs.square, 0)) as crew:
         first = [r.value for r in crew.run([2])]
         pids = crew.processes
         second = [r.value for r in crew.run([3, 4])]
@@ -29,7 +29,7 @@ def test_the_crew_takes_further_tasks():
 
 
 def test_no_more_workers_than_tasks():
-    with Crew(8, Recipe(crew_stubs.square, 0)) as crew:
+    with WorkerPool(8, Recipe(crew_stubs.square, 0)) as crew:
         list(crew.run([1]))
         assert len(crew.processes) == 1
 
@@ -67,14 +67,14 @@ def test_a_full_disk_ends_the_run():
 
 def test_stopping_finishes_what_is_under_way():
     ended = []
-    with Crew(2, Recipe(crew_stubs.slow, 0.2), stop=lambda: bool(ended)) as crew:
+    with WorkerPool(2, Recipe(crew_stubs.slow, 0.2), stop=lambda: bool(ended)) as crew:
         for result in crew.run(range(1000)):
             ended.append(result.task)  # noqa: PERF401 - the flag reads it meanwhile
     assert 2 <= len(ended) <= 4
 
 
 def test_workers_are_gone_afterwards():
-    with Crew(2, Recipe(crew_stubs.square, 0)) as crew:
+    with WorkerPool(2, Recipe(crew_stubs.square, 0)) as crew:
         list(crew.run(range(4)))
         pids = crew.processes
     assert pids
@@ -85,7 +85,7 @@ def test_workers_are_gone_afterwards():
 
 def test_an_error_in_the_caller_ends_workers_at_once():
     began = time.monotonic()
-    with pytest.raises(RuntimeError), Crew(1, Recipe(crew_stubs.slow, 60)) as crew:
+    with pytest.raises(RuntimeError), WorkerPool(1, Recipe(crew_stubs.slow, 60)) as crew:
         for _ in crew.run([1], tick=lambda: (_ for _ in ()).throw(RuntimeError)):
             pass
     assert time.monotonic() - began < 10

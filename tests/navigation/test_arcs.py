@@ -13,7 +13,7 @@ from navigation_oracles import RADIUS, shapes, shortest
 from navigation_scenes import convex, rectangle, ring
 
 from internav_data.geometry import Polygons
-from internav_data.navigation import WayFinder
+from internav_data.navigation import TangentGraph
 from internav_data.navigation.tangent_graph.arcs import (
     ALL,
     HALF,
@@ -58,7 +58,7 @@ def test_a_shadow_is_where_the_disc_would_meet_the_polygon(polygon, corner):
 @given(st.lists(near, min_size=1, max_size=5))
 def test_free_arcs_are_what_all_polygons_leave_of_their_corners_circles(polygons):
     solid = shapes(polygons)
-    arcs = WayFinder.of_polygons(Polygons.of(polygons))._arcs
+    arcs = TangentGraph.of_polygons(Polygons.of(polygons))._arcs
     corners = {tuple(corner) for polygon in polygons for corner in polygon}
     assert {(a[X], a[Y]) for a in arcs} <= corners
     for x, y in corners:
@@ -75,7 +75,7 @@ def test_free_arcs_are_what_all_polygons_leave_of_their_corners_circles(polygons
 
 def test_flush_walls_leave_no_corner_between_them():
     flush = [rectangle(0.0, 0.0, 1.0, 0.12), rectangle(1.0, 0.0, 2.0, 0.12)]
-    arcs = WayFinder.of_polygons(Polygons.of(flush))._arcs
+    arcs = TangentGraph.of_polygons(Polygons.of(flush))._arcs
     found = sorted({(a[X], a[Y]) for a in arcs})
     assert found == [
         (0.0, 0.0),
@@ -95,15 +95,15 @@ crumbs = st.tuples(st.integers(-30, 45), st.integers(-30, 45), st.integers(1, 12
 def test_an_obstacle_in_the_middle_of_a_turn_closes_it(things):
     corner = [rectangle(-3.0, -3.0, 0.0, 0.0)]
     p, q = (-2.0, 0.3), (0.3, -2.0)
-    ways = WayFinder.of_polygons(Polygons.of(corner))
+    ways = TangentGraph.of_polygons(Polygons.of(corner))
     found = ways.distance(p, q, Polygons.of(things))
-    whole = WayFinder.of_polygons(Polygons.of([*corner, *things])).distance(p, q)
+    whole = TangentGraph.of_polygons(Polygons.of([*corner, *things])).distance(p, q)
     assert found == pytest.approx(whole, abs=1e-7)
     assert found == pytest.approx(shortest([*corner, *things], p, q), rel=2e-3)
 
 
 def test_a_crumb_beyond_the_corner_sends_the_disc_round_itself():
-    ways = WayFinder.of_polygons(Polygons.of([rectangle(-3.0, -3.0, 0.0, 0.0)]))
+    ways = TangentGraph.of_polygons(Polygons.of([rectangle(-3.0, -3.0, 0.0, 0.0)]))
     p, q = (-2.0, 0.3), (0.3, -2.0)
     crumb = Polygons.of([rectangle(0.22, 0.22, 0.24, 0.24)])
     clear = ways.distance(p, q)
@@ -124,5 +124,5 @@ def test_closest_points_are_as_far_apart_as_the_polygons(first, second):
 
 
 def test_a_room_without_things_has_no_corner_to_turn_round():
-    arcs = WayFinder.of_polygons(Polygons.of(ring(4.0, 3.0)))._arcs
+    arcs = TangentGraph.of_polygons(Polygons.of(ring(4.0, 3.0)))._arcs
     assert all(not (0 < a[X] < 4.0 and 0 < a[Y] < 3.0) for a in arcs)

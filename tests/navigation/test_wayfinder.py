@@ -22,16 +22,16 @@ from navigation_scenes import (
 )
 
 from internav_data.geometry import Polygons
-from internav_data.navigation import Lattice, WayFinder
+from internav_data.navigation import Lattice, TangentGraph
 
-FREE = WayFinder.of_polygons(Polygons.of([]))
+FREE = TangentGraph.of_polygons(Polygons.of([]))
 places = st.tuples(st.integers(20, 580), st.integers(20, 380)).map(
     lambda c: (c[0] / 100, c[1] / 100)
 )
 
 
 def finder(polygons):
-    return WayFinder.of_polygons(Polygons.of(polygons))
+    return TangentGraph.of_polygons(Polygons.of(polygons))
 
 
 def test_nothing_in_the_way_is_a_straight_line():
@@ -80,7 +80,7 @@ def test_gap_of_two_radii_passes_and_a_narrower_one_does_not():
 
 def test_a_pair_of_obstacles_that_only_together_seal_a_door():
     house = two_rooms()
-    ways, lattice = WayFinder.of(house), Lattice.of(house)
+    ways, lattice = TangentGraph.of(house), Lattice.of(house)
     left = rectangle(2.9, 1.55, 3.1, 1.75)
     right = rectangle(2.9, 2.1, 3.1, 2.45)
     p, q = (1.0, 2.0), (5.0, 2.0)
@@ -179,7 +179,7 @@ def test_is_a_metric_and_does_not_mind_mirrors(things, p, q, r):
 @pytest.mark.parametrize("seed", range(3))
 def test_in_a_whole_house_bounded_by_lattice_and_line(seed):
     polygons, outline = random_rooms(seed)
-    ways, lattice = WayFinder.of_polygons(polygons), Lattice.of_polygons(polygons, outline)
+    ways, lattice = TangentGraph.of_polygons(polygons), Lattice.of_polygons(polygons, outline)
     rng = np.random.default_rng(seed)
     free = np.argwhere(lattice.free)
     for _ in range(40):
@@ -194,14 +194,14 @@ def test_in_a_whole_house_bounded_by_lattice_and_line(seed):
         if steps is not None:
             assert d is not None
             assert d <= 0.25 * steps + 1e-7
-        whole = WayFinder.of_polygons(Polygons.joined([polygons, obstacles])).distance(p, q)
+        whole = TangentGraph.of_polygons(Polygons.joined([polygons, obstacles])).distance(p, q)
         assert (whole is None) == (d is None)
         assert d is None or whole == pytest.approx(d, abs=1e-7)
 
 
 def test_answers_do_not_depend_on_what_was_asked_before():
     polygons, _ = random_rooms(5)
-    fresh, used = WayFinder.of_polygons(polygons), WayFinder.of_polygons(polygons)
+    fresh, used = TangentGraph.of_polygons(polygons), TangentGraph.of_polygons(polygons)
     wall = Polygons.of([rectangle(9.0, 3.0, 9.5, 3.4)])
     for k in range(300):  # more than are remembered
         used.distance((1.0 + 0.01 * k, 1.0), (18.0, 12.0))

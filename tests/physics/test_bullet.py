@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from internav_data.geometry import yaw_quaternion
-from internav_data.physics import Body, Column, Setting, wall_body
+from internav_data.physics import AgentCollider, Body, PhysicsScene, wall_body
 from internav_data.physics.engines.bullet import Bullet, bullet
 from internav_data.physics.engines.bullet_scene import SCENES_A_WORLD, Builder, pybullet
-from internav_data.physics.push import SHOVES
+from internav_data.physics.push import PUSH_SPECS
 from internav_data.records import Asset, Part, Pose, Wall
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -55,14 +55,14 @@ def scenes(count):
         ]
         if rng.random() < 0.5:
             around.append(wall_body(Wall(1.5, -2.0, 1.62, 2.0, 0.0, 2.6)))
-        column = Column(0.1, 0.85, 0.21) if rng.random() < 0.3 else None
+        column = AgentCollider(0.1, 0.85, 0.21) if rng.random() < 0.3 else None
         start = Pose(0.0, 0.0, 0.001 if k % 5 else 0.01, yaw_quaternion(15 * (k % 24)))
-        made.append((Setting((Body(thing, start, moves=True), *around), column), k % 5 == 0))
+        made.append((PhysicsScene((Body(thing, start, moves=True), *around), column), k % 5 == 0))
     return made
 
 
 def answer(engine, setting, falls):
-    return engine.settle(setting) if falls else engine.push(setting, SHOVES["force"])
+    return engine.settle(setting) if falls else engine.push(setting, PUSH_SPECS["force"])
 
 
 @pytest.fixture
@@ -85,7 +85,7 @@ def test_what_an_interrupt_left_in_a_world_is_swept_away(fresh, monkeypatch):
     asked = [setting for setting, falls in scenes(60) if not falls]
     lone = next(setting for setting in asked if len(setting.bodies) == 1)
     crowded = next(setting for setting in asked if len(setting.bodies) > 1)
-    expected = fresh.push(lone, SHOVES["force"])
+    expected = fresh.push(lone, PUSH_SPECS["force"])
     real = Builder._place
 
     def interrupted(self, *args, **where):
@@ -97,9 +97,9 @@ def test_what_an_interrupt_left_in_a_world_is_swept_away(fresh, monkeypatch):
         # A thing stands where the next scene's would go, and nobody knows its number.
         monkeypatch.setattr(Builder, "_place", interrupted)
         with pytest.raises(KeyboardInterrupt):
-            bullet().push(crowded, SHOVES["force"])
+            bullet().push(crowded, PUSH_SPECS["force"])
         monkeypatch.setattr(Builder, "_place", real)
-        assert bullet().push(lone, SHOVES["force"]) == expected
+        assert bullet().push(lone, PUSH_SPECS["force"]) == expected
 
 
 def test_a_world_is_given_up_before_it_leaks_much(monkeypatch):
@@ -107,7 +107,7 @@ def test_a_world_is_given_up_before_it_leaks_much(monkeypatch):
     real = Builder._begin
     monkeypatch.setattr(Builder, "_begin", lambda self: begun.append(real(self)))
     engine = bullet()
-    lone = Setting((Body(THINGS[2], Pose(0.0, 0.0, 0.001, UPRIGHT), moves=True),))
+    lone = PhysicsScene((Body(THINGS[2], Pose(0.0, 0.0, 0.001, UPRIGHT), moves=True),))
     for _ in range(3 * SCENES_A_WORLD):
         engine._builder.build(lone)
     assert len(begun) == 3
@@ -116,11 +116,11 @@ def test_a_world_is_given_up_before_it_leaks_much(monkeypatch):
 
 def test_what_a_users_own_client_sets_changes_nothing():
     asked = [setting for setting, falls in scenes(30) if not falls]
-    expected = [bullet().push(setting, SHOVES["force"]) for setting in asked]
+    expected = [bullet().push(setting, PUSH_SPECS["force"]) for setting in asked]
     client = pybullet.connect(pybullet.DIRECT)
     # Bullet's own global, whichever client it is set by.
     pybullet.setPhysicsEngineParameter(contactBreakingThreshold=0.02, physicsClientId=client)
-    answers = [bullet().push(setting, SHOVES["force"]) for setting in asked]
+    answers = [bullet().push(setting, PUSH_SPECS["force"]) for setting in asked]
     pybullet.disconnect(client)
     assert answers == expected
 

@@ -10,7 +10,7 @@ from internav_data.geometry import asset_corners, footprint, transform, yaw_quat
 from internav_data.physics import Body, push, wall_body
 from internav_data.physics.engines.bullet import pybullet
 from internav_data.physics.kdop import overlap
-from internav_data.physics.push import AGENT_LEAST_M, SHOVES
+from internav_data.physics.push import AGENT_LEAST_M, PUSH_SPECS
 from internav_data.physics.sweep import extent_of
 from internav_data.records import Asset, Part, Pose, Wall
 from internav_data.world.visibility import axis_distance
@@ -68,7 +68,7 @@ def test_free_slides_go_as_far_as_coulomb_says(mass_kg, friction):
     assert not kicked.toppled
     # Pushed by a force, it covers v^2 / 2a more until it is let go at v.
     acceleration = 200.0 / mass_kg - friction * GRAVITY
-    speed = min(2.0, acceleration * SHOVES["force"].seconds)
+    speed = min(2.0, acceleration * PUSH_SPECS["force"].seconds)
     expected = speed**2 / (2 * acceleration) + speed**2 / (2 * friction * GRAVITY)
     forced = push(low_box(mass_kg, friction), STANDING, 0, alone)
     if mass_kg > 1.0:  # lighter ones have their speed within one step: less than theory's way

@@ -12,9 +12,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from internav_data.physics import Body, Motion, Rest, Setting, engine_of_this_process, solving_anew
+from internav_data.physics import (
+    Body,
+    PhysicsScene,
+    PushSolution,
+    SettleSolution,
+    cache_disabled,
+    engine_of_this_process,
+)
 from internav_data.physics.cache import (
-    Remembering,
+    CachedEngine,
     _read_motion,
     _read_rest,
     _write_motion,
@@ -22,8 +29,8 @@ from internav_data.physics.cache import (
     origin,
 )
 from internav_data.physics.engines.bullet import bullet
-from internav_data.physics.push import SHOVES
-from internav_data.physics.result_cache import FILE_NAME, Solutions
+from internav_data.physics.push import PUSH_SPECS
+from internav_data.physics.result_cache import FILE_NAME, ResultCache
 from internav_data.records import Asset, Part, Pose
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -43,13 +50,13 @@ BOX = Asset(
 )
 
 
-LONE = Setting((Body(BOX, Pose(0.0, 0.0, 0.001, UPRIGHT), moves=True),))
+LONE = PhysicsScene((Body(BOX, Pose(0.0, 0.0, 0.001, UPRIGHT), moves=True),))
 
 
-PAIR = Setting((*LONE.bodies, Body(BOX, Pose(0.7, 0.1, 0.001, UPRIGHT), moves=True)))
+PAIR = PhysicsScene((*LONE.bodies, Body(BOX, Pose(0.7, 0.1, 0.001, UPRIGHT), moves=True)))
 
 
-SHOVE = SHOVES["force"]
+SHOVE = PUSH_SPECS["force"]
 
 
 class Counting:
@@ -70,7 +77,7 @@ class Counting:
 
 
 def remembering(folder, origin="here", engine=None):
-    return Remembering(engine or Counting(), Solutions(folder), origin)
+    return CachedEngine(engine or Counting(), ResultCache(folder), origin)
 
 
 @pytest.mark.parametrize("setting", [LONE, PAIR], ids=["lone", "pair"])
@@ -90,12 +97,12 @@ def test_every_difference_in_what_is_asked_is_another_question(tmp_path):
     body = LONE.bodies[0]
     asked = [
         (LONE, SHOVE),
-        (LONE, SHOVES["kick"]),
+        (LONE, PUSH_SPECS["kick"]),
         (PAIR, SHOVE),
-        (Setting((replace(body, asset=replace(BOX, friction=0.6)),)), SHOVE),
-        (Setting((replace(body, asset=replace(BOX, mass_kg=3.5)),)), SHOVE),
-        (Setting((replace(body, pose=Pose(0.0, 0.0, 0.001, (0.0, 0.0, 1.0, 0.0))),)), SHOVE),
-        (Setting((body, replace(PAIR.bodies[1], moves=False))), SHOVE),
+        (PhysicsScene((replace(body, asset=replace(BOX, friction=0.6)),)), SHOVE),
+        (PhysicsScene((replace(body, asset=replace(BOX, mass_kg=3.5)),)), SHOVE),
+        (PhysicsScene((replace(body, pose=Pose(0.0, 0.0, 0.001, (0.0, 0.0, 1.0, 0.0))),)), SHOVE),
+        (PhysicsScene((body, replace(PAIR.bodies[1], moves=False))), SHOVE),
     ]
     for setting, shove in asked:
         engine.push(setting, shove)
@@ -175,7 +182,7 @@ paths = st.integers(1, 3).flatmap(lambda n: st.binary(min_size=28 * n, max_size=
 
 
 motions = st.builds(
-    lambda movers, seconds, at_rest: Motion(
+    lambda movers, seconds, at_rest: PushSolution(
         tuple(m[0] for m in movers),
         tuple(m[1] for m in movers),
         tuple(m[2] for m in movers),
@@ -213,7 +220,7 @@ def test_a_motion_that_is_not_finite_is_none(motion, number):
 
 @given(poses, finite, finite, finite, st.booleans())
 def test_rests_come_back_as_they_were(pose, seconds, penetration_m, reach_m, at_rest):
-    rest = Rest(pose, seconds, at_rest, penetration_m, reach_m)
+    rest = SettleSolution(pose, seconds, at_rest, penetration_m, reach_m)
     assert repr(_read_rest(_write_rest(rest))) == repr(rest)
     assert _read_rest(_write_rest(rest)[:-1]) is None
     assert _read_rest(_write_rest(replace(rest, reach_m=math.nan))) is None
@@ -334,12 +341,12 @@ def opened(folder):
 
 def test_solving_anew_believes_nothing_that_is_kept(tmp_path, monkeypatch):
     monkeypatch.setattr("internav_data.physics.registry.solutions", lambda: held)
-    held = Solutions(tmp_path)
+    held = ResultCache(tmp_path)
     engine = engine_of_this_process()
     lie = replace(engine.push(LONE, SHOVE), seconds=123.0)
     held.put(engine._key(repr(SHOVE), LONE), _write_motion(lie))
     held.flush()
     assert engine_of_this_process().push(LONE, SHOVE) == lie
-    with solving_anew():
+    with cache_disabled():
         assert engine_of_this_process().push(LONE, SHOVE) == bullet().push(LONE, SHOVE) != lie
     assert engine_of_this_process().push(LONE, SHOVE) == lie

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from internav_data.geometry import asset_corners, transform, yaw_quaternion
-from internav_data.physics import Body, Setting, engine_of_this_process, settle, wall_body
+from internav_data.physics import Body, PhysicsScene, engine_of_this_process, settle, wall_body
 from internav_data.physics.settle import MAX_PENETRATION_M
 from internav_data.records import Asset, Part, Pose, Wall
 
@@ -55,7 +55,7 @@ def test_free_fall_takes_as_long_as_physics_says():
     # 1 cm falls in sqrt(2 h / g) = 45 ms = 11 steps; then ten calm steps follow.
     box = asset("box", [part("box", (0.0, 0.0, 0.2), (0.4, 0.4, 0.4))])
     rest = engine_of_this_process().settle(
-        Setting((Body(box, Pose(0.0, 0.0, 0.01, UPRIGHT), moves=True),))
+        PhysicsScene((Body(box, Pose(0.0, 0.0, 0.01, UPRIGHT), moves=True),))
     )
     assert rest.seconds >= math.sqrt(2 * 0.01 / 9.81) + 9 / 240
 
@@ -93,7 +93,7 @@ def test_same_answer_in_a_fresh_process_and_after_any_history():
         "for k in range(n): settle(asset(f'b{k}', [part('box', (0, 0, .1 + k / 50), "
         "(.2, .3, .2 + k / 25))]), Pose(0, 0, 0, UPRIGHT), 0.0, nothing)\n"
         "e = engine_of_this_process()\n"
-        "print(repr(e.settle(Setting((Body(chair(), Pose(0, 0, .01, UPRIGHT), True),)))))"
+        "print(repr(e.settle(PhysicsScene((Body(chair(), Pose(0, 0, .01, UPRIGHT), True),)))))"
     )
     answers = {
         subprocess.run(
@@ -102,7 +102,7 @@ def test_same_answer_in_a_fresh_process_and_after_any_history():
         for n in (0, 0, 7)
     }
     assert len(answers) == 1
-    assert "Rest(" in answers.pop()
+    assert "SettleSolution(" in answers.pop()
 
 
 def test_nothing_is_printed_by_importing_the_engine():

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from internav_data.physics.result_cache import FILE_NAME, Solutions, cache_folder
+from internav_data.physics.result_cache import FILE_NAME, ResultCache, cache_folder
 
 
 def test_a_full_file_is_emptied(tmp_path, monkeypatch):
     module = sys.modules["internav_data.physics.result_cache"]
     monkeypatch.setattr(module, "BYTES_AT_MOST", 1_200_000)
-    held, counts = Solutions(tmp_path), []
+    held, counts = ResultCache(tmp_path), []
     for k in range(1000):
         held.put(k.to_bytes(32, "little"), os.urandom(3000))
         counts.append(held.count())
@@ -25,11 +25,11 @@ def test_a_full_file_is_emptied(tmp_path, monkeypatch):
     assert (tmp_path / FILE_NAME).stat().st_size <= 1_200_000
     held.put(b"later", b"kept")
     assert held.count() >= 1
-    assert Solutions(tmp_path).get(b"later") == b"kept"
+    assert ResultCache(tmp_path).get(b"later") == b"kept"
 
 
 def test_values_beyond_any_use_are_not_kept(tmp_path):
-    held = Solutions(tmp_path)
+    held = ResultCache(tmp_path)
     held.put(b"k", bytes(5 << 20))
     assert held.count() == 0
 
@@ -39,7 +39,7 @@ def test_an_empty_file_that_another_holds_is_left_to_it(tmp_path, monkeypatch):
     with contextlib.closing(opened(tmp_path)) as other:
         other.execute("BEGIN IMMEDIATE")
         other.execute("CREATE TABLE other (name TEXT)")
-        assert not Solutions(tmp_path).is_open
+        assert not ResultCache(tmp_path).is_open
         other.execute("COMMIT")
         assert other.execute("SELECT name FROM sqlite_schema").fetchall() == [("other",)]
         assert (tmp_path / FILE_NAME).is_file()
@@ -50,7 +50,7 @@ def opened(folder):
 
 
 def test_a_reader_in_the_way_of_a_commit_leaves_no_transaction_open(tmp_path):
-    held = Solutions(tmp_path)
+    held = ResultCache(tmp_path)
     held.put(b"first", b"1")
     held.flush()
     with contextlib.closing(opened(tmp_path)) as reader:
@@ -62,11 +62,11 @@ def test_a_reader_in_the_way_of_a_commit_leaves_no_transaction_open(tmp_path):
         reader.execute("COMMIT")
     held.put(b"third", b"3")
     held.flush()
-    assert Solutions(tmp_path).get(b"third") == b"3"
+    assert ResultCache(tmp_path).get(b"third") == b"3"
 
 
 def test_an_interrupt_while_writing_leaves_no_transaction_open(tmp_path, monkeypatch):
-    held = Solutions(tmp_path)
+    held = ResultCache(tmp_path)
     real = held._ask
 
     def interrupted(question, *values):
@@ -80,23 +80,23 @@ def test_an_interrupt_while_writing_leaves_no_transaction_open(tmp_path, monkeyp
         held.flush()
     monkeypatch.undo()
     assert not held._file.in_transaction
-    other = Solutions(tmp_path)
+    other = ResultCache(tmp_path)
     other.put(b"second", b"2")
     assert other.count() == 1
 
 
 def test_what_was_put_is_known_before_it_is_written(tmp_path):
-    held = Solutions(tmp_path)
+    held = ResultCache(tmp_path)
     held.put(b"key", b"value")
     assert held.get(b"key") == b"value"
-    assert Solutions(tmp_path).get(b"key") is None
+    assert ResultCache(tmp_path).get(b"key") is None
 
 
 def test_several_processes_write_at_once(tmp_path):
     script = (
         "import sys; from pathlib import Path\n"
-        "from internav_data.physics.result_cache import Solutions\n"
-        "kept = Solutions(Path(sys.argv[1])); first = int(sys.argv[2])\n"
+        "from internav_data.physics.result_cache import ResultCache\n"
+        "kept = ResultCache(Path(sys.argv[1])); first = int(sys.argv[2])\n"
         "for k in range(first, first + 300):\n"
         "    kept.put(k.to_bytes(32, 'little'), k.to_bytes(4, 'little') * 700)\n"
         "kept.flush()\n"
@@ -106,7 +106,7 @@ def test_several_processes_write_at_once(tmp_path):
         for first in (0, 200, 400)
     ]
     assert [writer.wait(60) for writer in writers] == [0, 0, 0]
-    found = Solutions(tmp_path)
+    found = ResultCache(tmp_path)
     # A writer gives up what it would have to wait for too long; what is there is whole.
     assert 300 <= found.count() <= 700
     for k in range(700):
@@ -115,7 +115,7 @@ def test_several_processes_write_at_once(tmp_path):
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
 def test_a_forked_process_leaves_its_parents_file_alone(tmp_path):
-    held = Solutions(tmp_path)
+    held = ResultCache(tmp_path)
     held.put(b"parent" * 5, b"1")
     child = os.fork()
     if child == 0:

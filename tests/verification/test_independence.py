@@ -209,7 +209,7 @@ def test_ways_are_those_of_the_generator(spots):
     taken = [p for o in placed for p in site.shapes.footprint(o.asset_id, o.pose)]
     there = geometry.Polygons.joined(geometry.footprint(ASSETS["Bar_1"], o.pose) for o in placed)
     start, goal = (0.5, 0.5), (7.25, 3.25)
-    theirs = navigation.WayFinder.of(house).distance(start, goal, there)
+    theirs = navigation.TangentGraph.of(house).distance(start, goal, there)
     sight = Sight(site.sight.base, grown(taken), site.sight)
     mine = sight.length(start, goal, 100.0)
     near = [o for o in taken if shapely.dwithin(o, shapely.points([start, goal]), 0.21).any()]

@@ -13,7 +13,7 @@ from scenery import ASSETS, Grid, brute_steps, thing, write_dataset
 
 import internav_data.world.world
 from internav_data.navigation import Lattice
-from internav_data.physics.result_cache import Solutions
+from internav_data.physics.result_cache import ResultCache
 from internav_data.records import Pose
 from internav_data.records.errors import CorruptDataError
 from internav_data.verification import validate
@@ -45,11 +45,11 @@ def test_nothing_that_is_kept_on_disk_is_believed(tmp_path, monkeypatch, scenes)
         monkeypatch.setattr("internav_data.physics.registry.solutions", lambda: held)
         return held
 
-    held = keep_in(Solutions(tmp_path))
+    held = keep_in(ResultCache(tmp_path))
     assert physical.physical_scenes() == scenes
     assert held.count() > 10
 
-    class Lying(Solutions):
+    class Lying(ResultCache):
         def get(self, key):
             value = super().get(key)
             if value is None or len(value) < 120:  # a fall

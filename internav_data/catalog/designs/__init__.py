@@ -22,10 +22,10 @@ from internav_data.catalog.designs import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from internav_data.catalog.sampling import Dice
+    from internav_data.catalog.sampling import UniformSampler
     from internav_data.catalog.shapes import Sketch
 
-    Design = Callable[[Sketch, float, float, float, Dice], None]
+    Design = Callable[[Sketch, float, float, float, UniformSampler], None]
 
 DESIGNS: Mapping[str, Design] = {
     "ArmChair": seating.arm_chair,

@@ -9,7 +9,7 @@ from internav_data.catalog.sampling import LEAF, STEM
 from internav_data.catalog.shapes import Paint, ring
 
 if TYPE_CHECKING:
-    from internav_data.catalog.sampling import Dice
+    from internav_data.catalog.sampling import UniformSampler
     from internav_data.catalog.shapes import Sketch
 
 _CRUSTS = ((196, 140, 82), (168, 112, 62), (210, 162, 104), (142, 92, 54))
@@ -17,7 +17,7 @@ _APPLES = ((190, 44, 44), (206, 72, 54), (142, 176, 66), (212, 180, 78), (162, 3
 _TOMATOES = ((206, 58, 42), (190, 44, 40), (218, 88, 48), (212, 66, 58))
 
 
-def bread(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def bread(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a loaf along y: from a tin, or freely formed with cuts across."""
     crust, x, y = Paint(dice.pick(_CRUSTS), "food"), w / 2, d / 2
     cut = crust.shade(1.22)
@@ -85,7 +85,7 @@ def _fruit(
     s.layers(rings, skin)
 
 
-def apple(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def apple(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw an apple with its stem and a leaf."""
     skin = Paint(dice.pick(_APPLES), "food")
     body = 0.86 * h
@@ -110,7 +110,7 @@ def apple(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
         )
 
 
-def tomato(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def tomato(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a tomato with its green star."""
     skin = Paint(dice.pick(_TOMATOES), "food")
     body = 0.92 * h
@@ -132,7 +132,7 @@ def tomato(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     s.rod((0, 0), (0.9 * body, h), 0.03 * w, LEAF.shade(0.8))
 
 
-def lettuce(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def lettuce(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a head of lettuce: a pale heart within six outer leaves."""
     green = dice.pick(
         (

@@ -8,14 +8,14 @@ from internav_data.catalog.sampling import BLACK, BRASS, CHROME, IRON, SCREEN, S
 from internav_data.catalog.shapes import Paint, ring
 
 if TYPE_CHECKING:
-    from internav_data.catalog.sampling import Dice
+    from internav_data.catalog.sampling import UniformSampler
     from internav_data.catalog.shapes import Sketch
 
 _DRUM = Paint((96, 112, 124), "glass")
 _ENAMEL = (WHITE, STEEL, Paint((66, 70, 76), "metal"), Paint((226, 222, 212), "metal"))
 
 
-def television(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def television(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a television: a thin panel on a stand, on feet, or an old deep one."""
     x, y = w / 2, d / 2
     frame = dice.pick((BLACK, IRON, STEEL))
@@ -66,7 +66,7 @@ def television(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
             s.strut((cx, sy * (y - 0.014), 0), (cx, sy * 0.2 * thick, foot + 0.01), 0.014, frame)
 
 
-def microwave(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def microwave(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a microwave oven: door with window, handle, keys."""
     case, x, y = dice.pick((*_ENAMEL, BLACK)), w / 2, d / 2
     front = -y + 0.03
@@ -97,7 +97,7 @@ def microwave(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
         )
 
 
-def fridge(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def fridge(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a fridge: two doors above each other or side by side."""
     case, x, y = dice.pick(_ENAMEL), w / 2, d / 2
     front = -y + 0.05
@@ -129,7 +129,7 @@ def fridge(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
         door((-x, x), (split, h), side, (split + 0.06, min(h - 0.1, split + 0.42)))
 
 
-def stove(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def stove(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a cooker: oven door with window and bar, knobs, four plates."""
     case, x, y = dice.pick(_ENAMEL), w / 2, d / 2
     top = min(h, 0.92)
@@ -157,7 +157,7 @@ def stove(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
         s.box((-x, x), (y - 0.05, y), (top, h), case)
 
 
-def washing_machine(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def washing_machine(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a front loader: round door, drawer, dial."""
     case, x, y = dice.pick((WHITE, WHITE, STEEL)), w / 2, d / 2
     front = -y + 0.03
@@ -174,7 +174,7 @@ def washing_machine(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None
     s.box((0.4 * x, 0.82 * x), (front - 0.01, front), (0.88 * h, 0.94 * h), SCREEN)
 
 
-def clothes_dryer(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def clothes_dryer(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a dryer: square door with a round glass, grille, dial on the left."""
     case, x, y = dice.pick((WHITE, WHITE, STEEL)), w / 2, d / 2
     front = -y + 0.03
@@ -201,7 +201,7 @@ def clothes_dryer(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     s.box((0.3 * x, 0.82 * x), (front - 0.01, front), (0.89 * h, 0.95 * h), SCREEN)
 
 
-def dishwasher(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def dishwasher(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a dishwasher: one door, a bar, a strip of keys."""
     case, x, y = dice.pick(_ENAMEL), w / 2, d / 2
     front = -y + 0.035
@@ -212,7 +212,7 @@ def dishwasher(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     s.cylinder((-0.7 * x, 0.7 * x), (-y, -y + 0.022), (0.78 * h, 0.78 * h + 0.022), CHROME, "x")
 
 
-def floor_lamp(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def floor_lamp(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a standing lamp: a foot, a pole and a shade."""
     x, y = w / 2, d / 2
     pole = dice.pick((BRASS, IRON, CHROME))

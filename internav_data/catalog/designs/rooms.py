@@ -23,13 +23,13 @@ from internav_data.catalog.sampling import (
 from internav_data.catalog.shapes import Paint, ring
 
 if TYPE_CHECKING:
-    from internav_data.catalog.sampling import Dice
+    from internav_data.catalog.sampling import UniformSampler
     from internav_data.catalog.shapes import Sketch
 
 _WATER = Paint((206, 216, 218), "ceramic")
 
 
-def _base_cabinets(s: Sketch, size: tuple[float, float, float], dice: Dice) -> None:
+def _base_cabinets(s: Sketch, size: tuple[float, float, float], dice: UniformSampler) -> None:
     """Draw cabinets with doors and one column of drawers under a worktop."""
     w, d, h = size
     x, y = w / 2, d / 2
@@ -49,12 +49,12 @@ def _base_cabinets(s: Sketch, size: tuple[float, float, float], dice: Dice) -> N
         doors(s, (-x + drawn, x), front, (0.1, h - 0.05), leaves, paint.shade(1.06))
 
 
-def counter_top(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def counter_top(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a run of base cabinets with a worktop."""
     _base_cabinets(s, (w, d, h), dice)
 
 
-def kitchen_island(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def kitchen_island(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw an island: cabinets on one side, a lid that overhangs on the other."""
     _base_cabinets(s, (w, 0.62 * d, h), dice)
     x, y = w / 2, d / 2
@@ -63,7 +63,7 @@ def kitchen_island(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
         s.box((cx - 0.03, cx + 0.03), (1.38 * y - 0.1, 1.38 * y - 0.04), (0, h - 0.04), dice.wood())
 
 
-def sink(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def sink(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a wash basin on a pedestal or in a vanity."""
     x, y = w / 2, d / 2
     rim = h - 0.1
@@ -85,7 +85,7 @@ def sink(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     s.box((-0.012, 0.012), (0.1 * y, 0.74 * y), (h - 0.024, h), CHROME)
 
 
-def toilet(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def toilet(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a toilet: foot, bowl, seat, tank."""
     x, y = w / 2, d / 2
     bowl = min(0.42, 0.55 * h)
@@ -122,7 +122,7 @@ def toilet(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     s.rod((0, y - tank / 2), (h - 0.01, h), 0.025, CHROME)
 
 
-def bathtub(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def bathtub(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a tub with walls, a floor and taps."""
     x, y, t = w / 2, d / 2, 0.07
     skirt = dice.pick((CERAMIC, CERAMIC, Paint((150, 166, 170), "ceramic")))
@@ -136,7 +136,7 @@ def bathtub(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     s.box((x - 0.18, x - 0.06), (-0.014, 0.014), (h + 0.045, h + 0.07), CHROME)
 
 
-def shower(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def shower(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a shower: tray, glass on two sides, pole and head."""
     x, y = w / 2, d / 2
     s.box((-x, x), (-y, y), (0, 0.1), CERAMIC)
@@ -154,7 +154,7 @@ def shower(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     s.box((0.3 * x - 0.06, 0.3 * x + 0.06), (y - 0.08, y - 0.03), (1.02, 1.07), CHROME)
 
 
-def house_plant(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def house_plant(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a potted plant: long leaves from the soil, or a crown on a stem."""
     x, y = w / 2, d / 2
     pot = dice.pick(
@@ -201,7 +201,7 @@ def house_plant(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
         )
 
 
-def laundry_hamper(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def laundry_hamper(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a laundry basket with a lid."""
     weave, x, y = (
         Paint(dice.pick(((196, 164, 120), (150, 116, 82), (226, 220, 208))), "wood"),
@@ -222,7 +222,7 @@ def laundry_hamper(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     s.box((-0.2 * x, 0.2 * x), (-0.1 * y, 0.1 * y), (h - 0.01, h + 0.012), weave.shade(0.8))
 
 
-def rug(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def rug(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a rug with a border and a field; stepped in fractions of its thickness."""
     cloth, x, y = dice.fabric(), w / 2, d / 2
     other = dice.fabric()
@@ -241,7 +241,7 @@ def rug(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     )
 
 
-def painting(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def painting(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a framed picture whose back is the wall's side (+y)."""
     x, y = w / 2, d / 2
     frame = dice.pick((dice.wood(), BLACK, Paint((196, 166, 104), "metal")))
@@ -269,7 +269,7 @@ def painting(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     )
 
 
-def mirror(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def mirror(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a wall mirror, rectangular or oval."""
     x, y = w / 2, d / 2
     frame = dice.pick((dice.wood(), BLACK, CHROME, STEEL))

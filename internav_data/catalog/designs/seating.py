@@ -9,11 +9,11 @@ from internav_data.catalog.sampling import BLACK, CHROME, IRON, STEEL
 from internav_data.catalog.shapes import ring
 
 if TYPE_CHECKING:
-    from internav_data.catalog.sampling import Dice
+    from internav_data.catalog.sampling import UniformSampler
     from internav_data.catalog.shapes import Paint, Sketch
 
 
-def chair(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def chair(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a dining chair: legs, seat and back."""
     seat = min(0.46, 0.56 * h)
     shallow = d < 0.6  # a moulded seat that deep would be a lounger
@@ -70,7 +70,7 @@ def chair(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
         )
 
 
-def _shell_chair(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def _shell_chair(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a moulded seat on splayed legs."""
     seat, x, y = min(0.46, 0.56 * h), w / 2, d / 2
     shell, leg = dice.plastic(), dice.pick((dice.wood(), CHROME, IRON))
@@ -90,7 +90,7 @@ def _shell_chair(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     )
 
 
-def arm_chair(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def arm_chair(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw an armchair: club, wing or with a wooden frame."""
     style = dice.pick(("club", "wing", "frame", "club"))
     cloth, wood = dice.cover(), dice.wood()
@@ -129,7 +129,7 @@ def _framed(s: Sketch, size: tuple[float, float, float], cloth: Paint, wood: Pai
     s.slab(inner, (0.44 * y, 0.68 * y), (0.76 * y, y), (seat, h), cloth.shade(1.05))
 
 
-def sofa(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def sofa(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a sofa; a deep one has a chaise on one side."""
     cloth, wood = dice.cover(), dice.wood()
     seats = 2 if w < 1.95 else 3
@@ -157,7 +157,7 @@ def _upholstered(
     seats: int,
     cloth: Paint,
     wood: Paint,
-    dice: Dice,
+    dice: UniformSampler,
     shift: float = 0.0,
 ) -> None:
     """Draw base, legs, arms, back, and a seat and a back cushion for each place."""
@@ -195,7 +195,7 @@ def _upholstered(
         )
 
 
-def stool(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def stool(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a stool: a round, square or padded seat on four legs with a foot rail."""
     wood, x, y = dice.wood(), w / 2, d / 2
     legs = dice.pick((wood, IRON, CHROME))
@@ -229,7 +229,7 @@ def stool(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
         s.cushion((-0.94 * x, 0.94 * x), (-0.94 * y, 0.94 * y), (h - 0.06, h), seat, 0.4)
 
 
-def ottoman(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def ottoman(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw an upholstered block on short legs, or a round pouf."""
     cloth, x, y = dice.cover(), w / 2, d / 2
     if w < 1.25 * d:
@@ -244,7 +244,7 @@ def ottoman(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     s.cushion((-x, x), (-y, y), (0.66 * h, h), cloth, 0.3)
 
 
-def office_chair(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def office_chair(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a swivel chair on a five-pointed base."""
     x, y, cloth = w / 2, d / 2, dice.cover()
     seat = 0.47 * h
@@ -277,7 +277,7 @@ def office_chair(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     s.box((-0.9 * x, 0.9 * x), (-0.05 * y, 0.05 * y), (seat - 0.08, seat - 0.04), BLACK)
 
 
-def bench(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def bench(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a bench: slab sides or legs, sometimes a cushion on top."""
     wood, x, y = dice.wood(), w / 2, d / 2
     if dice.chance(0.5):

@@ -8,7 +8,7 @@ from internav_data.catalog.sampling import BLACK, BRASS, IRON, LINEN, PAPER, SCR
 from internav_data.catalog.shapes import Paint, ring
 
 if TYPE_CHECKING:
-    from internav_data.catalog.sampling import Dice
+    from internav_data.catalog.sampling import UniformSampler
     from internav_data.catalog.shapes import Sketch
 
 _CARDBOARD = (
@@ -19,7 +19,7 @@ _CARDBOARD = (
 )
 
 
-def box(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def box(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a cardboard box: taped shut, or open with its flaps out."""
     card, x, y = dice.pick(_CARDBOARD), w / 2, d / 2
     if dice.chance(0.5):
@@ -50,7 +50,7 @@ def _span(a: float, b: float) -> tuple[float, float]:
     return (a, b) if a < b else (b, a)
 
 
-def alarm_clock(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def alarm_clock(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw an alarm clock: twin bells, digital, or a round face on a block."""
     paint, x, y = dice.plastic(), w / 2, d / 2
     style = "digital" if w > 1.25 * h else dice.pick(("bells", "bells", "block"))
@@ -116,7 +116,7 @@ def alarm_clock(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
         s.box((-0.5 * x, 0.5 * x), (-0.12 * y, 0.12 * y), (0.95 * h, h), STEEL)
 
 
-def laptop(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def laptop(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw an open laptop: base, keys, touch pad, screen."""
     case = dice.pick(
         (
@@ -167,7 +167,7 @@ def laptop(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     )
 
 
-def pot(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def pot(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a cooking pot: open or with a lid, two handles or a long one."""
     body = dice.pick(
         (STEEL, STEEL, IRON, Paint((176, 62, 54), "metal"), Paint((64, 104, 120), "metal"))
@@ -214,7 +214,7 @@ def _open_wall(s: Sketch, size: tuple[float, float, float], cy: float, paint: Pa
         s.hull([(a, b, z) for a, b, _ in around for z in (0.0, h)], paint)
 
 
-def garbage_can(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def garbage_can(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a bin: tapered with a lid, pedal bin, or an open basket."""
     paint, x, y = dice.pick((dice.plastic(), STEEL, IRON)), w / 2, d / 2
     style = dice.pick(("lid", "pedal", "open", "pedal"))

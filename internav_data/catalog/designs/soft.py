@@ -9,11 +9,11 @@ from internav_data.catalog.sampling import LINEN, WHITE
 from internav_data.catalog.shapes import ring
 
 if TYPE_CHECKING:
-    from internav_data.catalog.sampling import Dice
+    from internav_data.catalog.sampling import UniformSampler
     from internav_data.catalog.shapes import Sketch
 
 
-def bed(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def bed(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a bed, its head at +y: frame, mattress, duvet, pillows."""
     x, y = w / 2, d / 2
     wood, cloth = dice.wood(), dice.fabric()
@@ -31,7 +31,7 @@ def bed(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
         s.cushion((left + 0.02, left + wide - 0.02), (y - 0.5, y - 0.1), (0.48, 0.62), WHITE, 0.4)
 
 
-def pillow(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def pillow(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a stuffed pillow: pointed corners, a full middle, perhaps a stripe."""
     cloth, x, y = dice.pick((dice.fabric(), dice.fabric(), LINEN)), w / 2, d / 2
 
@@ -65,7 +65,7 @@ def pillow(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
         )
 
 
-def dog_bed(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def dog_bed(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a dog's bed: a cushion within a soft rim, lower in front."""
     rim, x, y = dice.fabric(), w / 2, d / 2
     t = 0.15 * min(w, d)

@@ -9,7 +9,7 @@ from internav_data.catalog.sampling import BLACK, BRASS, CHROME, IRON, STEEL
 from internav_data.catalog.shapes import Paint
 
 if TYPE_CHECKING:
-    from internav_data.catalog.sampling import Dice
+    from internav_data.catalog.sampling import UniformSampler
     from internav_data.catalog.shapes import Sketch, Span
 
 
@@ -48,7 +48,7 @@ def _carcass(s: Sketch, size: tuple[float, float, float], wood: Paint, foot: flo
     s.box((-x, x), (-y + 0.008, y), (h - 0.024, h), wood.shade(1.06))
 
 
-def dresser(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def dresser(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a chest of drawers, one or two columns."""
     wood, x, y = dice.wood(), w / 2, d / 2
     foot = dice.pick((0.05, 0.12))
@@ -60,7 +60,7 @@ def dresser(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
         drawers(s, (left, left + wide), -y + 0.03, (foot + 0.01, h - 0.03), rows, wood.shade(1.1))
 
 
-def nightstand(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def nightstand(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a bedside table with two drawers."""
     wood, x, y = dice.wood(), w / 2, d / 2
     foot = dice.pick((0.05, 0.16))
@@ -68,7 +68,7 @@ def nightstand(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     drawers(s, (-x + 0.015, x - 0.015), -y + 0.03, (foot + 0.01, h - 0.03), 2, wood.shade(1.1))
 
 
-def tv_stand(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def tv_stand(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a low board with doors at the sides and open shelves between."""
     wood, x, y = dice.wood(), w / 2, d / 2
     _carcass(s, (w, d, h), wood, dice.pick((0.05, 0.12)))
@@ -111,13 +111,13 @@ _SPINES = (
 )
 
 
-def _books(s: Sketch, x: Span, y: Span, z: Span, dice: Dice) -> None:
+def _books(s: Sketch, x: Span, y: Span, z: Span, dice: UniformSampler) -> None:
     """Draw a row of books as one block."""
     colour = Paint(dice.pick(_SPINES), "paper")
     s.box(x, y, (z[0] - 0.002, z[1]), colour)
 
 
-def shelving_unit(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def shelving_unit(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw open shelves with a few things on them."""
     wood, x, y = dice.wood(), w / 2, d / 2
     boards = 4 if h < 1.5 else 5
@@ -134,7 +134,7 @@ def shelving_unit(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
         )
 
 
-def bookcase(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def bookcase(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a high shelf full of books."""
     wood, x, y = dice.wood(), w / 2, d / 2
     tops = _shelves(s, (w, d, h), 6, wood, back=True)
@@ -157,7 +157,7 @@ def bookcase(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
         )
 
 
-def wardrobe(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def wardrobe(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a wardrobe with two or three doors."""
     wood, x, y = dice.wood(), w / 2, d / 2
     _carcass(s, (w, d, h), wood, 0.06)
@@ -169,7 +169,7 @@ def wardrobe(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     doors(s, (-x + 0.01, x - 0.01), front, (low, h - 0.03), 2 if w < 1.4 else 3, wood.shade(1.1))
 
 
-def shoe_cabinet(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def shoe_cabinet(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a slim cabinet with tilting fronts."""
     wood, x, y = dice.wood(), w / 2, d / 2
     _carcass(s, (w, d, h), wood, 0.05)
@@ -178,7 +178,7 @@ def shoe_cabinet(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     )
 
 
-def filing_cabinet(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def filing_cabinet(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a metal cabinet with deep drawers."""
     metal, x, y = dice.pick((STEEL, IRON, Paint((214, 212, 204), "metal"))), w / 2, d / 2
     _carcass(s, (w, d, h), metal, 0.04)
@@ -192,7 +192,7 @@ def filing_cabinet(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     )
 
 
-def storage_rack(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def storage_rack(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a metal rack with boxes on its boards."""
     metal, x, y = dice.pick((IRON, STEEL)), w / 2, d / 2
     s.legs((-x, x), (-y, y), (0, h), 0.018, metal)
@@ -213,7 +213,7 @@ def storage_rack(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
             )
 
 
-def coat_rack(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def coat_rack(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a coat stand: a pole, four feet, pegs around its head."""
     wood, x, y = dice.pick((dice.wood(), IRON)), w / 2, d / 2
     s.rod((0, 0), (0.04, h), 0.022, wood)
@@ -224,7 +224,7 @@ def coat_rack(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
             s.strut((0, 0, z - 0.06), (sx * reach * x, sy * reach * y, z), 0.012, wood.shade(0.9))
 
 
-def piano(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def piano(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw an upright piano."""
     wood = dice.pick(
         (Paint((36, 34, 36), "wood"), Paint((96, 56, 38), "wood"), Paint((60, 40, 32), "wood"))
@@ -257,7 +257,7 @@ def piano(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
         s.box((cx - 0.02, cx + 0.02), (case - 0.1, case), (0.06, 0.08), BRASS)
 
 
-def safe(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def safe(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a strongbox: door, dial and handle."""
     metal, x, y = dice.pick((IRON, IRON.shade(1.5), Paint((92, 102, 96), "metal"))), w / 2, d / 2
     front = -y + 0.035
@@ -276,7 +276,7 @@ def safe(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
         )
 
 
-def crate(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def crate(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw an open wooden crate of slats."""
     wood, x, y, t = dice.wood(), w / 2, d / 2, 0.014
     s.box((-x + t, x - t), (-y + t, y - t), (0, t), wood.shade(0.85))

@@ -9,7 +9,7 @@ from internav_data.catalog.sampling import BRASS, GLASS, IRON, MIRROR
 from internav_data.catalog.shapes import ring
 
 if TYPE_CHECKING:
-    from internav_data.catalog.sampling import Dice
+    from internav_data.catalog.sampling import UniformSampler
     from internav_data.catalog.shapes import Paint, Sketch, Span
 
 
@@ -33,7 +33,7 @@ def drawers(
             )
 
 
-def desk(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def desk(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a desk: pedestals, trestles, panels, an L for deep ones, a hutch for tall ones."""
     wood = dice.wood()
     if d > 1.0:
@@ -47,7 +47,7 @@ def desk(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
 
 
 def _plain_desk(
-    s: Sketch, size: tuple[float, float, float], style: str, wood: Paint, dice: Dice
+    s: Sketch, size: tuple[float, float, float], style: str, wood: Paint, dice: UniformSampler
 ) -> None:
     w, d, h = size
     x, y, lid = w / 2, d / 2, h - 0.035
@@ -82,7 +82,9 @@ def _plain_desk(
         s.box((-0.3 * x, 0.3 * x), (front, 0.8 * y), (lid - 0.11, lid), wood.shade(0.9))
 
 
-def _corner_desk(s: Sketch, size: tuple[float, float, float], wood: Paint, dice: Dice) -> None:
+def _corner_desk(
+    s: Sketch, size: tuple[float, float, float], wood: Paint, dice: UniformSampler
+) -> None:
     """Draw an L: one leaf along the back, one towards the front."""
     w, d, h = size
     x, y, side = w / 2, d / 2, dice.pick((-1, 1))
@@ -122,7 +124,7 @@ def _hutch(s: Sketch, size: tuple[float, float, float], wood: Paint) -> None:
     )
 
 
-def dining_table(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def dining_table(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a dining table: four legs, trestle, or round on a pedestal."""
     wood, x, y = dice.wood(), w / 2, d / 2
     top = wood.shade(1.06)
@@ -172,7 +174,7 @@ def dining_table(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     s.box((-0.64 * x, 0.64 * x), (-0.025, 0.025), (0.26 * h, 0.36 * h), wood.shade(0.9))
 
 
-def side_table(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def side_table(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a side table: console, night table, round, shelved or a cube."""
     wood, x, y = dice.wood(), w / 2, d / 2
     compact = max(w, d) < 1.3 * min(w, d)
@@ -207,7 +209,9 @@ def side_table(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
             s.box(inner, (-y + 0.02, y - 0.02), (0.22 * h, 0.22 * h + 0.02), wood)
 
 
-def _round_table(s: Sketch, size: tuple[float, float, float], wood: Paint, dice: Dice) -> None:
+def _round_table(
+    s: Sketch, size: tuple[float, float, float], wood: Paint, dice: UniformSampler
+) -> None:
     w, d, h = size
     x, y = w / 2, d / 2
     metal = dice.pick((BRASS, IRON, wood))
@@ -228,7 +232,9 @@ def _round_table(s: Sketch, size: tuple[float, float, float], wood: Paint, dice:
     s.cylinder((-0.62 * x, 0.62 * x), (-0.62 * y, 0.62 * y), (0.3 * h, 0.3 * h + 0.018), wood)
 
 
-def _console(s: Sketch, size: tuple[float, float, float], wood: Paint, dice: Dice) -> None:
+def _console(
+    s: Sketch, size: tuple[float, float, float], wood: Paint, dice: UniformSampler
+) -> None:
     w, d, h = size
     x, y = w / 2, d / 2
     s.box((-x, x), (-y, y), (h - 0.035, h), wood.shade(1.06))
@@ -245,7 +251,7 @@ def _console(s: Sketch, size: tuple[float, float, float], wood: Paint, dice: Dic
     s.box((-x + 0.02, x - 0.02), (-y + 0.02, y - 0.02), (0.16 * h, 0.16 * h + 0.02), wood)
 
 
-def coffee_table(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def coffee_table(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a low table: oval, with a shelf, or a slab on panels."""
     wood, x, y = dice.wood(), w / 2, d / 2
     style = dice.pick(("oval", "shelf", "panels"))
@@ -276,7 +282,7 @@ def coffee_table(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
     )
 
 
-def vanity_table(s: Sketch, w: float, d: float, h: float, dice: Dice) -> None:
+def vanity_table(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     """Draw a dressing table with a mirror."""
     wood, x, y, top = dice.wood(), w / 2, d / 2, 0.76
     s.box((-x, x), (-y, y), (top - 0.03, top), wood.shade(1.06))

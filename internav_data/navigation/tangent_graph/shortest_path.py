@@ -88,7 +88,7 @@ _UNTOUCHED_M = CLEARANCE_M + 0.001
 """What keeps this distance from a drawn way is out of its way: chords leave arcs by 0.8 mm."""
 
 
-class WayFinder:
+class TangentGraph:
     """Shortest ways of the disc among convex polygons, with obstacles that come and go.
 
     What belongs to the house alone (free arcs, tangents, clusters) is worked out once.
@@ -109,17 +109,17 @@ class WayFinder:
         self._clear_ways: dict[tuple[float, float, float, float], tuple[float, Floats]] = {}
 
     @staticmethod
-    def of(house: House) -> WayFinder:
+    def of(house: House) -> TangentGraph:
         """Prepare a house: its walls and furniture, no obstacles.
 
         Walls must close its outline (entrances are closed): a way could lead outside otherwise.
         """
-        return WayFinder(house_footprints(house))
+        return TangentGraph(house_footprints(house))
 
     @staticmethod
-    def of_polygons(polygons: Polygons) -> WayFinder:
+    def of_polygons(polygons: Polygons) -> TangentGraph:
         """Prepare any convex polygons."""
-        return WayFinder(polygons)
+        return TangentGraph(polygons)
 
     def distance(self, p: Vec2, q: Vec2, obstacles: Polygons | None = None) -> float | None:
         """Length of the shortest way between two points, metres; None where they are sealed off.
@@ -238,6 +238,6 @@ class WayFinder:
 
 
 def keeps_clear(points: Floats, polygons: Polygons) -> bool:
-    """Whether the disc, going a way (n, 2) of `WayFinder.path`, surely keeps clear of polygons."""
+    """Return whether a disc going along (n, 2) `points` surely keeps clear of polygons."""
     boxes = boxes_of(polygons.vertices, polygons.offsets)
     return bool(way_clear_of(points, polygons.vertices, polygons.offsets, boxes, _UNTOUCHED_M))

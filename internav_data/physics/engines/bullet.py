@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any
 
 from internav_data.geometry import centre_of_mass, multiply, rotation_matrix
 from internav_data.physics.engines.bullet_scene import RULES, STEP_S, Builder, pybullet
-from internav_data.physics.scene import Motion, Rest
+from internav_data.physics.scene import PushSolution, SettleSolution
 from internav_data.physics.sweep import radius_m, trail_of
 from internav_data.records import Pose
 
 if TYPE_CHECKING:
-    from internav_data.physics.scene import Setting, Shove
+    from internav_data.physics.scene import PhysicsScene, PushSpec
     from internav_data.records import Asset
 
 
@@ -54,7 +54,7 @@ class Bullet:
     name: str = "bullet"
     build: str = field(default_factory=lambda: f"pybullet {version('pybullet')}, rules {RULES}")
 
-    def settle(self, setting: Setting) -> Rest:
+    def settle(self, setting: PhysicsScene) -> SettleSolution:
         """Let the first body fall until at rest, one second at most."""
         ids = self._builder.build(setting)
         body = setting.bodies[0]
@@ -71,7 +71,7 @@ class Bullet:
             now, turn = pybullet.getBasePositionAndOrientation(ids[0], self._builder.client)
             shift = math.hypot(now[0] - start[0], now[1] - start[1])
             reach = max(reach, shift + radius * _angle(start_turn, turn))
-        return Rest(
+        return SettleSolution(
             pose=self._pose(ids[0], body.asset),
             seconds=steps * STEP_S,
             at_rest=calm >= REST_STEPS,
@@ -79,7 +79,7 @@ class Bullet:
             reach_m=reach,
         )
 
-    def push(self, setting: Setting, shove: Shove) -> Motion:
+    def push(self, setting: PhysicsScene, shove: PushSpec) -> PushSolution:
         """Push the first body along +x, let it go, and wait until all that moves is at rest."""
         ids = self._builder.build(setting)
         client = self._builder.client
@@ -111,7 +111,7 @@ class Bullet:
                 # by now never will.
                 crept = [trail.crept(CREEP_M, CREEP_RAD) for trail in trails]
                 rests = rests or not any(crept)
-        return Motion(
+        return PushSolution(
             poses=tuple(self._pose(ids[k], setting.bodies[k].asset) for k in moving),
             sweeps=tuple(trail.octagon for trail in trails),
             paths=tuple(trail.path for trail in trails),
@@ -124,7 +124,7 @@ class Bullet:
         speed, spin = pybullet.getBaseVelocity(identity, self._builder.client)
         return math.hypot(*speed) < REST_SPEED and math.hypot(*spin) < REST_SPIN
 
-    def _shove(self, identity: int, shove: Shove, gain: float, pushes_left: int) -> int:
+    def _shove(self, identity: int, shove: PushSpec, gain: float, pushes_left: int) -> int:
         """Push for one step; returns how many steps of pushing are left."""
         speed, spin = pybullet.getBaseVelocity(identity, self._builder.client)
         if speed[0] + gain >= shove.speed_m_s:

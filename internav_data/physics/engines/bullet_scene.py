@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from types import ModuleType
 
-    from internav_data.physics.scene import Body, Column, Setting
+    from internav_data.physics.scene import AgentCollider, Body, PhysicsScene
     from internav_data.records import Asset
 
 
@@ -85,7 +85,7 @@ class Builder:
     _slab: int = -1
     _scenes_left: int = 0
 
-    def build(self, setting: Setting) -> list[int]:
+    def build(self, setting: PhysicsScene) -> list[int]:
         """Take the last scene down, make another one and return the ids of its bodies, in order."""
         # Zero until the scene stands: what an interrupt left half done is swept away as a whole.
         left, self._scenes_left = self._scenes_left, 0
@@ -151,7 +151,7 @@ class Builder:
         self._bodies.append(identity)
         return identity
 
-    def _add_agent(self, column: Column) -> None:
+    def _add_agent(self, column: AgentCollider) -> None:
         shape = pybullet.createCollisionShape(
             pybullet.GEOM_CYLINDER,
             radius=column.radius_m,

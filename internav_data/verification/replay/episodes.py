@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from internav_data.physics import engine_of_this_process, solving_anew
+from internav_data.physics import cache_disabled, engine_of_this_process
 from internav_data.verification.replay.experts import check_expert
 from internav_data.verification.replay.outcomes import check_outcomes
 from internav_data.verification.replay.settling import check_settling
@@ -20,7 +20,7 @@ def replay_episode(theatre: Theatre, episode: Episode, report: Collector) -> Non
 
     What cannot be judged is counted among the report's notes.
     """
-    with solving_anew():
+    with cache_disabled():
         _replay(theatre, episode, report)
 
 

@@ -20,7 +20,7 @@ from internav_data.verification.shapes import AGENT_HEIGHT_M, STEP_OVER_M
 if TYPE_CHECKING:
     from shapely import Geometry
 
-    from internav_data.physics import Settled
+    from internav_data.physics import SettleResult
     from internav_data.records import Episode, Obstacle
     from internav_data.verification.obstacles import Expect
     from internav_data.verification.replay.checked_scene import Theatre
@@ -59,7 +59,7 @@ def check_settling(theatre: Theatre, episode: Episode, expect: Expect) -> None:
             expect(found == stored, f"physics.settle-{name}", f"{what}: {found}", stored)
 
 
-def _fall(theatre: Theatre, episode: Episode, number: int) -> Settled:
+def _fall(theatre: Theatre, episode: Episode, number: int) -> SettleResult:
     """Let an obstacle fall from the spot from which it would come to lie where it is stored."""
     obstacle = episode.obstacles[number]
     asset = theatre.assets[obstacle.asset_id]
