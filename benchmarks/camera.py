@@ -23,7 +23,7 @@ from internav_data import generate_house
 from internav_data.catalog import asset_mesh
 from internav_data.navigation import SPACING_M, Lattice
 from internav_data.render.asset_mesh import LIBRARY
-from internav_data.render.camera import EYE_HEIGHT_M, Camera, Scenery, View, camera_axes
+from internav_data.render.camera import EYE_HEIGHT_M, Camera, CameraView, StaticScene, camera_axes
 from internav_data.render.frame import picture
 from internav_data.render.shading import shade
 
@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 TARGETS = {"times_tiny_renderer_300": 12.0, "frames_per_s_64": 4000.0}
 
 
-def views_of(house: House, count: int, seed: int) -> list[View]:
+def views_of(house: House, count: int, seed: int) -> list[CameraView]:
     """Free lattice nodes, quarter turns, the agent's horizons."""
-    scenery = Scenery.of(house)
+    scenery = StaticScene.of(house)
     props = scenery.props()
     rng = np.random.default_rng(seed)
     free = np.argwhere(Lattice.of(house).free)
@@ -45,7 +45,7 @@ def views_of(house: House, count: int, seed: int) -> list[View]:
     for _ in range(count):
         i, j = free[int(rng.integers(len(free)))]
         yaw, horizon = 90.0 * int(rng.integers(4)), (30.0, 30.0, 0.0, 60.0)[int(rng.integers(4))]
-        out.append(View(scenery, props, SPACING_M * i, SPACING_M * j, yaw, horizon))
+        out.append(CameraView(scenery, props, SPACING_M * i, SPACING_M * j, yaw, horizon))
     return out
 
 
@@ -77,7 +77,7 @@ def bullet_scene(house: House) -> Any:  # noqa: ANN401 - pybullet is untyped
     for z in (-0.05, max(r.ceiling_m for r in house.rooms) + 0.05):
         centre = [(max(xs) + min(xs)) / 2, (max(ys) + min(ys)) / 2, z]
         pybullet.createMultiBody(0, -1, shape, centre)
-    for thing in house.things:
+    for thing in house.objects:
         mesh = asset_mesh(house.assets[thing.asset_id])
         shape = pybullet.createVisualShape(
             pybullet.GEOM_MESH, vertices=mesh.vertices.tolist(),
@@ -88,7 +88,7 @@ def bullet_scene(house: House) -> Any:  # noqa: ANN401 - pybullet is untyped
     return pybullet
 
 
-def tiny(client: Any, view: View, size: int) -> None:  # noqa: ANN401 - pybullet is untyped
+def tiny(client: Any, view: CameraView, size: int) -> None:  # noqa: ANN401 - pybullet is untyped
     """Draw one view with TinyRenderer: colour, depth and segmentation."""
     yaw, down = math.radians(view.yaw_deg), math.radians(view.horizon_deg)
     eye = [view.x, view.y, EYE_HEIGHT_M]
@@ -99,7 +99,7 @@ def tiny(client: Any, view: View, size: int) -> None:  # noqa: ANN401 - pybullet
     client.getCameraImage(size, size, look, lens, renderer=client.ER_TINY_RENDERER, shadow=0)
 
 
-def stages_of(camera: Camera, view: View) -> dict[str, float]:
+def stages_of(camera: Camera, view: CameraView) -> dict[str, float]:
     """Microseconds one picture takes in Python, in culling and drawing, and in shading."""
     out = camera.frames(1)
     camera.render([view], out)
@@ -134,7 +134,7 @@ def stages_of(camera: Camera, view: View) -> dict[str, float]:
     }  # fmt: skip
 
 
-def stages(views: list[View], size: int) -> dict[str, float]:
+def stages(views: list[CameraView], size: int) -> dict[str, float]:
     """Average the stages of some views."""
     camera = Camera(size)
     each = [stages_of(camera, view) for view in views]
@@ -163,11 +163,11 @@ def main() -> int:
 
     house = generate_house(seed=options.seed, scene=options.scene)
     views = views_of(house, options.views, options.seed)
-    triangles = sum(len(asset_mesh(house.assets[t.asset_id]).faces) for t in house.things)
+    triangles = sum(len(asset_mesh(house.assets[t.asset_id]).faces) for t in house.objects)
     result: dict[str, Any] = {
         "scene": {
             "seed": options.seed, "scene": options.scene, "rooms": len(house.rooms),
-            "things": len(house.things), "triangles": triangles + 12 * len(house.walls),
+            "things": len(house.objects), "triangles": triangles + 12 * len(house.walls),
         },
         "views": len(views),
     }  # fmt: skip

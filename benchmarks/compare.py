@@ -25,7 +25,7 @@ import numpy as np
 import shapely
 
 from internav_data.catalog import catalogue
-from internav_data.episodes import EpisodeConfig, Site, build_episodes
+from internav_data.episodes import EpisodeConfig, SpawnSite, build_episodes
 from internav_data.geometry import Polygons, footprint
 from internav_data.houses import HouseConfig, build_house
 from internav_data.physics import settle
@@ -83,9 +83,12 @@ def _row(
     ours, our_s = _timed(lambda: build_episodes(house, count, pool, config))
     rng = np.random.default_rng([seed, house.scene])
     most = config.most_obstacles(len(house.rooms))
-    site, house_s = _timed(lambda: naive.Site.of(house))
+    site, house_s = _timed(lambda: naive.SpawnSite.of(house))
     theirs, their_s = _timed(lambda: naive.build_episodes(site, count, pool, most, rng))
-    checked = [*(_theirs_on(site, e) for e in ours), *(_ours_on(Site.of(house), e) for e in theirs)]
+    checked = [
+        *(_theirs_on(site, e) for e in ours),
+        *(_ours_on(SpawnSite.of(house), e) for e in theirs),
+    ]
     row = {
         "rooms": len(house.rooms),
         "internav_s": our_s,
@@ -102,7 +105,7 @@ def _row(
     return row
 
 
-def _theirs_on(site: naive.Site, episode: Episode) -> tuple[bool, bool]:
+def _theirs_on(site: naive.SpawnSite, episode: Episode) -> tuple[bool, bool]:
     """Let the baseline judge one of our episodes."""
     assets = catalogue().assets
     shapes = [
@@ -111,14 +114,14 @@ def _theirs_on(site: naive.Site, episode: Episode) -> tuple[bool, bool]:
     start, goal = (episode.start.i, episode.start.j), (episode.goal.i, episode.goal.j)
     steps, way = naive.judge(site, start, goal, shapes)
     clear = naive.steps_between(site.grid, start, goal)
-    ways = _near(way, episode.way_m) and _near(
+    ways = _near(way, episode.obstructed_path_m) and _near(
         naive.length(site.sight.path(naive._metres(start), naive._metres(goal)) or []),
-        episode.clear_m,
+        episode.shortest_path_m,
     )
-    return steps == episode.steps and clear == episode.clear_steps, ways
+    return steps == episode.obstructed_path_steps and clear == episode.shortest_path_steps, ways
 
 
-def _ours_on(site: Site, episode: naive.NaiveEpisode) -> tuple[bool, bool]:
+def _ours_on(site: SpawnSite, episode: naive.NaiveEpisode) -> tuple[bool, bool]:
     """Judge one of the baseline's episodes."""
     lattice = site.lattice.copy()
     shapes = [footprint(o.asset, o.rest.pose) for o in episode.obstacles]
@@ -128,8 +131,10 @@ def _ours_on(site: Site, episode: naive.NaiveEpisode) -> tuple[bool, bool]:
     ends = naive._metres(episode.start), naive._metres(episode.goal)
     way = site.ways.distance(*ends, Polygons.joined(shapes))
     clear = site.lattice.distance(episode.start, episode.goal)
-    ways = _near(way, episode.way_m) and _near(site.ways.distance(*ends), episode.clear_m)
-    return steps == episode.steps and clear == episode.clear_steps, ways
+    ways = _near(way, episode.obstructed_path_m) and _near(
+        site.ways.distance(*ends), episode.shortest_path_m
+    )
+    return steps == episode.obstructed_path_steps and clear == episode.shortest_path_steps, ways
 
 
 def _near(first: float | None, second: float | None) -> bool:

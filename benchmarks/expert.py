@@ -26,14 +26,14 @@ import numpy as np
 from internav_data.catalog import catalogue
 from internav_data.episodes import build_episodes
 from internav_data.houses import HouseConfig, build_house
-from internav_data.planner.problem import Ground
+from internav_data.planner.problem import PlanningProblem
 from internav_data.planner.search import expert_of_episode
-from internav_data.world import ACTION_COUNT, Action, Stage, World
+from internav_data.world import ACTION_COUNT, Action, HouseModel, World
 
 if TYPE_CHECKING:
     from internav_data.records import Episode, Expert
 
-Case = tuple[Stage, "Episode", "Expert | None", float]
+Case = tuple[HouseModel, "Episode", "Expert | None", float]
 WORLDS_AT_MOST = 4000
 """Worlds that an exhaustive search may take."""
 
@@ -44,7 +44,7 @@ def solve_all(scenes: int, count: int, seed: int) -> list[Case]:
     cases: list[Case] = []
     for scene in range(scenes):
         house = build_house(seed, scene, HouseConfig(), catalogue())
-        stage = Stage.of(house)
+        stage = HouseModel.of(house)
         for place, episode in enumerate(build_episodes(house, count, pool)):
             if place == 0:
                 expert_of_episode(stage, episode, assets)
@@ -81,9 +81,14 @@ def summary(cases: list[Case]) -> dict[str, float]:
             "pushes": round(statistics.fmean(x.pushes for _, x in solved), 3),
             "picks": round(statistics.fmean(x.picks for _, x in solved), 3),
             "spl": round(
-                statistics.fmean(e.clear_m / max(x.path_m, e.clear_m) for e, x in solved), 4
+                statistics.fmean(
+                    e.shortest_path_m / max(x.path_m, e.shortest_path_m) for e, x in solved
+                ),
+                4,
             ),
-            "sts": round(statistics.fmean(e.clear_m / 0.25 / x.steps for e, x in solved), 4),
+            "sts": round(
+                statistics.fmean(e.shortest_path_m / 0.25 / x.steps for e, x in solved), 4
+            ),
         }
     return out
 
@@ -93,7 +98,7 @@ def fewest(world: World, bound: int) -> int | None:
 
     A* over true worlds: no plan is faster than one in a house without any movable thing.
     """
-    ground = Ground.of(world)
+    ground = PlanningProblem.of(world)
     free = np.zeros_like(ground.prices(world))
     ahead = ground.costs(ground.masks(world), 0, free)
     # Layers by spent + ahead, so that the worlds that matter come first.

@@ -62,7 +62,7 @@ def shape_of(room: Room) -> float:
 def covered(house: House, room: Room) -> float:
     """Floor area under things (bounding boxes of footprints), m2."""
     total = 0.0
-    for thing in house.things:
+    for thing in house.objects:
         asset = house.assets[thing.asset_id]
         if thing.room == room.room_id and thing.support < 0 and thing.z < 1.0 and asset.blocks:
             polygons = footprint(asset, thing.pose).vertices
@@ -128,9 +128,9 @@ def survey(config: HouseConfig, scenes: int, seed: int) -> Result:
             1 - sum(covered(house, r) for r in house.rooms) / floor
         )
         for room in house.rooms:
-            things = sum(t.room == room.room_id for t in house.things)
+            things = sum(t.room == room.room_id for t in house.objects)
             standing = sum(
-                t.room == room.room_id and t.support < 0 and t.z < 1.0 for t in house.things
+                t.room == room.room_id and t.support < 0 and t.z < 1.0 for t in house.objects
             )
             degree = sum(room.room_id in edge for edge in house.room_graph)
             table["area by type (m2)"][room.type].append(room.area_m2)

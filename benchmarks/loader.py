@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from internav_data.dataset import Dataset
 
-_SCAN = ("room_count", "mode", "clear_m", "obstacle_count")
+_SCAN = ("room_count", "mode", "shortest_path_m", "obstacle_count")
 _TARGETS = {
     "scan_episodes_per_s": 1_000_000,
     "records_per_s": 5_000,

@@ -214,7 +214,7 @@ class Site:
             for w in house.walls
             if w.z_min < HIGH and w.z_max > LOW
         ]
-        for thing in house.things:
+        for thing in house.objects:
             blockers += plan_of(house.assets[thing.asset_id], thing.pose)
         tree = shapely.STRtree(blockers)
         outline = shapely.Polygon(house.outline)
@@ -294,10 +294,10 @@ class NaiveEpisode:
     mode: str
     start: Node
     goal: Node
-    clear_steps: int
-    clear_m: float
+    shortest_path_steps: int
+    shortest_path_m: float
     steps: int | None
-    way_m: float | None
+    obstructed_path_m: float | None
     obstacles: list[NaiveObstacle]
 
 
@@ -346,15 +346,17 @@ def _episode(
     for _ in range(REDRAWS):
         start, goal, clear = _ends(site, rng)
         node_paths = _node_paths(site, start, goal)
-        clear_steps = steps_between(site.grid, start, goal)
-        assert clear_steps is not None
-        episode = NaiveEpisode(mode, start, goal, clear_steps, clear, clear_steps, None, [])
+        shortest_path_steps = steps_between(site.grid, start, goal)
+        assert shortest_path_steps is not None
+        episode = NaiveEpisode(
+            mode, start, goal, shortest_path_steps, clear, shortest_path_steps, None, []
+        )
         if _spawn(site, episode, node_paths, pool, most, rng):
             shapes = [o.shape for o in episode.obstacles]
             path = site.sight.with_obstacles(grown(shapely.union_all(shapes))).path(
                 _metres(start), _metres(goal)
             )
-            episode.way_m = None if path is None else length(path)
+            episode.obstructed_path_m = None if path is None else length(path)
             return episode
     raise RuntimeError(f"{site.house.scene_id}: no episode in {REDRAWS} draws")
 
@@ -413,14 +415,17 @@ def _spawn(
             grid.add_edges_from(edges)
             continue
         episode.obstacles.append(obstacle)
-        episode.steps = steps
+        episode.obstructed_path_steps = steps
     return _done(episode)
 
 
 def _done(episode: NaiveEpisode) -> bool:
     if episode.mode == "blocked":
-        return episode.steps is None
-    return episode.steps is not None and episode.steps > episode.clear_steps
+        return episode.obstructed_path_steps is None
+    return (
+        episode.obstructed_path_steps is not None
+        and episode.obstructed_path_steps > episode.shortest_path_steps
+    )
 
 
 def _try(  # noqa: PLR0911 - every refusal is a return

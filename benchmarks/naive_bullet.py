@@ -66,7 +66,7 @@ def settle(
             bullet.GEOM_BOX, halfExtents=half, physicsClientId=CLIENT
         )
         _surface(bullet.createMultiBody(0, solid, visual, centre, physicsClientId=CLIENT), 1.0)
-    for thing in house.things:
+    for thing in house.objects:
         reach = math.hypot(*house.assets[thing.asset_id].size[:2]) / 2
         near_x = low_x - reach < thing.x < high_x + reach
         if near_x and low_y - reach < thing.y < high_y + reach:

@@ -25,8 +25,8 @@ DATA = {
 }
 """Both of 1-3 rooms and at most three obstacles."""
 DATA_BOTH = ("--rooms", "1-3", "--set", "episodes.max_obstacles=[3,3,3]")
-NEAR = ("--where", "clear_m<=6")
-"""Episodes to train and to measure on; clear_m is 2 m at least."""
+NEAR = ("--where", "shortest_path_m<=6")
+"""Episodes to train and to measure on; shortest_path_m is 2 m at least."""
 METHODS = {
     "ppo": ("--method", "ppo"),
     "ppo-intent": ("--method", "ppo-intent"),

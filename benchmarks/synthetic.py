@@ -27,8 +27,8 @@ from internav_data.records import (
     Part,
     Physics,
     Room,
+    SceneObject,
     Start,
-    Thing,
     Wall,
 )
 
@@ -130,7 +130,7 @@ def _house(scene: int, rng: np.random.Generator, assets: tuple[Asset, ...]) -> H
         doors=tuple(doors),
         windows=(),
         walls=walls,
-        things=things,
+        objects=things,
         materials=(Material("oak", (120, 90, 60), "planks"),),
         room_graph=tuple(sorted({d.rooms for d in doors})),
         area_m2=25.0 * count,
@@ -138,11 +138,11 @@ def _house(scene: int, rng: np.random.Generator, assets: tuple[Asset, ...]) -> H
     )
 
 
-def _thing(number: int, room: int, rng: np.random.Generator, asset: Asset) -> Thing:
+def _thing(number: int, room: int, rng: np.random.Generator, asset: Asset) -> SceneObject:
     x, y = _point(rng, 15, 2)
     half = math.radians(90 * int(rng.integers(4))) / 2
     turn = (0.0, 0.0, round(math.sin(half), 6), round(math.cos(half), 6))
-    return Thing(number, asset.asset_id, asset.type, room, x, y, 0.0, turn, -1, -1)
+    return SceneObject(number, asset.asset_id, asset.type, room, x, y, 0.0, turn, -1, -1)
 
 
 def _paths(house: House, a: int, b: int) -> list[tuple[int, ...]]:
@@ -198,18 +198,18 @@ def _episode(
         room_count=count,
         mode=mode,  # type: ignore[arg-type] # one of two words
         sealed=way is None,
-        rooms_on_way=len(paths[0]),
+        rooms_on_path=len(paths[0]),
         obstacle_count=len(obstacles),
-        clear_m=round(float(rng.uniform(2, 20)), 4),
-        clear_steps=clear,
-        way_m=way,
-        steps=None if mode == "blocked" else clear + int(rng.integers(1, 30)),
+        shortest_path_m=round(float(rng.uniform(2, 20)), 4),
+        shortest_path_steps=clear,
+        obstructed_path_m=way,
+        obstructed_path_steps=None if mode == "blocked" else clear + int(rng.integers(1, 30)),
         start=Start(i, j, i / 4, j / 4, 90 * int(rng.integers(4)), a),
         goal=Goal(k, l, k / 4, l / 4, b),
         room_paths=tuple(paths),
-        room_paths_cut=False,
+        room_paths_truncated=False,
         node_paths=tuple(node_paths),
-        node_paths_cut=False,
+        node_paths_truncated=False,
         obstacles=obstacles,
         expert=_expert(rng, index) if full else None,
         physics=Physics(

@@ -32,7 +32,7 @@ from internav_data.physics.push import PUSH_SPECS, _push_alone, _push_in
 from internav_data.physics.result_cache import FOLDER_VARIABLE, ResultCache
 from internav_data.physics.scene import UPRIGHT, Body, PhysicsScene
 from internav_data.records import Pose
-from internav_data.world import Action, Stage, World
+from internav_data.world import Action, HouseModel, World
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -73,7 +73,7 @@ def make_worlds(scenes: int, count: int) -> list[World]:
     pool, worlds = catalogue().spawnable, []
     for scene in range(scenes):
         house = build_house(0, scene, HouseConfig(), catalogue())
-        stage = Stage.of(house)
+        stage = HouseModel.of(house)
         worlds += [
             World.of_episode(stage, episode, catalogue().assets)
             for episode in build_episodes(house, count, pool)

@@ -40,8 +40,9 @@ def main() -> None:
     print(f"read {first}, then went on with {len(rest)} more")
 
     # As columns.
-    table = ds.to_table(["room_count", "obstacle_count", "clear_m"])
-    print(f"{table.num_rows} rows; mean clear_m {table['clear_m'].to_numpy().mean():.2f}")
+    table = ds.to_table(["room_count", "obstacle_count", "shortest_path_m"])
+    mean = table["shortest_path_m"].to_numpy().mean()
+    print(f"{table.num_rows} rows; mean shortest_path_m {mean:.2f}")
 
 
 if __name__ == "__main__":

@@ -21,8 +21,8 @@ from internav_data.records import (
     Part,
     Physics,
     Room,
+    SceneObject,
     Start,
-    Thing,
     Wall,
     Window,
 )
@@ -90,9 +90,9 @@ def rug() -> Asset:
     return asset("Rug_0", [flat], (2.0, 1.4, 0.01), blocks=False)
 
 
-def thing(number: int, asset_id: str, x: float, y: float, room: int) -> Thing:
+def thing(number: int, asset_id: str, x: float, y: float, room: int) -> SceneObject:
     kind = asset_id.rsplit("_", 1)[0]
-    return Thing(number, asset_id, kind, room, x, y, 0.0, UPRIGHT, -1, -1)
+    return SceneObject(number, asset_id, kind, room, x, y, 0.0, UPRIGHT, -1, -1)
 
 
 def walls() -> tuple[Wall, ...]:
@@ -149,7 +149,7 @@ def hand_house() -> House:
         ),
         windows=(Window(0, 0, 2.2, 4.0, 0.0, 1.4, 1.2, 0.9),),
         walls=walls(),
-        things=(
+        objects=(
             thing(0, "Rug_0", 1.6, 1.6, 0),
             thing(1, "DiningTable_0", 1.6, 1.6, 0),
             thing(2, "Chair_0", 1.6, 2.2, 0),
@@ -198,18 +198,18 @@ def hand_episode() -> Episode:
         room_count=2,
         mode="blocked",
         sealed=True,
-        rooms_on_way=2,
+        rooms_on_path=2,
         obstacle_count=2,
-        clear_m=5.1,
-        clear_steps=22,
-        way_m=None,
-        steps=None,
+        shortest_path_m=5.1,
+        shortest_path_steps=22,
+        obstructed_path_m=None,
+        obstructed_path_steps=None,
         start=Start(12, 4, 3.0, 1.0, 90, 0),
         goal=Goal(28, 4, 7.0, 1.0, 1),
         room_paths=((0, 1),),
-        room_paths_cut=False,
+        room_paths_truncated=False,
         node_paths=(NodePath((0,), ((3.0, 1.0), (5.0, 2.0), (7.0, 1.0))),),
-        node_paths_cut=False,
+        node_paths_truncated=False,
         obstacles=(
             obstacle("Chair_0", 5.0, 2.0, pickable=False),
             obstacle("Apple_0", 6.0, 1.5, pickable=True),

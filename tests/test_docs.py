@@ -101,9 +101,9 @@ def test_examples_run(example, small_dataset, small_run, tmp_path):
 def test_the_agent_that_ships_plays(small_dataset):
     from internav_data import load_dataset
     from internav_data.camp.policy import candidate
-    from internav_data.evaluation.evaluate import Settings, evaluate
+    from internav_data.evaluation.evaluate import EvaluationConfig, evaluate
 
-    dataset, settings = load_dataset(small_dataset), Settings(limit=2, max_steps=20)
+    dataset, settings = load_dataset(small_dataset), EvaluationConfig(limit=2, max_steps=20)
     shipped = ROOT / "examples" / "camp-small"
     found = candidate(str(shipped), dataset, settings, greedy=False, without_intent=False)
     assert (found.about.method, found.about.environment_steps) == ("camp", 60_416)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from internav_data.dataset import Dataset
     from internav_data.evaluation.archive import Evaluation
-    from internav_data.evaluation.evaluate import Settings
+    from internav_data.evaluation.evaluate import EvaluationConfig
     from internav_data.evaluation.statements import Methods
 
 _REPORT = "report.html"
@@ -203,11 +203,11 @@ def _dataset(given: dict[str, Any]) -> Dataset[Any]:
     return load_dataset(given["dataset"], split, filters or None)
 
 
-def _settings(given: dict[str, Any]) -> Settings:
-    from internav_data.evaluation.evaluate import Settings
+def _settings(given: dict[str, Any]) -> EvaluationConfig:
+    from internav_data.evaluation.evaluate import EvaluationConfig
 
     names = ("seed", "batch", "workers", "max_steps", "limit")
-    return Settings(**{name: given[name] for name in names})
+    return EvaluationConfig(**{name: given[name] for name in names})
 
 
 def _same_dataset(path: Path, evaluation: Evaluation) -> Dataset[Any]:

@@ -35,7 +35,7 @@ Examples:
   camp-train data/mine                                    CaMP from scratch, into runs/camp-0
   camp-train data/mine --init-from expert --steps 100000  clone the dataset's expert first
   camp-train data/mine --method ppo --seed 1 --out runs/ppo-1
-  camp-train data/mine --where "clear_m<=6" --set run.max_steps=200
+  camp-train data/mine --where "shortest_path_m<=6" --set run.max_steps=200
   camp-train data/mine --dry-run                          how long it would take
   camp-train data/mine --out runs/camp-0 --resume         go on after Ctrl-C
   camp-train --print-config > mine.toml                   all settings, to be changed
@@ -172,11 +172,11 @@ def _forecast(request: Request, *, as_json: bool) -> int:
 
 
 def _train(request: Request, given: dict[str, Any]) -> int:
-    from internav_data.camp.logging import Teller
+    from internav_data.camp.logging import ProgressReporter
     from internav_data.camp.run import begin, resume
     from internav_data.core.interrupts import Interrupts
 
-    teller = Teller(sys.stderr)
+    teller = ProgressReporter(sys.stderr)
     with Interrupts() as interrupts:
 
         def interrupted() -> int:

@@ -11,7 +11,7 @@ import click
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from internav_data.generation import GenerationConfig, Progress
+    from internav_data.generation import GenerationConfig, GenerationProgress
 
 F = TypeVar("F", bound="Callable[..., Any]")
 
@@ -87,11 +87,11 @@ def config_from(
     return config
 
 
-def progress() -> Progress:
+def progress() -> GenerationProgress:
     """Return a progress that tells on stderr."""
-    from internav_data.generation import Progress
+    from internav_data.generation import GenerationProgress
 
-    return Progress(sys.stderr)
+    return GenerationProgress(sys.stderr)
 
 
 def positive(_context: click.Context, parameter: click.Parameter, value: int | None) -> int | None:

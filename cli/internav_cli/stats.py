@@ -45,7 +45,8 @@ def command(*, dataset: Path, split: str | None, as_json: bool) -> int:
         f"pickable, {stats['obstacles_fixed']} fixed"
     )
     click.echo(
-        f"clear_m: {_spread(stats['clear_m'])}; clear_steps: {_spread(stats['clear_steps'])}"
+        f"shortest_path_m: {_spread(stats['shortest_path_m'])}; "
+        f"shortest_path_steps: {_spread(stats['shortest_path_steps'])}"
     )
     for line in interaction_lines(stats):
         click.echo(line)

@@ -310,7 +310,7 @@ user's own agent could draw from these.)"""
 
 
 @dataclass(slots=True)
-class Place:
+class TrainState:
     """Where a run is."""
 
     parts: list[str]

@@ -59,7 +59,7 @@ def bounds_of(config: Any, prefix: str = "") -> dict[str, tuple[float, float, fl
 
 
 Intent = Literal["integrated", "policy", "recursive", "none"]
-Preset = Literal["paper", "small"]
+TrainPreset = Literal["paper", "small"]
 INTERACTION_ACTIONS: Final = 11
 """After so many actions an interaction closes (the released code cuts after more than 10)."""
 
@@ -70,7 +70,7 @@ class NetworkConfig:
 
     image_size: int = 64
     """Pixels a side of what the agent sees."""
-    encoder: Preset = "small"
+    encoder: TrainPreset = "small"
     """"paper": one network for colour and one for depth, fused; "small": one network
     over all four channels."""
     hidden: int = 128
@@ -190,7 +190,7 @@ class DataConfig:
     """Which episodes of the dataset, and what they pay."""
 
     where: tuple[str, ...] = ()
-    """Conditions on columns that all hold, as in "clear_m<=6"; in training and validation."""
+    """Conditions on columns that all must hold, as "shortest_path_m<=6": training, validation."""
     failed_done_reward: float = 0.0
     """Of Done away from the goal (-1 in the released configuration)."""
     houses_kept: int = 512

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from internav_data.camp.policy import AgentPlayer
+from internav_data.camp.policy import AgentPolicy
 from internav_data.dataset import load_dataset
 from internav_data.dataset.select import condition
-from internav_data.evaluation.evaluate import Settings, evaluate
+from internav_data.evaluation.evaluate import EvaluationConfig, evaluate
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from internav_data.camp.agents import Agent
     from internav_data.camp.config import CampConfig
-    from internav_data.camp.stages import Stage
+    from internav_data.camp.stages import TrainingStage
     from internav_data.camp.tasks import Task
     from internav_data.dataset import Dataset
     from internav_data.records import Episode
@@ -33,7 +33,7 @@ class TrainingData:
     path
         A folder that `internav-gen generate` wrote.
     where
-        Conditions on columns, as in "clear_m<=6".
+        Conditions on columns, as in "shortest_path_m<=6".
 
     Raises
     ------
@@ -67,7 +67,7 @@ class TrainingData:
             raise UsageError(f"{self.path}: there are no {what}; {advice}")
         return found
 
-    def task(self, stage: Stage, config: CampConfig, own: range, *, ids: bool) -> Task:
+    def task(self, stage: TrainingStage, config: CampConfig, own: range, *, ids: bool) -> Task:
         """Return those environments of a stage whose numbers are in `own`."""
         if not stage.tasks:
             return self.main(config, len(own), ids=ids, single_room=stage.single_room)
@@ -91,8 +91,8 @@ class TrainingData:
         if not limit or not len(episodes):
             return None
         size, ids = config.network.image_size, agent.wants_ids
-        player = AgentPlayer(method, agent, size, greedy=False, ids=ids)
-        settings = Settings(
+        player = AgentPolicy(method, agent, size, greedy=False, ids=ids)
+        settings = EvaluationConfig(
             batch=min(config.ppo.environments, limit),
             workers=config.run.workers,
             max_steps=config.run.max_steps,

@@ -27,7 +27,7 @@ _PATIENCE_H = 6
 """Hours that ranks wait for each other: the first one alone validates."""
 
 
-class Ranks:
+class DistributedContext:
     """Where a process is among those that train together; alone unless `torchrun` started it.
 
     Parameters
@@ -104,21 +104,21 @@ class Ranks:
         return [item for text in texts for item in json.loads(text)]
 
 
-def ranks_of(device: torch.device) -> Ranks:
+def ranks_of(device: torch.device) -> DistributedContext:
     """Return this process among its ranks, and meet the others.
 
     `torchrun` says who it is by the environment variables RANK, WORLD_SIZE and LOCAL_RANK.
     """
     size = int(os.environ.get("WORLD_SIZE", "1"))
     if size == 1:
-        return Ranks(device)
+        return DistributedContext(device)
     if device.type == "cuda":
         device = torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0")))
         torch.cuda.set_device(device)
     if not distributed.is_initialized():
         backend = "nccl" if device.type == "cuda" else "gloo"
         distributed.init_process_group(backend, timeout=timedelta(hours=_PATIENCE_H))
-    return Ranks(device, distributed.get_rank(), size)
+    return DistributedContext(device, distributed.get_rank(), size)
 
 
 def device_of(name: str) -> torch.device:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from torch import Tensor
 
-    from internav_data.camp.distributed import Ranks
+    from internav_data.camp.distributed import DistributedContext
     from internav_data.camp.rollout import Rollout
 
     Row = dict[str, Any]
@@ -42,7 +42,7 @@ _SUCCESSES: Final = {
 """Shares of successes that are logged, and what is counted for each."""
 
 
-class Logbook:
+class MetricsLogger:
     """Appends rows; goes on after those that a checkpoint knew of.
 
     Parameters
@@ -112,7 +112,7 @@ def flat(row: Mapping[str, Any]) -> Iterable[tuple[str, float]]:
             yield name, float(value)
 
 
-class Window:
+class EpisodeWindow:
     """The last episodes that ended: what curves are made of.
 
     Parameters
@@ -133,7 +133,7 @@ class Window:
         for metrics in ended:
             self._episodes.append({name: float(value) for name, value in metrics.items()})
 
-    def noted(self, rollout: Rollout, own: range, ranks: Ranks) -> Row:
+    def noted(self, rollout: Rollout, own: range, ranks: DistributedContext) -> Row:
         """Take in the episodes that ended on all ranks; return what was decided on them.
 
         `own` are the numbers of this rank's environments.
@@ -240,7 +240,7 @@ def rates(steps: int, seconds: Sequence[float]) -> Row:
     }
 
 
-class Teller(Ticker):
+class ProgressReporter(Ticker):
     """Takes in the rows of a run's log and tells how far it is.
 
     Parameters

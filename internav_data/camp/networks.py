@@ -82,7 +82,7 @@ class Encoder(nn.Module):
         return torch.cat([features.view(*held.shape[:2], -1), goal, held, horizon], -1)
 
 
-class Policy(nn.Module):
+class RecurrentActorCritic(nn.Module):
     """A GRU, a linear actor and a linear critic.
 
     Parameters
@@ -113,7 +113,7 @@ class Policy(nn.Module):
 
 
 @dataclass(frozen=True)
-class Course:
+class EpisodeSegments:
     """Where episodes begin in a run of steps, and how GRUs go over it."""
 
     starts: Tensor
@@ -125,9 +125,9 @@ class Course:
         begun: list[int] = self.starts.any(1).nonzero().flatten().tolist()
         return sorted({0, *begun, len(self.starts)})
 
-    def of(self, columns: Tensor) -> Course:
+    def of(self, columns: Tensor) -> EpisodeSegments:
         """Return the course of some of the environments."""
-        return Course(self.starts[:, columns])
+        return EpisodeSegments(self.starts[:, columns])
 
     def run(self, gru: nn.GRU, inputs: Tensor, hidden: Tensor) -> tuple[Tensor, Tensor]:
         """Run a GRU in one call a chunk; zero it only where an episode begins.

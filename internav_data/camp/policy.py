@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.dataset import Dataset
-    from internav_data.evaluation.evaluate import Observations, Player, Settings
+    from internav_data.evaluation.evaluate import EvaluationConfig, Observations, Policy
     from internav_data.evaluation.policies import Note
     from internav_data.records import Episode
 
@@ -39,15 +39,15 @@ _NOTED: Final = {
 
 
 @dataclass(frozen=True, slots=True)
-class Candidate:
+class EvaluatedPolicy:
     """Somebody to evaluate, and what is known of them."""
 
-    player: Player
+    player: Policy
     about: About
 
 
-class AgentPlayer:
-    """A trained agent as a `Player`: torch is imported when it plays.
+class AgentPolicy:
+    """A trained agent as a `Policy`: torch is imported when it plays.
 
     Parameters
     ----------
@@ -81,18 +81,18 @@ class AgentPlayer:
         self._record: Mapping[str, Any] = {}
 
     def begin(self, count: int, seed: int) -> None:
-        """See `Player`."""
+        """See `Policy`."""
         self._agent.eval()
         self._seed, self._state = seed, self._agent.initial_state(count)
         self._starts, self._draws = np.ones(count, np.bool_), [None] * count
 
     def start(self, seat: int, episode: Episode) -> None:
-        """See `Player`."""
+        """See `Policy`."""
         self._starts[seat] = True
         self._draws[seat] = episode_generator(self._seed, episode)
 
     def act(self, observations: Observations) -> NDArray[np.int64]:
-        """See `Player`. Two numbers are drawn a step, used or not: for an option, an action."""
+        """See `Policy`. Two numbers are drawn a step, used or not: for an option, an action."""
         import torch  # noqa: PLC0415 - oracles do without
 
         device = next((p.device for p in self._agent.parameters()), torch.device("cpu"))
@@ -130,11 +130,11 @@ class AgentPlayer:
 def candidate(
     who: str,
     dataset: Dataset[Episode],
-    settings: Settings,
+    settings: EvaluationConfig,
     *,
     greedy: bool = False,
     without_intent: bool = False,
-) -> Candidate:
+) -> EvaluatedPolicy:
     """Return an oracle by its name, or the agent of a run's folder.
 
     Raises
@@ -147,7 +147,7 @@ def candidate(
         seed=settings.seed, max_steps=settings.max_steps, oracle=True,
     )  # fmt: skip
     if who in ORACLES:
-        return Candidate(oracle(who, dataset), about)
+        return EvaluatedPolicy(oracle(who, dataset), about)
     if not Path(who).exists():
         raise UsageError(
             f"{who}: neither a run's folder nor an oracle; expected what `camp-train` wrote, or "
@@ -161,7 +161,7 @@ def candidate(
         from internav_data.camp.agents import without_intent as cut  # noqa: PLC0415 - torch
 
         agent = cut(agent)
-    return Candidate(AgentPlayer(about.name, agent, size, greedy=greedy, ids=ids), about)
+    return EvaluatedPolicy(AgentPolicy(about.name, agent, size, greedy=greedy, ids=ids), about)
 
 
 def oracles_beside(dataset: Dataset[Episode]) -> list[str]:

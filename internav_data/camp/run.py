@@ -11,7 +11,7 @@ import torch
 
 from internav_data.camp.agents import agent_names, make_agent
 from internav_data.camp.agents.hierarchy import Hierarchy
-from internav_data.camp.checkpoint import Place, has_checkpoint, read
+from internav_data.camp.checkpoint import TrainState, has_checkpoint, read
 from internav_data.camp.cloning import forecast_cloning
 from internav_data.camp.config import CampConfig, plain
 from internav_data.camp.data import TrainingData
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from internav_data.camp.checkpoint import Checkpoint
-    from internav_data.camp.stages import Stage
+    from internav_data.camp.stages import TrainingStage
     from internav_data.camp.train import Tell
 
 CONFIG: Final = "config.toml"
@@ -173,8 +173,8 @@ def _prepared(
     tell: Tell | None,
     interrupted: Callable[[], int],
     since: Checkpoint | None = None,
-    place: Place | None = None,
-) -> tuple[Trainer, list[Stage]]:
+    place: TrainState | None = None,
+) -> tuple[Trainer, list[TrainingStage]]:
     config = request.config
     torch.set_num_threads(config.run.threads)
     # Nothing here draws from torch's own generator, but a user's agent may.
@@ -197,7 +197,7 @@ def _prepared(
         )
     for single in {stage.single_room for stage in stages}:
         data.episodes(single_room=single)
-    place = place or Place(list(request.parts), request.clones)
+    place = place or TrainState(list(request.parts), request.clones)
     trainer = Trainer(
         request.out, data, request.method, config, ranks_of(device_of(request.device)), place,
         since=since, tell=tell, interrupted=interrupted,
@@ -205,7 +205,7 @@ def _prepared(
     return trainer, stages
 
 
-def _place(since: Checkpoint) -> Place:
+def _place(since: Checkpoint) -> TrainState:
     """Return where a run was.
 
     Raises
@@ -213,7 +213,7 @@ def _place(since: Checkpoint) -> Place:
     CorruptDataError
         The checkpoint does not say.
     """
-    blank = dataclasses.asdict(Place([], clones=False))
+    blank = dataclasses.asdict(TrainState([], clones=False))
     said: dict[str, Any] = {name: since.progress.get(name) for name in blank}
     for name, value in blank.items():
         kinds = (int, float) if isinstance(value, float) else type(value)
@@ -225,7 +225,7 @@ def _place(since: Checkpoint) -> Place:
         raise CorruptDataError(f"checkpoint: progress: log, critics: expected counts, got {counts}")
     if not isinstance(window, list) or not all(isinstance(each, dict) for each in window):
         raise CorruptDataError("checkpoint: progress: window: expected a list of episodes")
-    place = Place(**said)
+    place = TrainState(**said)
     if place.parts:
         try:
             check_parts([str(part) for part in place.parts])
@@ -234,7 +234,9 @@ def _place(since: Checkpoint) -> Place:
     return place
 
 
-def _check_part(out: Path, place: Place, trainer: Trainer, stages: Sequence[Stage]) -> None:
+def _check_part(
+    out: Path, place: TrainState, trainer: Trainer, stages: Sequence[TrainingStage]
+) -> None:
     """Refuse to leave a stage unfinished."""
     known = plan(trainer.config, PARTS, hierarchical=isinstance(trainer.agent, Hierarchy))
     unfinished = {stage.name for stage in known if place.done < stage.updates}

@@ -24,7 +24,7 @@ _NUMBERS: Final = ("cloning", *PARTS, *(f"auxiliary-{name}" for name in TASKS.va
 
 
 @dataclass(frozen=True, slots=True)
-class Stage:
+class TrainingStage:
     """A run of updates with an optimiser of its own."""
 
     name: str
@@ -45,7 +45,7 @@ class Stage:
     """… and when it ends."""
 
 
-def plan(config: CampConfig, parts: Sequence[str], *, hierarchical: bool) -> list[Stage]:
+def plan(config: CampConfig, parts: Sequence[str], *, hierarchical: bool) -> list[TrainingStage]:
     """Return the stages of a run.
 
     Every method gets the same environment steps: flat ones spend those of the auxiliary tasks on
@@ -120,7 +120,7 @@ def _stage(
     over: tuple[float, float],
     *,
     hierarchical: bool,
-) -> Stage:
+) -> TrainingStage:
     auxiliary = part == "auxiliary" and hierarchical
     count, given = config.ppo.environments, config.stages
     tasks: tuple[int, ...] = ()
@@ -129,6 +129,6 @@ def _stage(
         tasks = side_by_side if task < 0 else (task,) * count
     name = f"{part}-{TASKS[task]}" if task >= 0 else part
     rate = given.joint_learning_rate if hierarchical and not auxiliary else given.learning_rate
-    return Stage(
+    return TrainingStage(
         name, part, tasks, part != "all", rate, updates, name if auxiliary else "main", *over
     )

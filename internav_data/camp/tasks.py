@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from internav_data.dataset import Dataset
 from internav_data.envs.make import make_vector
-from internav_data.envs.slot import EnvState
+from internav_data.envs.slot import EpisodeSnapshot
 from internav_data.records import Episode
 from internav_data.records.errors import CorruptDataError
 
@@ -139,7 +139,7 @@ class Timed:
         return found
 
 
-def env_state(said: Mapping[str, Any]) -> EnvState:
+def env_state(said: Mapping[str, Any]) -> EpisodeSnapshot:
     """Return what an environment is, from a checkpoint.
 
     Raises
@@ -152,6 +152,6 @@ def env_state(said: Mapping[str, Any]) -> EnvState:
         start = said["start"]
         where = None if start is None else (int(start[0]), int(start[1]), int(start[2]))
         seed, position = int(said["seed"]), int(said["position"])
-        return EnvState(str(said["episode_id"]), actions, seed, position, where)
+        return EpisodeSnapshot(str(said["episode_id"]), actions, seed, position, where)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
         raise CorruptDataError(f"environments: {error!r}: no state of an environment") from error

@@ -24,7 +24,7 @@ from internav_data.camp.checkpoint import (
 )
 from internav_data.camp.cloning import CLONING, clone_expert
 from internav_data.camp.collect import Collector, orders_of, uniforms_of
-from internav_data.camp.logging import Logbook, Window, rates
+from internav_data.camp.logging import EpisodeWindow, MetricsLogger, rates
 from internav_data.camp.stages import order_seed
 from internav_data.camp.tasks import Timed
 from internav_data.core.interrupts import InterruptedRunError
@@ -37,12 +37,12 @@ if TYPE_CHECKING:
     from torch.optim import Optimizer
 
     from internav_data.camp.agents import Agent, State
-    from internav_data.camp.checkpoint import Place
+    from internav_data.camp.checkpoint import TrainState
     from internav_data.camp.config import CampConfig
     from internav_data.camp.data import TrainingData
-    from internav_data.camp.distributed import Ranks
+    from internav_data.camp.distributed import DistributedContext
     from internav_data.camp.logging import Row
-    from internav_data.camp.stages import Stage
+    from internav_data.camp.stages import TrainingStage
     from internav_data.camp.tasks import Task
 
     Tell = Callable[[Row], object]
@@ -54,7 +54,7 @@ INTERRUPTED: Final = "saved; go on with --resume"
 class Running:
     """A stage under way."""
 
-    stage: Stage
+    stage: TrainingStage
     learner: Agent
     optimiser: Optimizer
     collector: Collector
@@ -90,8 +90,8 @@ class Trainer:
         data: TrainingData,
         method: str,
         config: CampConfig,
-        ranks: Ranks,
-        place: Place,
+        ranks: DistributedContext,
+        place: TrainState,
         *,
         since: Checkpoint | None = None,
         tell: Tell | None = None,
@@ -111,12 +111,12 @@ class Trainer:
         if since:
             self.agent.load_state_dict(dict(since.weights))
         self.agent.to(ranks.device)
-        self._window = Window(config.run.window, said.get("window", ()))
+        self._window = EpisodeWindow(config.run.window, said.get("window", ()))
         self._began = time.perf_counter()
         self._updates = 0
-        self.log: Logbook | None = None
+        self.log: MetricsLogger | None = None
 
-    def fit(self, stages: list[Stage]) -> None:
+    def fit(self, stages: list[TrainingStage]) -> None:
         """Train to the end of the last stage.
 
         Raises
@@ -130,7 +130,7 @@ class Trainer:
         position, board = int(said.get("log", 0)), config.run.tensorboard
         with ExitStack() as kept:
             if self.ranks.first:
-                book = Logbook(self.run, position, board=board)
+                book = MetricsLogger(self.run, position, board=board)
                 self.log = kept.enter_context(book)
             self._began = time.perf_counter()
             if place.clones and place.stage in {"", CLONING}:
@@ -142,11 +142,11 @@ class Trainer:
             for stage in stages[first:]:
                 if stage.name != place.stage:
                     place.stage, place.done, self.since = stage.name, 0, None
-                    self._window = Window(config.run.window)
+                    self._window = EpisodeWindow(config.run.window)
                 if place.done < stage.updates:
                     self._learn(stage)
 
-    def open(self, stage: Stage) -> Running:
+    def open(self, stage: TrainingStage) -> Running:
         """Make a stage's environments and optimiser, as they were in the checkpoint if there is
         one."""  # noqa: D205, D209 - one sentence
         own = self.own
@@ -219,7 +219,7 @@ class Trainer:
         self.write({**row, "validation": found})
         return found["success"]
 
-    def _learn(self, stage: Stage) -> None:
+    def _learn(self, stage: TrainingStage) -> None:
         now, place, every = self.open(stage), self.place, self.config.run
         try:
             if not place.updates:

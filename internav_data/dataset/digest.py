@@ -1,6 +1,6 @@
 """The logical digest: what a table says, whatever its row groups, encodings and pyarrow version.
 
-Definition, format version 1. sha256 over the leaf columns in schema order. A leaf column is
+Definition, since format version 1. sha256 over the leaf columns in schema order. A leaf column is
 
     text(path)  text(type)  u64(rows)  level …  level
 

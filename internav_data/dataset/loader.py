@@ -201,7 +201,7 @@ class Dataset(Generic[E]):
         """Every asset of the dataset by its id."""
         (file,) = self.manifest.of("assets")
         with open_file(self.path, file, ASSETS) as opened:
-            table = read_all(self.path / file.path, opened)
+            table = read_all(self.path / file.path, opened, ASSETS)
         return {asset.asset_id: asset for asset in from_table(table, ASSETS)}
 
     @functools.cached_property

@@ -12,18 +12,21 @@ import json
 from collections.abc import Mapping  # noqa: TC003 - read at run time for the JSON Schema
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from internav_data.core.files import write_atomically
 from internav_data.dataset.parquet import footer_sha256, open_parquet
-from internav_data.dataset.tables import FORMAT_VERSION
+from internav_data.dataset.tables import FORMAT_VERSION, TABLES
 from internav_data.records import Split  # noqa: TC001 - as above
 from internav_data.records.errors import CorruptDataError
 
 if TYPE_CHECKING:
     import pyarrow.parquet as pq
+    from _typeshed import DataclassInstance
 
     from internav_data.dataset.tables import TableSpec
+
+D = TypeVar("D", bound="DataclassInstance")
 
 MANIFEST = "manifest.json"
 _MAX_BYTES = 64 << 20
@@ -91,6 +94,8 @@ class Manifest:
     """How often something was drawn again while generating, by reason."""
     quarantined: tuple[Quarantined, ...]
     files: tuple[DataFile, ...]
+    requires: tuple[str, ...] = ()
+    """Keys and columns that a reader must know; any other that it does not know, it ignores."""
 
     def of(self, table: str, split: str | None = None) -> tuple[DataFile, ...]:
         """Return the files of one table (of one split, if given) in order."""
@@ -119,7 +124,7 @@ def read_manifest(root: Path) -> Manifest:
     Raises
     ------
     CorruptDataError
-        Missing, damaged, of a newer format, or naming files outside the dataset.
+        Missing, damaged, of another format, or naming files outside the dataset.
 
     """
     path = root / MANIFEST
@@ -160,6 +165,12 @@ def _check_version(path: Path, raw: Any) -> None:  # noqa: ANN401 - JSON
         raise CorruptDataError(
             f"{path}: format_version: expected a number, got {version!r}: {_AGAIN}"
         )
+    if version < FORMAT_VERSION:
+        raise CorruptDataError(
+            f"{path}: written in format version {version}, whose columns have other names; this "
+            f"release reads version {FORMAT_VERSION}: generate the dataset anew, with the same "
+            "seed and config"
+        )
     if version > FORMAT_VERSION:
         raise CorruptDataError(
             f"{path}: written in format version {version}, this release reads up to "
@@ -169,17 +180,35 @@ def _check_version(path: Path, raw: Any) -> None:  # noqa: ANN401 - JSON
 
 def _parse(path: Path, raw: dict[str, Any]) -> Manifest:
     try:
-        expected = {f.name for f in dataclasses.fields(Manifest)}
-        if raw.keys() != expected:
-            difference = sorted(raw.keys() ^ expected)
-            raise ValueError(f"missing or unknown keys {difference}")  # noqa: TRY301
         values = dict(raw)
-        values["counts"] = {str(k): Counts(**v) for k, v in raw["counts"].items()}
-        values["quarantined"] = tuple(Quarantined(**q) for q in raw["quarantined"])
-        values["files"] = tuple(DataFile(**f) for f in raw["files"])
-        return Manifest(**values)
+        values["counts"] = {str(k): _made(Counts, v) for k, v in raw["counts"].items()}
+        values["quarantined"] = tuple(_made(Quarantined, q) for q in raw["quarantined"])
+        values["files"] = tuple(_made(DataFile, f) for f in raw["files"])
+        values["requires"] = tuple(map(str, raw.get("requires", ())))
+        manifest = _made(Manifest, values)
     except (TypeError, ValueError, AttributeError, KeyError) as error:
         raise CorruptDataError(f"{path}: not a manifest ({error}): {_AGAIN}") from error
+    unknown = sorted(set(manifest.requires) - known_features())
+    if unknown:
+        raise CorruptDataError(
+            f"{path}: this release does not know {', '.join(unknown)}, which the dataset requires: "
+            "upgrade with `pip install --upgrade internav-data`"
+        )
+    return manifest
+
+
+def _made(cls: type[D], raw: Mapping[str, Any]) -> D:
+    """Return a dataclass of a JSON object's keys; those that it has no field for are ignored."""
+    names = {f.name for f in dataclasses.fields(cls)}
+    return cls(**{key: value for key, value in raw.items() if key in names})
+
+
+def known_features() -> frozenset[str]:
+    """Return all that `requires` may name: manifest keys, and columns as `table.column`."""
+    keys = {f.name for f in dataclasses.fields(Manifest)}
+    return frozenset(
+        keys | {f"{spec.name}.{name}" for spec in TABLES for name in spec.schema.names}
+    )
 
 
 def _check_file(root: Path, file: DataFile) -> None:

@@ -28,7 +28,9 @@ WIDTHS: dict[str, str] = {
     "actions": "int8",
     "index": "int32",
     "scene": "int32",
-    "clear_steps": "int32",
+    "shortest_path_steps": "int32",
+    "obstructed_path_steps": "int32",
+    "path_steps_after": "int32",
     "steps": "int32",
     "group": "int16",
 }

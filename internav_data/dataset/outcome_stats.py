@@ -38,9 +38,9 @@ class ExpertRow:
     """Mean of those with an expert, as the next."""
     picks: float
     spl: float
-    """Mean over all episodes of clear_m / max(path_m, clear_m), 0 without an expert."""
+    """Mean of shortest_path_m / max(path_m, shortest_path_m) over episodes; 0 without expert."""
     sts: float
-    """Mean over all episodes of clear_m / 0.25 m / steps, 0 without an expert."""
+    """Mean over all episodes of shortest_path_m / 0.25 m / steps, 0 without an expert."""
     refused: int
     """Draws of the whole dataset, all splits, that were thrown away since no expert was found."""
     refused_share: float
@@ -110,7 +110,7 @@ def expert_row(table: pa.Table, manifest: Manifest) -> ExpertRow:
     Parameters
     ----------
     table
-        With `clear_m` and, of `expert`, the `EXPERT_COLUMNS`.
+        With `shortest_path_m` and, of `expert`, the `EXPERT_COLUMNS`.
     manifest
         Of the whole dataset.
 
@@ -121,15 +121,17 @@ def expert_row(table: pa.Table, manifest: Manifest) -> ExpertRow:
         pc.struct_field(expert, name).drop_null().to_numpy()
         for name in ("steps", "pushes", "picks", "path_m")
     )
-    clear_m = table.column("clear_m").to_numpy()[solved]
+    shortest_path_m = table.column("shortest_path_m").to_numpy()[solved]
     return ExpertRow(
         solved=int(solved.sum()),
         solved_share=mean(solved),
         steps=spread(steps),
         pushes=mean(pushes),
         picks=mean(picks),
-        spl=share(float((clear_m / np.maximum(path_m, clear_m)).sum()), len(solved)),
-        sts=share(float((clear_m / _STEP_M / steps).sum()), len(solved)),
+        spl=share(
+            float((shortest_path_m / np.maximum(path_m, shortest_path_m)).sum()), len(solved)
+        ),
+        sts=share(float((shortest_path_m / _STEP_M / steps).sum()), len(solved)),
         refused=manifest.redraws.get(REFUSED, 0),
         refused_share=refused_share(manifest),
     )

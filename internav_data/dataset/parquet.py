@@ -12,7 +12,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from internav_data.core.files import file_sha256, write_with
-from internav_data.dataset.decode import one_array, schema_difference
+from internav_data.dataset.compatibility import conformed, problems
+from internav_data.dataset.decode import one_array
 from internav_data.dataset.digest import logical_digest
 from internav_data.dataset.encode import to_table
 from internav_data.records.errors import CorruptDataError
@@ -148,18 +149,21 @@ def open_parquet(path: Path, spec: TableSpec[Any]) -> pq.ParquetFile:
         raise CorruptDataError(f"{path}: the file is missing: {MENDING}") from None
     except Exception as error:
         raise damaged(path, error) from error
-    if not schema.equals(spec.schema):
-        difference = schema_difference(schema, spec.schema)
+    if not schema.equals(spec.schema) and (found := problems(schema, spec.schema)):
         raise CorruptDataError(
-            f"{path}: the columns are not those of {spec.name}: {difference}: {MENDING}"
+            f"{path}: the columns are not those of {spec.name}: {', '.join(found[:3])}: {MENDING}"
         )
     return file
 
 
 def read_group(
-    path: Path, file: pq.ParquetFile, group: int, columns: Sequence[str] | None = None
+    path: Path,
+    file: pq.ParquetFile,
+    group: int,
+    spec: TableSpec[Any],
+    columns: Sequence[str] | None = None,
 ) -> pa.Table:
-    """Return one row group, its page checksums verified.
+    """Return one row group as columns of the spec, its page checksums verified.
 
     Raises
     ------
@@ -168,8 +172,10 @@ def read_group(
 
     """
     try:
-        names = None if columns is None else list(columns)
-        return file.read_row_group(group, columns=names, use_threads=False)
+        if file.schema_arrow.equals(spec.schema):
+            names = None if columns is None else list(columns)
+            return file.read_row_group(group, columns=names, use_threads=False)
+        return conformed(file.read_row_group(group, use_threads=False), spec.schema, columns)
     except Exception as error:
         raise damaged(path, error) from error
 
@@ -184,11 +190,13 @@ def read_table(path: Path, spec: TableSpec[Any], columns: Sequence[str] | None =
 
     """
     with open_parquet(path, spec) as file:
-        return read_all(path, file, columns)
+        return read_all(path, file, spec, columns)
 
 
-def read_all(path: Path, file: pq.ParquetFile, columns: Sequence[str] | None = None) -> pa.Table:
-    """Return the table in an open file.
+def read_all(
+    path: Path, file: pq.ParquetFile, spec: TableSpec[Any], columns: Sequence[str] | None = None
+) -> pa.Table:
+    """Return the table in an open file as columns of the spec.
 
     Raises
     ------
@@ -197,10 +205,31 @@ def read_all(path: Path, file: pq.ParquetFile, columns: Sequence[str] | None = N
 
     """
     try:
-        table = file.read(columns=None if columns is None else list(columns))
+        if file.schema_arrow.equals(spec.schema):
+            table = file.read(columns=None if columns is None else list(columns))
+        else:
+            table = conformed(file.read(), spec.schema, columns)
         table.validate(full=True)
     except Exception as error:
         raise damaged(path, error) from error
+    return table
+
+
+def read_as_written(path: Path, spec: TableSpec[Any]) -> pa.Table:
+    """Return the table in a file with every column that it holds, known to this release or not.
+
+    Raises
+    ------
+    CorruptDataError
+        Missing, damaged or of other columns.
+
+    """
+    with open_parquet(path, spec) as file:
+        try:
+            table = file.read()
+            table.validate(full=True)
+        except Exception as error:
+            raise damaged(path, error) from error
     return table
 
 

@@ -107,7 +107,7 @@ class RowGroupCache:
 
     def _read(self, number: int, group: int) -> tuple[int, Reader]:
         path = self._root / self._files[number].path
-        table = read_group(path, self.file(number), group, self._columns)
+        table = read_group(path, self.file(number), group, self._spec, self._columns)
         if self._columns is not None:
             return table.nbytes, ColumnReader(table.select(list(self._columns)), self._spec)
         extra = self._extra() if self._extra else None

@@ -81,7 +81,7 @@ def read_columns(
     tables = []
     for file in files:
         with open_file(root, file, spec) as opened:
-            tables.append(read_all(root / file.path, opened, names))
+            tables.append(read_all(root / file.path, opened, spec, names))
     schema = pa.schema([spec.schema.field(name) for name in names])
     return pa.concat_tables(
         [schema.empty_table(), *(table.select(list(names)) for table in tables)]

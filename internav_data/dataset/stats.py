@@ -32,8 +32,14 @@ if TYPE_CHECKING:
 
 _STEP_M = 0.25  # of the lattice: the distance of Table 2 counts its steps
 _SCALARS = (
-    *("scene_id", "split", "room_count", "mode", "sealed", "rooms_on_way"),
-    *("obstacle_count", "clear_m", "clear_steps", "way_m", "steps"),
+    *("scene_id", "split", "room_count", "mode", "sealed", "rooms_on_path"),
+    *(
+        "obstacle_count",
+        "shortest_path_m",
+        "shortest_path_steps",
+        "obstructed_path_m",
+        "obstructed_path_steps",
+    ),
 )
 _OBSTACLES = tuple(f"obstacles.list.element.{n}" for n in ("type", "pushable", "pickable"))
 
@@ -60,7 +66,7 @@ class RoomsRow:
     obstacle_num: float
     """Mean number of spawned obstacles."""
     distance_m: float
-    """Mean of 0.25 m x clear_steps."""
+    """Mean of 0.25 m x shortest_path_steps."""
     cross_room_num: float
     """Mean number of rooms on the shortest room path."""
     blocked: int
@@ -90,10 +96,10 @@ class Stats:
     obstacles_pushable: int
     obstacles_pickable: int
     obstacles_fixed: int
-    clear_m: Spread
-    clear_steps: Spread
+    shortest_path_m: Spread
+    shortest_path_steps: Spread
     detour_steps: Spread
-    """Further steps of lengthened episodes: steps - clear_steps."""
+    """Further steps of lengthened episodes: steps - shortest_path_steps."""
     expert: ExpertRow
     outcomes: tuple[OutcomeRow, ...]
     openable_share_of_blocked: float
@@ -139,7 +145,7 @@ def stats_of(root: Path, manifest: Manifest, split: str | None = None) -> Stats:
     tables, kinds, outcomes = [_no_rows()], [_no_obstacles()], OutcomeCounts()
     for file in manifest.of("episodes", split):
         with open_file(root, file, EPISODES) as opened:
-            table = read_all(root / file.path, opened, names)
+            table = read_all(root / file.path, opened, EPISODES, names)
         tables.append(_flat_rows(table))
         for chunk in table.column("obstacles").chunks:
             kinds.append(_flat_obstacles(chunk))
@@ -181,7 +187,9 @@ def _stats(
     rooms = table.column("room_count").to_numpy()
     blocked = pc.equal(table.column("mode"), "blocked").to_numpy()
     sealed = table.column("sealed").to_numpy()
-    detours = pc.subtract(table.column("steps"), table.column("clear_steps"))
+    detours = pc.subtract(
+        table.column("obstructed_path_steps"), table.column("shortest_path_steps")
+    )
     longer = detours.filter(pc.equal(table.column("mode"), "lengthened")).drop_null()
     push, pick = (kinds.column(name).to_numpy().astype(bool) for name in ("pushable", "pickable"))
     held = {k: v for k, v in manifest.counts.items() if split in (None, k)}
@@ -199,8 +207,8 @@ def _stats(
         obstacles_pushable=int(push.sum()),
         obstacles_pickable=int(pick.sum()),
         obstacles_fixed=int((~(push | pick)).sum()),
-        clear_m=spread(table.column("clear_m").to_numpy()),
-        clear_steps=spread(table.column("clear_steps").to_numpy()),
+        shortest_path_m=spread(table.column("shortest_path_m").to_numpy()),
+        shortest_path_steps=spread(table.column("shortest_path_steps").to_numpy()),
         detour_steps=spread(longer.to_numpy()),
         expert=expert_row(table, manifest),
         outcomes=outcomes.rows(),
@@ -225,8 +233,8 @@ def _rooms_row(
         episodes=part.num_rows,
         ratio=mean(chosen),
         obstacle_num=mean(part.column("obstacle_count").to_numpy()),
-        distance_m=mean(_STEP_M * part.column("clear_steps").to_numpy()),
-        cross_room_num=mean(part.column("rooms_on_way").to_numpy()),
+        distance_m=mean(_STEP_M * part.column("shortest_path_steps").to_numpy()),
+        cross_room_num=mean(part.column("rooms_on_path").to_numpy()),
         blocked=int((chosen & blocked).sum()),
         sealed=int((chosen & sealed).sum()),
         paper=PAPER[span],

@@ -27,8 +27,11 @@ _LEAVES: dict[str, pa.DataType] = {
     "int64": pa.int64(),
 }
 
-FORMAT_VERSION = 1
-"""Raised whenever a reader of the version before would misunderstand what is written."""
+FORMAT_VERSION = 2
+"""Raised whenever a reader of the version before would misunderstand what is written.
+
+From version 2 on columns and manifest keys are only added, nullable or with a default.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,8 +87,14 @@ EPISODES: TableSpec[Episode] = TableSpec(
     "episodes",
     Episode,
     (
-        *("episode_id", "scene_id", "index", "room_count", "mode", "sealed", "rooms_on_way"),
-        *("obstacle_count", "clear_m", "clear_steps", "way_m", "steps"),
+        *("episode_id", "scene_id", "index", "room_count", "mode", "sealed", "rooms_on_path"),
+        *(
+            "obstacle_count",
+            "shortest_path_m",
+            "shortest_path_steps",
+            "obstructed_path_m",
+            "obstructed_path_steps",
+        ),
     ),
 )
 SCENES: TableSpec[House] = TableSpec("scenes", House, ("scene_id", "scene", "area_m2"))

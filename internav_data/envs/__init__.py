@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from internav_data.envs.auxiliary import AuxiliaryStart, auxiliary_starts
     from internav_data.envs.processes import InterNavProcesses
     from internav_data.envs.single import InterNavEnv
-    from internav_data.envs.slot import EnvState
+    from internav_data.envs.slot import EpisodeSnapshot
     from internav_data.envs.vector import InterNavVectorEnv
 
 __all__ = [
     "AuxiliaryStart",
-    "EnvState",
+    "EpisodeSnapshot",
     "InterNavEnv",
     "InterNavProcesses",
     "InterNavVectorEnv",
@@ -31,7 +31,7 @@ ENV_ID = "InterNav-v0"
 
 _HOMES = {
     "AuxiliaryStart": "auxiliary",
-    "EnvState": "slot",
+    "EpisodeSnapshot": "slot",
     "InterNavEnv": "single",
     "InterNavProcesses": "processes",
     "InterNavVectorEnv": "vector",

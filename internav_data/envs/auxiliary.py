@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 import numpy as np
 
 from internav_data.navigation import SPACING_M
-from internav_data.world import Stage, World
+from internav_data.world import HouseModel, World
 from internav_data.world.visibility import REACH_M
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ class AuxiliaryStart(NamedTuple):
 
 
 def auxiliary_starts(
-    stage: Stage, episode: Episode, assets: Mapping[str, Asset], kind: Kind
+    stage: HouseModel, episode: Episode, assets: Mapping[str, Asset], kind: Kind
 ) -> tuple[AuxiliaryStart, ...]:
     """Return all starts of an episode: obstacle after obstacle, the nearest to its node first.
 
@@ -68,7 +68,7 @@ def auxiliary_starts(
 
 
 def world_at(
-    stage: Stage, episode: Episode, assets: Mapping[str, Asset], start: AuxiliaryStart
+    stage: HouseModel, episode: Episode, assets: Mapping[str, Asset], start: AuxiliaryStart
 ) -> World:
     """Return the world of an episode with its agent at an auxiliary start."""
     world = World.of_episode(stage, episode, assets)

@@ -18,13 +18,13 @@ from internav_data.envs.tasks import (
 from internav_data.geometry.headings import HEADINGS
 from internav_data.navigation import SPACING_M
 from internav_data.records.errors import UsageError
-from internav_data.render.camera import View
+from internav_data.render.camera import CameraView
 from internav_data.world import ACTION_COUNT, Action, World
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from internav_data.envs.source import Place
+    from internav_data.envs.source import LoadedHouse
     from internav_data.navigation import Lattice
     from internav_data.physics import PushModel
     from internav_data.records import Asset, Episode
@@ -46,7 +46,7 @@ _SEEN: Final = frozenset(
 
 
 @dataclass(frozen=True, slots=True)
-class Rules:
+class TaskConfig:
     """What a user can set about the task."""
 
     max_steps: int = 500
@@ -67,7 +67,7 @@ class Rules:
             raise UsageError(f"push_model: expected 'force' or 'kick', got {self.push_model!r}")
 
 
-class Step(NamedTuple):
+class TaskStep(NamedTuple):
     """What a step gave."""
 
     reward: float
@@ -75,7 +75,7 @@ class Step(NamedTuple):
     truncated: bool
 
 
-class Play:
+class EpisodeRun:
     """An episode from its start; a function of the episode and the actions so far.
 
     Attributes
@@ -91,16 +91,29 @@ class Play:
     """
 
     __slots__ = (
-        "_clear", "_length_m", "_rules", "actions", "clear_m", "episode", "last", "over",
-        "place", "props", "stale", "start", "success", "tally", "world",
+        "_clear",
+        "_length_m",
+        "_rules",
+        "actions",
+        "episode",
+        "last",
+        "over",
+        "place",
+        "props",
+        "shortest_path_m",
+        "stale",
+        "start",
+        "success",
+        "tally",
+        "world",
     )  # fmt: skip
 
     def __init__(
         self,
         episode: Episode,
-        place: Place,
+        place: LoadedHouse,
         assets: Mapping[str, Asset],
-        rules: Rules,
+        rules: TaskConfig,
         start: Sequence[int] | None = None,
     ) -> None:
         self.episode, self.place, self._rules = episode, place, rules
@@ -109,8 +122,8 @@ class Play:
             self._stand(start)
         self.props = place.scenery.props((assets[o.asset_id], o.pose) for o in episode.obstacles)
         self._clear = place.field_to((episode.goal.i, episode.goal.j))
-        self.clear_m = self._clear.at(self.world.i, self.world.j)
-        self._length_m = episode.clear_m if start is None else self.clear_m
+        self.shortest_path_m = self._clear.at(self.world.i, self.world.j)
+        self._length_m = episode.shortest_path_m if start is None else self.shortest_path_m
         self.start = None if start is None else (start[0], start[1], start[2] % 4)
         self.actions: list[int] = []
         self.tally = EpisodeStatistics()
@@ -118,7 +131,7 @@ class Play:
         self.stale = True
         self.last: StepResult | None = None
 
-    def step(self, action: int) -> Step:
+    def step(self, action: int) -> TaskStep:
         """Act, and pay for it.
 
         Raises
@@ -150,7 +163,7 @@ class Play:
         truncated = not terminated and len(self.actions) >= self._rules.max_steps
         self.over = terminated or truncated
         self.tally.reward += reward
-        return Step(reward, terminated, truncated)
+        return TaskStep(reward, terminated, truncated)
 
     def _stand(self, start: Sequence[int]) -> None:
         """Put the agent elsewhere: on a free node."""
@@ -173,7 +186,7 @@ class Play:
             # Furniture was moved and let the agent into what is cut off else: the last distance
             # stands, so that rewards still add up to start minus end on every loop.
             return 0.0
-        before, self.clear_m = self.clear_m, after
+        before, self.shortest_path_m = self.shortest_path_m, after
         return move_reward(before, after)
 
     def _interacted(self, action: Action, result: StepResult, lattice: Lattice) -> float:
@@ -205,23 +218,25 @@ class Play:
         home = self.place.instances
         if item < len(home):
             return home[item]
-        return len(self.place.stage.house.things) + item - len(home)
+        return len(self.place.stage.house.objects) + item - len(home)
 
     def metrics(self) -> dict[str, float | int | bool]:
         """Metrics as of now; meant for the end."""
         return metrics(
             self.tally,
             success=self.success,
-            clear_m=self._length_m,
+            shortest_path_m=self._length_m,
             steps=len(self.actions),
-            distance_m=self.clear_m,
+            distance_m=self.shortest_path_m,
         )
 
-    def view(self) -> View:
+    def view(self) -> CameraView:
         """Return what the camera is to draw."""
         world = self.world
         x, y = world.position
-        return View(self.place.scenery, self.props, x, y, 90.0 * world.quarter, world.horizon_deg)
+        return CameraView(
+            self.place.scenery, self.props, x, y, 90.0 * world.quarter, world.horizon_deg
+        )
 
     def polar(self) -> tuple[float, float]:
         """Goal from the agent: distance in metres and bearing in (-pi, pi], left positive."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from gymnasium.vector import VectorEnv
 
-from internav_data.envs.slot import EnvState, check_options
+from internav_data.envs.slot import EpisodeSnapshot, check_options
 from internav_data.envs.spaces import layout
 from internav_data.envs.vector import OPTIONS, InterNavVectorEnv, choices, seeds_of, set_spaces
 from internav_data.records.errors import InternavError, UsageError
@@ -180,13 +180,13 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
             merged(infos, self._counts),
         )
 
-    def state(self) -> tuple[EnvState, ...]:
+    def state(self) -> tuple[EpisodeSnapshot, ...]:
         """Return what each environment is."""
         for k in range(len(self._pipes)):
             self._ask(k, "state")
         return tuple(state for states in self._answers() for state in states)
 
-    def restore(self, states: Sequence[EnvState]) -> tuple[Observations, dict[str, Any]]:
+    def restore(self, states: Sequence[EpisodeSnapshot]) -> tuple[Observations, dict[str, Any]]:
         """Become what `state` returned."""
         if len(states) != self.num_envs:
             raise UsageError(f"restore: expected {self.num_envs} states, got {len(states)}")

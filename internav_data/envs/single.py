@@ -8,8 +8,8 @@ import gymnasium
 import numpy as np
 
 from internav_data.envs.episode import WAIT
-from internav_data.envs.slot import Arguments, EnvState, Player, check_options, step_info
-from internav_data.envs.spaces import Board, observation_space
+from internav_data.envs.slot import Arguments, EnvSlot, EpisodeSnapshot, check_options, step_info
+from internav_data.envs.spaces import ObservationBuffer, observation_space
 from internav_data.records.errors import UsageError
 from internav_data.render.camera import Camera
 from internav_data.world import ACTION_COUNT
@@ -68,8 +68,8 @@ class InterNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
         self.render_mode = render_mode
         self.observation_space = observation_space(image_size, ids=ids)
         self.action_space = gymnasium.spaces.Discrete(ACTION_COUNT)
-        (self._player,) = Player.several(1, dataset, arguments)
-        self._board = Board.of(Camera(image_size), 1, ids=ids)
+        (self._player,) = EnvSlot.several(1, dataset, arguments)
+        self._board = ObservationBuffer.of(Camera(image_size), 1, ids=ids)
         self._large: Camera | None = None
 
     def reset(
@@ -99,11 +99,11 @@ class InterNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
         """Pass a step: for options that hand control back."""
         return self.step(WAIT)
 
-    def state(self) -> EnvState:
+    def state(self) -> EpisodeSnapshot:
         """Return all that this environment is, in a few words."""
         return self._player.state()
 
-    def restore(self, state: EnvState) -> tuple[dict[str, Any], dict[str, Any]]:
+    def restore(self, state: EpisodeSnapshot) -> tuple[dict[str, Any], dict[str, Any]]:
         """Become what `state` returned, here or elsewhere."""
         self._player.restore(state)
         return self._look(), self._whose()

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypedDict
 
-from internav_data.envs.episode import Play, Rules
+from internav_data.envs.episode import EpisodeRun, TaskConfig
 from internav_data.envs.source import HOUSES_KEPT, PLACES, Source, open_source
 from internav_data.records.errors import UsageError
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from internav_data.dataset import Dataset
-    from internav_data.envs.episode import Step
+    from internav_data.envs.episode import TaskStep
     from internav_data.envs.order import EpisodeOrder
     from internav_data.physics import PushModel
     from internav_data.records import Episode
@@ -35,7 +35,7 @@ class Arguments(TypedDict, total=False):
 
 
 @dataclass(frozen=True, slots=True)
-class EnvState:
+class EpisodeSnapshot:
     """All that an environment is: from it, any process can build it again."""
 
     episode_id: str
@@ -49,22 +49,22 @@ class EnvState:
     """Node i, j and quarter turn, where it did not begin at the episode's own start."""
 
 
-class Player:
+class EnvSlot:
     """One environment without its pictures."""
 
     __slots__ = ("_order", "_position", "_rules", "_seed", "_shuffle", "_stay", "current", "source")
 
-    def __init__(self, source: Source, rules: Rules, *, stay: int, shuffle: bool) -> None:
+    def __init__(self, source: Source, rules: TaskConfig, *, stay: int, shuffle: bool) -> None:
         self.source, self._rules = source, rules
         self._stay, self._shuffle = stay, shuffle
         self._order: EpisodeOrder | None = None
         self._seed = self._position = 0
-        self.current: Play | None = None
+        self.current: EpisodeRun | None = None
 
     @staticmethod
     def several(
         count: int, dataset: str | Path | Dataset[Episode], arguments: Arguments
-    ) -> list[Player]:
+    ) -> list[EnvSlot]:
         """Make players that share one source.
 
         Raises
@@ -87,14 +87,14 @@ class Player:
             )
         PLACES.capacity = max(PLACES.capacity, kept)
         source = open_source(dataset, arguments.get("split"), arguments.get("filters"))
-        rules = Rules(
+        rules = TaskConfig(
             arguments.get("max_steps", 500),
             arguments.get("failed_done_reward", 0.0),
             arguments.get("push_model", source.push_model),
         )
         rules.check()
         shuffle = arguments.get("shuffle", True)
-        return [Player(source, rules, stay=stay, shuffle=shuffle) for _ in range(count)]
+        return [EnvSlot(source, rules, stay=stay, shuffle=shuffle) for _ in range(count)]
 
     @property
     def ordered(self) -> bool:
@@ -102,7 +102,7 @@ class Player:
         return self._order is not None
 
     @property
-    def play(self) -> Play:
+    def play(self) -> EpisodeRun:
         """The episode being played."""
         if self.current is None:
             raise UsageError("InterNav: nothing is played yet; call reset() first")
@@ -118,7 +118,7 @@ class Player:
         episode_id: str | None = None,
         actions: Iterable[int] = (),
         start: Sequence[int] | None = None,
-    ) -> Play:
+    ) -> EpisodeRun:
         """Begin the next episode, or a named one (which leaves the order where it is)."""
         if episode_id is not None:
             number = self.source.number_of(episode_id)
@@ -129,26 +129,26 @@ class Player:
             self._position += 1
         episode = self.source.episode(number)
         place, assets = self.source.place(episode), self.source.dataset.assets
-        self.current = Play(episode, place, assets, self._rules, start)
+        self.current = EpisodeRun(episode, place, assets, self._rules, start)
         for action in actions:
             self.current.step(int(action))
         return self.current
 
-    def state(self) -> EnvState:
+    def state(self) -> EpisodeSnapshot:
         """Return all that this is."""
         play = self.play
-        return EnvState(
+        return EpisodeSnapshot(
             play.episode.episode_id, tuple(play.actions), self._seed, self._position, play.start
         )
 
-    def restore(self, state: EnvState) -> Play:
+    def restore(self, state: EpisodeSnapshot) -> EpisodeRun:
         """Become what a state says."""
         self.seed(state.seed)
         self._position = state.position
         return self.begin(state.episode_id, state.actions, state.start)
 
 
-def step_info(play: Play, step: Step) -> dict[str, Any]:
+def step_info(play: EpisodeRun, step: TaskStep) -> dict[str, Any]:
     """Return what is said about a step."""
     last = play.last
     if last is None:

@@ -14,7 +14,7 @@ from internav_data.world.actions import HORIZONS_DEG
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from internav_data.envs.episode import Play
+    from internav_data.envs.episode import EpisodeRun
     from internav_data.render.camera import Camera
 
 FAR_M: Final = 1000.0
@@ -57,7 +57,7 @@ def layout(count: int, size: int, *, ids: bool = False) -> dict[str, tuple[tuple
     }
 
 
-class Board:
+class ObservationBuffer:
     """Observations of a batch, written in place.
 
     Parameters
@@ -77,12 +77,14 @@ class Board:
         self._frames = Frames(buffers["rgb"], depth, ids)
 
     @staticmethod
-    def of(camera: Camera, count: int, *, ids: bool = False) -> Board:
+    def of(camera: Camera, count: int, *, ids: bool = False) -> ObservationBuffer:
         """Make a board in ordinary memory."""
         sizes = layout(count, camera.size, ids=ids)
-        return Board(camera, {name: np.zeros(*described) for name, described in sizes.items()})
+        return ObservationBuffer(
+            camera, {name: np.zeros(*described) for name, described in sizes.items()}
+        )
 
-    def write(self, row: int, play: Play) -> None:
+    def write(self, row: int, play: EpisodeRun) -> None:
         """Write what a world's agent sees; nothing is drawn where it sees what it saw before."""
         world, buffers = play.world, self.buffers
         if play.stale:

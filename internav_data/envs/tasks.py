@@ -36,7 +36,12 @@ class EpisodeStatistics:
 
 
 def metrics(
-    tally: EpisodeStatistics, *, success: bool, clear_m: float, steps: int, distance_m: float
+    tally: EpisodeStatistics,
+    *,
+    success: bool,
+    shortest_path_m: float,
+    steps: int,
+    distance_m: float,
 ) -> dict[str, float | int | bool]:
     """Return the metrics of one finished episode: their means over episodes are the paper's.
 
@@ -46,7 +51,7 @@ def metrics(
         What was counted.
     success
         Done at the goal.
-    clear_m
+    shortest_path_m
         L: any-angle distance from start to goal without obstacles.
     steps
         Steps taken, Done and waits included.
@@ -57,8 +62,8 @@ def metrics(
     return {
         "success": success,
         "distance_to_goal_m": distance_m,
-        "spl": clear_m / max(path_m, clear_m) if success else 0.0,
-        "sts": clear_m / SPACING_M / steps if success else 0.0,
+        "spl": shortest_path_m / max(path_m, shortest_path_m) if success else 0.0,
+        "sts": shortest_path_m / SPACING_M / steps if success else 0.0,
         "steps": steps,
         "path_m": path_m,
         "pushes_tried": tally.tried["push"],

@@ -8,8 +8,8 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from internav_data.envs.slot import Arguments, EnvState, Player, check_options, step_info
-from internav_data.envs.spaces import Board, observation_space
+from internav_data.envs.slot import Arguments, EnvSlot, EpisodeSnapshot, check_options, step_info
+from internav_data.envs.spaces import ObservationBuffer, observation_space
 from internav_data.records.errors import UsageError
 from internav_data.render.camera import Camera
 from internav_data.world import ACTION_COUNT
@@ -88,13 +88,13 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         buffers: Observations | None = None,
         **arguments: Unpack[Arguments],
     ) -> None:
-        self.players = Player.several(num_envs, dataset, arguments)
+        self.players = EnvSlot.several(num_envs, dataset, arguments)
         set_spaces(self, num_envs, image_size, autoreset=autoreset, ids=ids)
         camera = Camera(image_size)
         if buffers is None:
-            self._board = Board.of(camera, num_envs, ids=ids)
+            self._board = ObservationBuffer.of(camera, num_envs, ids=ids)
         else:
-            self._board = Board(camera, buffers)
+            self._board = ObservationBuffer(camera, buffers)
         self._autoreset, self._copy = autoreset, copy
         self._over = np.zeros(num_envs, np.bool_)
 
@@ -146,11 +146,11 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         infos = self._joined(said)
         return self._observations(), rewards, terminated, truncated, infos
 
-    def state(self) -> tuple[EnvState, ...]:
+    def state(self) -> tuple[EpisodeSnapshot, ...]:
         """Return what each environment is."""
         return tuple(player.state() for player in self.players)
 
-    def restore(self, states: Sequence[EnvState]) -> tuple[Observations, dict[str, Any]]:
+    def restore(self, states: Sequence[EpisodeSnapshot]) -> tuple[Observations, dict[str, Any]]:
         """Become what `state` returned."""
         if len(states) != self.num_envs:
             raise UsageError(f"restore: expected {self.num_envs} states, got {len(states)}")

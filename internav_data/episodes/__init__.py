@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 from internav_data.episodes.config import EpisodeConfig
 
 if TYPE_CHECKING:
-    from internav_data.episodes.build import Batch, build_batch, build_episodes, mode_of
-    from internav_data.episodes.site import Site
+    from internav_data.episodes.build import EpisodeBatch, build_batch, build_episodes, mode_of
+    from internav_data.episodes.site import SpawnSite
 
-__all__ = ["Batch", "EpisodeConfig", "Site", "build_batch", "build_episodes", "mode_of"]
+__all__ = ["EpisodeBatch", "EpisodeConfig", "SpawnSite", "build_batch", "build_episodes", "mode_of"]
 
-_HOMES = {"Site": "site"} | dict.fromkeys(
-    ("Batch", "build_batch", "build_episodes", "mode_of"), "build"
+_HOMES = {"SpawnSite": "site"} | dict.fromkeys(
+    ("EpisodeBatch", "build_batch", "build_episodes", "mode_of"), "build"
 )
 
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from internav_data.episodes.config import EpisodeConfig
 from internav_data.episodes.outcomes import outcomes_of
-from internav_data.episodes.site import Site
-from internav_data.episodes.spawn import Way, spawn
+from internav_data.episodes.site import SpawnSite
+from internav_data.episodes.spawn import EpisodeDraft, spawn
 from internav_data.geometry import round_m
 from internav_data.navigation import SPACING_M, node_paths
 from internav_data.physics import engine_of_this_process
@@ -46,7 +46,7 @@ QUARTER_TURNS = (0, 90, 180, 270)
 
 
 @dataclass(frozen=True, slots=True)
-class Batch:
+class EpisodeBatch:
     """Episodes of a house, and how often something was drawn again for them."""
 
     episodes: tuple[Episode, ...]
@@ -97,17 +97,17 @@ def build_batch(
     *,
     first: int = 0,
     attempt: int = 0,
-) -> Batch:
+) -> EpisodeBatch:
     """Make episodes as `build_episodes` does, and say how often something was drawn again."""
     config = config or EpisodeConfig()
-    site = Site.of(house)
+    site = SpawnSite.of(house)
     redraws: Counter[Redraw] = Counter()
     episodes = []
     for index in range(first, first + count):
         episode, again = _build_episode(site, index, pool, config, attempt)
         episodes.append(episode)
         redraws += again
-    return Batch(tuple(episodes), dict(sorted(redraws.items())))
+    return EpisodeBatch(tuple(episodes), dict(sorted(redraws.items())))
 
 
 def mode_of(scene: int, index: int) -> Mode:
@@ -116,7 +116,7 @@ def mode_of(scene: int, index: int) -> Mode:
 
 
 def _build_episode(
-    site: Site, index: int, pool: Sequence[Asset], config: EpisodeConfig, attempt: int
+    site: SpawnSite, index: int, pool: Sequence[Asset], config: EpisodeConfig, attempt: int
 ) -> tuple[Episode, Counter[Redraw]]:
     house = site.house
     again: Counter[Redraw] = Counter()
@@ -134,7 +134,7 @@ def _build_episode(
 
 
 def _draw(
-    site: Site,
+    site: SpawnSite,
     index: int,
     pool: Sequence[Asset],
     config: EpisodeConfig,
@@ -163,7 +163,9 @@ def _draw(
     return _recorded(way, index, world, expert)
 
 
-def _draw_way(site: Site, mode: Mode, config: EpisodeConfig, rng: Generator) -> Way | None:
+def _draw_way(
+    site: SpawnSite, mode: Mode, config: EpisodeConfig, rng: Generator
+) -> EpisodeDraft | None:
     """Draw a start and a goal, in two rooms where there are two; None if all are too close.
 
     Rooms first, then a node in each: were nodes drawn at once, large rooms would be in most pairs
@@ -175,24 +177,31 @@ def _draw_way(site: Site, mode: Mode, config: EpisodeConfig, rng: Generator) -> 
     for _ in range(PAIRS):
         chosen = rng.choice(rooms, size=2, replace=len(rooms) == 1)
         first, second = (int(rng.choice(np.flatnonzero(site.rooms == room))) for room in chosen)
-        clear_m = site.ways.distance(_point(_node(site, first)), _point(_node(site, second)))
-        if clear_m is not None and round_m(clear_m) >= config.least_clear_m:
-            return _begin(site, mode, config, first, second, round_m(clear_m))
+        shortest_path_m = site.ways.distance(
+            _point(_node(site, first)), _point(_node(site, second))
+        )
+        if shortest_path_m is not None and round_m(shortest_path_m) >= config.min_shortest_path_m:
+            return _begin(site, mode, config, first, second, round_m(shortest_path_m))
     return None
 
 
 def _begin(
-    site: Site, mode: Mode, config: EpisodeConfig, first: int, second: int, clear_m: float
-) -> Way | None:
+    site: SpawnSite,
+    mode: Mode,
+    config: EpisodeConfig,
+    first: int,
+    second: int,
+    shortest_path_m: float,
+) -> EpisodeDraft | None:
     """Gather what is known about a start and a goal before anything is spawned."""
     start, goal = _node(site, first), _node(site, second)
     here, there = _point(start), _point(goal)
-    clear_steps = site.lattice.distance(start, goal)
-    if clear_steps is None:
+    shortest_path_steps = site.lattice.distance(start, goal)
+    if shortest_path_steps is None:
         return None
     rooms, cut = site.room_paths(int(site.rooms[first]), int(site.rooms[second]))
     nodes, nodes_cut = node_paths(site.house, here, there, rooms)
-    return Way(
+    return EpisodeDraft(
         site=site,
         config=config,
         mode=mode,
@@ -201,17 +210,17 @@ def _begin(
         start_room=int(site.rooms[first]),
         goal_room=int(site.rooms[second]),
         room_paths=rooms,
-        room_paths_cut=cut,
+        room_paths_truncated=cut,
         node_paths=nodes,
-        node_paths_cut=nodes_cut,
+        node_paths_truncated=nodes_cut,
         lattice=site.lattice.copy(),
-        clear_m=clear_m,
-        clear_steps=clear_steps,
-        steps=clear_steps,
+        shortest_path_m=shortest_path_m,
+        shortest_path_steps=shortest_path_steps,
+        steps=shortest_path_steps,
     )
 
 
-def _node(site: Site, index: int) -> tuple[int, int]:
+def _node(site: SpawnSite, index: int) -> tuple[int, int]:
     i, j = site.nodes[index]
     return int(i), int(j)
 
@@ -220,10 +229,10 @@ def _point(node: tuple[int, int]) -> tuple[float, float]:
     return SPACING_M * node[0], SPACING_M * node[1]
 
 
-def _recorded(way: Way, index: int, world: World, expert: Expert | None) -> Episode:
+def _recorded(way: EpisodeDraft, index: int, world: World, expert: Expert | None) -> Episode:
     """Write down a finished way; its predicates are judged on the rounded poses."""
-    house, way_m = way.site.house, world.way_m()
-    outcomes = outcomes_of(world, (way.steps, way_m))
+    house, obstructed_path_m = way.site.house, world.obstructed_path_m()
+    outcomes = outcomes_of(world, (way.steps, obstructed_path_m))
     return Episode(
         episode_id=f"{house.scene_id}/{index:04d}",
         scene_id=house.scene_id,
@@ -232,19 +241,19 @@ def _recorded(way: Way, index: int, world: World, expert: Expert | None) -> Epis
         seed=house.seed,
         room_count=len(house.rooms),
         mode=way.mode,
-        sealed=way_m is None,
-        rooms_on_way=len(way.room_paths[0]),
+        sealed=obstructed_path_m is None,
+        rooms_on_path=len(way.room_paths[0]),
         obstacle_count=len(way.obstacles),
-        clear_m=way.clear_m,
-        clear_steps=way.clear_steps,
-        way_m=way_m,
-        steps=way.steps,
+        shortest_path_m=way.shortest_path_m,
+        shortest_path_steps=way.shortest_path_steps,
+        obstructed_path_m=obstructed_path_m,
+        obstructed_path_steps=way.steps,
         start=Start(*way.start, *_point(way.start), 90 * world.quarter, way.start_room),
         goal=Goal(*way.goal, *_point(way.goal), way.goal_room),
         room_paths=way.room_paths,
-        room_paths_cut=way.room_paths_cut,
+        room_paths_truncated=way.room_paths_truncated,
         node_paths=way.node_paths,
-        node_paths_cut=way.node_paths_cut,
+        node_paths_truncated=way.node_paths_truncated,
         obstacles=tuple(map(_obstacle, way.obstacles, outcomes)),
         expert=expert,
         physics=_physics(way),
@@ -271,7 +280,7 @@ def _obstacle(spawned: Spawned, outcomes: tuple[Outcome, ...]) -> Obstacle:
     )
 
 
-def _physics(way: Way) -> Physics:
+def _physics(way: EpisodeDraft) -> Physics:
     engine = engine_of_this_process()
     return Physics(
         engine=engine.name,

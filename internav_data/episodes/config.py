@@ -20,7 +20,7 @@ class EpisodeConfig:
     """Standard deviation of an obstacle's distance from the way, metres."""
     gap_m: float = 0.01
     """Least distance between an obstacle and everything else when it is spawned, metres."""
-    least_clear_m: float = 2.0
+    min_shortest_path_m: float = 2.0
     """Least any-angle distance from start to goal without obstacles, metres."""
     spots: int = 200
     """Spots tried for the obstacles of one start and goal."""
@@ -43,8 +43,8 @@ class EpisodeConfig:
             (self.sideways_m < 0.0, f"sideways_m: expected 0 or more, got {self.sideways_m}"),
             (self.gap_m < 0.0, f"gap_m: expected 0 or more, got {self.gap_m}"),
             (
-                self.least_clear_m <= 0.0,
-                f"least_clear_m: expected more than 0, got {self.least_clear_m}",
+                self.min_shortest_path_m <= 0.0,
+                f"min_shortest_path_m: expected more than 0, got {self.min_shortest_path_m}",
             ),
             (self.spots < 1, f"spots: expected at least 1, got {self.spots}"),
             (self.redraws < 1, f"redraws: expected at least 1, got {self.redraws}"),

@@ -43,7 +43,7 @@ def outcomes_of(world: World, before: Distances | None = None) -> tuple[tuple[Ou
     before
         Those distances, steps and metres, where they are known already.
     """
-    before = before or (world.steps(), world.way_m())
+    before = before or (world.steps(), world.obstructed_path_m())
     return tuple(
         (
             *(_pushed(world, index, heading, before, lifted) for heading in range(4)),
@@ -87,7 +87,7 @@ class _Lifted:
         # A way that the thing leaves free is still the shortest one.
         if self._way is None or keeps_clear(self._way[1], there.items[self._index].footprint):
             return steps, best_way_m
-        return steps, there.way_m()
+        return steps, there.obstructed_path_m()
 
 
 def _pushed(world: World, index: int, heading: int, before: Distances, lifted: _Lifted) -> Outcome:
@@ -99,15 +99,15 @@ def _pushed(world: World, index: int, heading: int, before: Distances, lifted: _
     if pushed.moved:
         there = world.copy()
         there.put([(index, pushed.pose), *pushed.moved])
-        steps, way_m = there.steps(), there.way_m()
+        steps, obstructed_path_m = there.steps(), there.obstructed_path_m()
     else:
-        steps, way_m = lifted.laid(pushed.pose)
+        steps, obstructed_path_m = lifted.laid(pushed.pose)
     return Outcome(
         action=PUSHES[heading],
         success=True,
         displacement_m=pushed.displacement_m,
-        steps=steps,
-        way_m=way_m,
+        path_steps_after=steps,
+        path_m_after=obstructed_path_m,
         opened=before[0] is None and steps is not None,
         seconds=pushed.seconds,
         reason="",
@@ -119,14 +119,14 @@ def _picked(world: World, index: int, before: Distances, lifted: _Lifted) -> Out
         return _failed(PICK, "not pickable", before)
     if carries(world, index):
         return _failed(PICK, "something rests on it", before)
-    steps, way_m = lifted.distances
+    steps, obstructed_path_m = lifted.distances
     opened = before[0] is None and steps is not None
     return Outcome(
         action=PICK,
         success=True,
         displacement_m=0.0,
-        steps=steps,
-        way_m=way_m,
+        path_steps_after=steps,
+        path_m_after=obstructed_path_m,
         opened=opened,
         seconds=0.0,
         reason="",
@@ -138,8 +138,8 @@ def _failed(action: str, reason: str, before: Distances, seconds: float = 0.0) -
         action=action,
         success=False,
         displacement_m=0.0,
-        steps=before[0],
-        way_m=before[1],
+        path_steps_after=before[0],
+        path_m_after=before[1],
         opened=False,
         seconds=seconds,
         reason=reason,

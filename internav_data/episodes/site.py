@@ -9,7 +9,7 @@ import numpy as np
 
 from internav_data.geometry import Polygons, house_footprints
 from internav_data.navigation import SPACING_M, room_paths, rooms_of
-from internav_data.world import Stage
+from internav_data.world import HouseModel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 
 
 @dataclass(slots=True)
-class Site:
+class SpawnSite:
     """A furnished house with its lattice, its ways and the nodes where agents can be put."""
 
     house: House
-    stage: Stage
+    stage: HouseModel
     """What the worlds of its episodes share."""
     footprints: Polygons
     """All that stands in the house, walls first."""
@@ -41,14 +41,14 @@ class Site:
     )
 
     @staticmethod
-    def of(house: House) -> Site:
+    def of(house: House) -> SpawnSite:
         """Work out what the episodes of a house share."""
-        stage = Stage.of(house)
+        stage = HouseModel.of(house)
         lattice = stage.lattice
         components = lattice.components()
         sizes = np.bincount(components[components >= 0].ravel(), minlength=1)
         nodes = np.argwhere(components == int(np.argmax(sizes)))
-        return Site(
+        return SpawnSite(
             house=house,
             stage=stage,
             footprints=house_footprints(house),

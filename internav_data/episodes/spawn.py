@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.random import Generator
 
     from internav_data.episodes.config import EpisodeConfig
-    from internav_data.episodes.site import Site
+    from internav_data.episodes.site import SpawnSite
     from internav_data.navigation import Lattice
     from internav_data.physics import SettleResult
     from internav_data.records import Asset, Mode, NodePath, Vec2
@@ -49,10 +49,10 @@ class Spawned:
 
 
 @dataclass(slots=True)
-class Way:
+class EpisodeDraft:
     """One attempt: a start, a goal, and the obstacles so far."""
 
-    site: Site
+    site: SpawnSite
     config: EpisodeConfig
     mode: Mode
     start: tuple[int, int]
@@ -60,13 +60,13 @@ class Way:
     start_room: int
     goal_room: int
     room_paths: tuple[tuple[int, ...], ...]
-    room_paths_cut: bool
+    room_paths_truncated: bool
     node_paths: tuple[NodePath, ...]
-    node_paths_cut: bool
+    node_paths_truncated: bool
     lattice: Lattice
     """With the obstacles so far."""
-    clear_m: float
-    clear_steps: int
+    shortest_path_m: float
+    shortest_path_steps: int
     steps: int | None
     obstacles: list[Spawned] = field(default_factory=list)
 
@@ -75,7 +75,7 @@ class Way:
         """Whether the mode's condition holds."""
         if self.mode == "blocked":
             return self.steps is None
-        return self.steps is not None and self.steps > self.clear_steps
+        return self.steps is not None and self.steps > self.shortest_path_steps
 
 
 @lru_cache(maxsize=16384)
@@ -84,7 +84,7 @@ def _standing(asset: Asset, yaw_deg: int) -> Polygons:
     return footprint(asset, Pose(0.0, 0.0, 0.0, yaw_quaternion(yaw_deg)))
 
 
-def spawn(way: Way, pool: Sequence[Asset], rng: Generator) -> bool:
+def spawn(way: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> bool:
     """Put obstacles on a way until its mode's condition holds.
 
     Returns
@@ -103,7 +103,7 @@ def spawn(way: Way, pool: Sequence[Asset], rng: Generator) -> bool:
     return way.done
 
 
-def _try_spot(way: Way, pool: Sequence[Asset], rng: Generator) -> None:
+def _try_spot(way: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> None:
     """Draw an asset and a spot, and keep it where nothing speaks against it.
 
     Each spot takes the same number of draws, whatever becomes of it.
@@ -132,7 +132,7 @@ def _try_spot(way: Way, pool: Sequence[Asset], rng: Generator) -> None:
 
 
 def _spot(
-    site: Site, first: Vec2, second: Vec2, along: float, sideways: float
+    site: SpawnSite, first: Vec2, second: Vec2, along: float, sideways: float
 ) -> tuple[float, float] | None:
     """Point at a share of the way's length, moved sideways within its room."""
     points = site.way_between(first, second)
@@ -148,7 +148,7 @@ def _spot(
     return None
 
 
-def _distance(way: Way, polygons: Polygons, stop_at: float) -> float:
+def _distance(way: EpisodeDraft, polygons: Polygons, stop_at: float) -> float:
     """Distance to the house and to the other obstacles, at most `stop_at`."""
     near = clearance(polygons, way.site.footprints, stop_at)
     for other in way.obstacles:
@@ -156,7 +156,7 @@ def _distance(way: Way, polygons: Polygons, stop_at: float) -> float:
     return near
 
 
-def _place(way: Way, spawned: Spawned) -> None:
+def _place(way: EpisodeDraft, spawned: Spawned) -> None:
     """Keep an obstacle unless it stands over start or goal or cuts a way to be lengthened."""
     handle = way.lattice.add(spawned.footprint)
     free = way.lattice.free
@@ -169,12 +169,12 @@ def _place(way: Way, spawned: Spawned) -> None:
     way.steps = steps
 
 
-def _near(way: Way, here: Polygons) -> list[Body]:
+def _near(way: EpisodeDraft, here: Polygons) -> list[Body]:
     """Things, obstacles and walls near a spot, as fixed bodies."""
     house = way.site.house
     bodies = [
         Body(house.assets[thing.asset_id], thing.pose, moves=False)
-        for thing in house.things
+        for thing in house.objects
         if _is_near(here, footprint(house.assets[thing.asset_id], thing.pose))
     ]
     bodies += [

@@ -96,7 +96,7 @@ def read_evaluation(folder: Path) -> Evaluation:
                 f"{table_path}: expected {episodes} rows as {ABOUT} says (at most "
                 f"{_ROWS_AT_MOST}), got {rows}; evaluate again"
             )
-        results = tuple(from_table(read_all(table_path, opened), RESULTS))
+        results = tuple(from_table(read_all(table_path, opened, RESULTS), RESULTS))
     if len({result.episode_id for result in results}) != len(results):
         raise CorruptDataError(f"{table_path}: an episode is there twice; evaluate again")
     return Evaluation(about, results)

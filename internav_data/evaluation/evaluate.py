@@ -35,7 +35,7 @@ _SUBSET, _ACTIONS = 1, 0
 """Where the seeds table has attempts: what of an evaluation is drawn."""
 
 
-class Player(Protocol):
+class Policy(Protocol):
     """Policy being evaluated: a trained agent (`camp.policy`) or a reference policy."""
 
     name: str
@@ -57,7 +57,7 @@ class Player(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class EvaluationConfig:
     """How an evaluation is made."""
 
     seed: int = 0
@@ -99,9 +99,9 @@ def chosen(count: int, limit: int | None) -> list[int]:
 
 
 def evaluate(
-    player: Player,
+    player: Policy,
     dataset: Dataset[Episode],
-    settings: Settings | None = None,
+    settings: EvaluationConfig | None = None,
     tell: Tell | None = None,
 ) -> list[EpisodeResult]:
     """Play the episodes of a dataset; the results come in the dataset's order.
@@ -124,7 +124,7 @@ def evaluate(
     """
     from internav_data.envs.make import make_vector  # noqa: PLC0415 - the camera's kernels
 
-    settings = settings or Settings()
+    settings = settings or EvaluationConfig()
     settings.check()
     if not len(dataset):
         raise UsageError(
@@ -152,7 +152,7 @@ class _Round:
     def __init__(
         self,
         env: Any,  # noqa: ANN401 - either vector environment
-        player: Player,
+        player: Policy,
         dataset: Dataset[Episode],
         numbers: Sequence[int],
         seed: int,

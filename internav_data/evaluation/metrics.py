@@ -37,7 +37,7 @@ class EpisodeResult:
     """Taken: Done, waits and failed actions included."""
     distance_m: float
     """From the end to the goal, any-angle, no obstacle about (FDT)."""
-    clear_m: float
+    shortest_path_m: float
     """L: from the start to the goal, any-angle, no obstacle about."""
     path_m: float
     """P: 0.25 m for each move that succeeded."""
@@ -73,7 +73,7 @@ def result_of(episode: Episode, said: Mapping[str, float], actions: Sequence[int
     """
     distance, reached = float(said["distance_to_goal_m"]), bool(said["success"])
     if not math.isfinite(distance):
-        distance, reached = episode.clear_m, False
+        distance, reached = episode.shortest_path_m, False
     return EpisodeResult(
         episode_id=episode.episode_id,
         scene_id=episode.scene_id,
@@ -83,7 +83,7 @@ def result_of(episode: Episode, said: Mapping[str, float], actions: Sequence[int
         success=reached,
         steps=int(said["steps"]),
         distance_m=distance,
-        clear_m=episode.clear_m,
+        shortest_path_m=episode.shortest_path_m,
         path_m=float(said["path_m"]),
         spl=float(said["spl"]) if reached else 0.0,
         sts=float(said["sts"]) if reached else 0.0,

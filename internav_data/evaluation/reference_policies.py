@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.dataset import Dataset
-    from internav_data.evaluation.evaluate import Player
+    from internav_data.evaluation.evaluate import Policy
     from internav_data.navigation import Lattice
     from internav_data.records import Episode
 
     Node = tuple[int, int]
-    Plan = Callable[[Episode], Sequence[int]]
+    ActionPlanner = Callable[[Episode], Sequence[int]]
 
 ORACLES: Final = ("expert", "planner", "random")
 ACTIONS: Final = 12
@@ -32,7 +32,7 @@ _TURNS: Final[tuple[tuple[int, ...], ...]] = ((), (LEFT,), (LEFT, LEFT), (RIGHT,
 """What turns the agent by so many quarters, counter-clockwise."""
 
 
-def oracle(name: str, dataset: Dataset[Episode]) -> Player:
+def oracle(name: str, dataset: Dataset[Episode]) -> Policy:
     """Return one of `ORACLES` for a dataset.
 
     Raises
@@ -68,21 +68,21 @@ class ScriptedPlayer:
 
     image_size = 1  # it does not look
 
-    def __init__(self, name: str, plan: Plan) -> None:
+    def __init__(self, name: str, plan: ActionPlanner) -> None:
         self.name = name
         self._plan = plan
         self._left: list[deque[int]] = []
 
     def begin(self, count: int, seed: int) -> None:  # noqa: ARG002 - nothing is random here
-        """See `Player`."""
+        """See `Policy`."""
         self._left = [deque() for _ in range(count)]
 
     def start(self, seat: int, episode: Episode) -> None:
-        """See `Player`."""
+        """See `Policy`."""
         self._left[seat] = deque(self._plan(episode))
 
     def act(self, observations: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:  # noqa: ARG002
-        """See `Player`."""
+        """See `Policy`."""
         return np.array([left.popleft() if left else DONE for left in self._left], np.int64)
 
 
@@ -97,15 +97,15 @@ class RandomPlayer:
         self._draws: list[Generator | None] = []
 
     def begin(self, count: int, seed: int) -> None:
-        """See `Player`."""
+        """See `Policy`."""
         self._seed, self._draws = seed, [None] * count
 
     def start(self, seat: int, episode: Episode) -> None:
-        """See `Player`."""
+        """See `Policy`."""
         self._draws[seat] = episode_generator(self._seed, episode)
 
     def act(self, observations: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:  # noqa: ARG002
-        """See `Player`."""
+        """See `Policy`."""
         drawn = [DONE if draw is None else int(draw.integers(ACTIONS)) for draw in self._draws]
         return np.array(drawn, np.int64)
 
@@ -115,7 +115,7 @@ def expert_actions(episode: Episode) -> Sequence[int]:
     return (DONE,) if episode.expert is None else episode.expert.actions
 
 
-def planner_of(dataset: Dataset[Episode]) -> Plan:
+def planner_of(dataset: Dataset[Episode]) -> ActionPlanner:
     """Return what plans the shortest way on the lattice, things as they lie, touching none."""
     from internav_data.envs.source import open_source  # noqa: PLC0415 - the camera's kernels
     from internav_data.world import World  # noqa: PLC0415

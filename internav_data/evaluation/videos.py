@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from internav_data.dataset import load_dataset
-from internav_data.evaluation.evaluate import Settings, evaluate
+from internav_data.evaluation.evaluate import EvaluationConfig, evaluate
 from internav_data.evaluation.report import episodes_by_id, picked, push_model_of
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.dataset import Dataset
-    from internav_data.evaluation.evaluate import Player
+    from internav_data.evaluation.evaluate import Policy
     from internav_data.evaluation.metrics import EpisodeResult
     from internav_data.evaluation.policies import Note
     from internav_data.records import Episode
@@ -28,7 +28,7 @@ FPS: Final = 6.0
 class _Noting:
     """Plays as another does, and keeps what led to each action."""
 
-    def __init__(self, player: Player) -> None:
+    def __init__(self, player: Policy) -> None:
         self.name, self.image_size = player.name, player.image_size
         self.ids = getattr(player, "ids", False)
         self._player = player
@@ -50,10 +50,10 @@ class _Noting:
 
 def films(
     folder: Path,
-    player: Player,
+    player: Policy,
     results: Sequence[EpisodeResult],
     dataset: Dataset[Episode],
-    settings: Settings,
+    settings: EvaluationConfig,
     kind: str = "gif",
 ) -> Iterator[Path]:
     """Film the best, the median and the worst episode of an evaluation.
@@ -70,7 +70,7 @@ def films(
     for word, result in picked(results, each=1):
         only = load_dataset(dataset.path, dataset.split, [("episode_id", "=", result.episode_id)])
         noting = _Noting(player)
-        alone = Settings(settings.seed, batch=1, max_steps=settings.max_steps)
+        alone = EvaluationConfig(settings.seed, batch=1, max_steps=settings.max_steps)
         (again,) = evaluate(noting, only, alone)
         (episode,) = episodes_by_id(only, [result.episode_id]).values()
         steps = [[Bars(*note) for note in notes] for notes in noting.steps]

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from internav_data.generation.config import GenerationConfig, load_config
-    from internav_data.generation.progress import Progress
+    from internav_data.generation.progress import GenerationProgress
     from internav_data.generation.report import Report
     from internav_data.generation.run import generate
     from internav_data.generation.single import generate_episodes, generate_house
 
 __all__ = [
     "GenerationConfig",
-    "Progress",
+    "GenerationProgress",
     "Report",
     "generate",
     "generate_episodes",
@@ -23,7 +23,7 @@ __all__ = [
 
 _HOMES = {
     "GenerationConfig": "config",
-    "Progress": "progress",
+    "GenerationProgress": "progress",
     "Report": "report",
     "generate": "run",
     "generate_episodes": "single",

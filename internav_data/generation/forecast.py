@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from internav_data.core.progress import clock
-from internav_data.generation.progress import Progress
+from internav_data.generation.progress import GenerationProgress
 from internav_data.generation.run import check_counts, cores
 from internav_data.generation.scenes import asset_folders, build_scene
 from internav_data.records.errors import QuarantineError
@@ -66,7 +66,10 @@ class _Sample:
 
 
 def forecast(
-    config: GenerationConfig, scenes: int, workers: int = 0, progress: Progress | None = None
+    config: GenerationConfig,
+    scenes: int,
+    workers: int = 0,
+    progress: GenerationProgress | None = None,
 ) -> Forecast:
     """Make some scenes in memory and tell what all would take; nothing is kept.
 
@@ -80,7 +83,7 @@ def forecast(
     """
     check_counts(scenes, workers)
     config.check()
-    (progress or Progress()).say(f"making up to {SAMPLE_SCENES} scenes to measure")
+    (progress or GenerationProgress()).say(f"making up to {SAMPLE_SCENES} scenes to measure")
     sample = _sample(config, range(min(scenes, SAMPLE_SCENES)))
     made, tried = len(sample.houses), len(sample.houses) + sample.failed
     share = made / tried

@@ -12,7 +12,7 @@ COMPILING_AFTER_S = 8.0
 """Workers start within two seconds; what takes longer is numba compiling."""
 
 
-class Progress(Ticker):
+class GenerationProgress(Ticker):
     """Counts what ends and tells it on a stream; silent without one."""
 
     def __init__(self, stream: TextIO | None = None) -> None:
@@ -60,6 +60,6 @@ class Progress(Ticker):
             self.tell(self.line())
 
 
-def to_stderr() -> Progress:
+def to_stderr() -> GenerationProgress:
     """Return a progress that tells on stderr."""
-    return Progress(sys.stderr)
+    return GenerationProgress(sys.stderr)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from internav_data.dataset import Manifest
-    from internav_data.generation.progress import Progress
+    from internav_data.generation.progress import GenerationProgress
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class Report:
         return asdict(self) | {"out": str(self.out)}
 
 
-def report_of(out: Path, manifest: Manifest, progress: Progress) -> Report:
+def report_of(out: Path, manifest: Manifest, progress: GenerationProgress) -> Report:
     """Gather what a run did: what the dataset holds now, and what was counted on the way."""
     return Report(
         out=out,

@@ -28,7 +28,7 @@ from internav_data.dataset import (
     write_quarantine,
 )
 from internav_data.generation.messages import Done
-from internav_data.generation.progress import Progress
+from internav_data.generation.progress import GenerationProgress
 from internav_data.generation.report import Report, report_of
 from internav_data.generation.scenes import (
     ScenePayload,
@@ -67,7 +67,7 @@ def generate(
     config: GenerationConfig,
     scenes: int,
     workers: int = 0,
-    progress: Progress | None = None,
+    progress: GenerationProgress | None = None,
     assets: Catalogue | None = None,
     setup: Callable[[ScenePayload], Callable[[int], int]] = scene_maker,
 ) -> Report:
@@ -104,7 +104,7 @@ def generate(
         A full or read-only disk; finished scenes are kept.
 
     """
-    progress = progress or Progress()
+    progress = progress or GenerationProgress()
     check_counts(scenes, workers)
     config.check()
     assets = assets or _catalogue(config)
@@ -213,7 +213,7 @@ class _Plan:
         return [*self.todo[:cut], *tail]
 
 
-def _make(crew: WorkerPool, plan: _Plan, progress: Progress, work: Path) -> None:
+def _make(crew: WorkerPool, plan: _Plan, progress: GenerationProgress, work: Path) -> None:
     """Have the scenes made; those that cannot be are stored as quarantined."""
     before = plan.scenes - len(plan.todo)
     progress.begin(plan.scenes, before, sum(plan.expected(scene) for scene in plan.todo))
@@ -233,7 +233,7 @@ def _make(crew: WorkerPool, plan: _Plan, progress: Progress, work: Path) -> None
 
 
 def _assembled(
-    out: Path, identity: Identity, assets: Catalogue, scenes: int, progress: Progress
+    out: Path, identity: Identity, assets: Catalogue, scenes: int, progress: GenerationProgress
 ) -> Manifest:
     if has_manifest(out) and not _work_files(out):
         held = read_manifest(out)
@@ -269,7 +269,7 @@ def _hopeless(out: Path, count: int, reason: str) -> QuarantineError:
     return QuarantineError(f"none of {count} scenes could be made: {reason}; nothing was written")
 
 
-def _interruption(out: Path, progress: Progress) -> str:
+def _interruption(out: Path, progress: GenerationProgress) -> str:
     done = progress.scenes_before + progress.scenes
     return (
         f"interrupted after {done} of {progress.scenes_total} scenes; they are kept in {out}: "

@@ -216,7 +216,7 @@ def wall_footprints(walls: Iterable[Wall]) -> Polygons:
 
 def house_footprints(house: House) -> Polygons:
     """Walls, then every thing in order: all that stands in the agent's way without obstacles."""
-    things = (footprint(house.assets[t.asset_id], t.pose) for t in house.things)
+    things = (footprint(house.assets[t.asset_id], t.pose) for t in house.objects)
     return Polygons.joined([wall_footprints(house.walls), *things])
 
 

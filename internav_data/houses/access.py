@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.random import Generator
 
-    from internav_data.houses.plan import Plan, Segment
+    from internav_data.houses.plan import FloorGrid, Segment
 
 JAMB_CM = 10
 """Least distance of an opening from the centre line of a wall that meets its own."""
@@ -81,7 +81,7 @@ def door_cost(first: str, second: str) -> float:
     return (_UNKNOWN_PUBLIC, _UNKNOWN_MIXED, _UNKNOWN_PRIVATE)[private]
 
 
-def _deep_enough(plan: Plan, segment: Segment, m: int, side: int) -> bool:
+def _deep_enough(plan: FloorGrid, segment: Segment, m: int, side: int) -> bool:
     """Whether the room on one side of a wall is deep enough for a door beside grid cell m."""
     lines = plan.ys if segment.along_x else plan.xs
     room = segment.before if side < 0 else segment.after
@@ -100,7 +100,7 @@ def _deep_enough(plan: Plan, segment: Segment, m: int, side: int) -> bool:
     return False
 
 
-def spans(plan: Plan, segment: Segment) -> list[Span]:
+def spans(plan: FloorGrid, segment: Segment) -> list[Span]:
     """Stretches of a wall where doors have their clear depth on both sides."""
     stops = plan.xs if segment.along_x else plan.ys
     out: list[Span] = []
@@ -119,7 +119,7 @@ def spans(plan: Plan, segment: Segment) -> list[Span]:
     return out
 
 
-def possible_doors(plan: Plan, width_cm: int) -> dict[tuple[int, int], list[Span]]:
+def possible_doors(plan: FloorGrid, width_cm: int) -> dict[tuple[int, int], list[Span]]:
     """Where doors of at least a width can be, by pair of rooms (ascending), longest span first."""
     out: dict[tuple[int, int], list[Span]] = {}
     for segment in plan.segments:

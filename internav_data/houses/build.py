@@ -157,7 +157,7 @@ def _assembled(
         doors=tuple(_door(k, o) for k, o in enumerate(doors)),
         windows=tuple(_window(k, o) for k, o in enumerate(windows)),
         walls=build_walls(plan, openings, ceiling_cm),
-        things=things,
+        objects=things,
         materials=materials,
         room_graph=tuple(sorted({o.rooms for o in doors if o.open})),
         area_m2=round_m(sum(plan.area_cm2(room) for room in range(len(types))) / 1e4),

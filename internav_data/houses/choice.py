@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from internav_data.houses.access import door_tree, possible_doors
 from internav_data.houses.layouts import draw_layout, row
-from internav_data.houses.plan import Plan, clear_size_m
+from internav_data.houses.plan import FloorGrid, clear_size_m
 from internav_data.houses.standards import (
     HABITABLE,
     HALF_WALL_CM,
@@ -56,7 +56,7 @@ class FloorPlan:
     """
 
     types: tuple[str, ...]
-    plan: Plan
+    plan: FloorGrid
     tree: tuple[tuple[int, int], ...]
     """Pairs of rooms to be joined by a door, so that all rooms can be reached."""
     score: float
@@ -69,13 +69,13 @@ class FloorPlan:
     """A user's own height."""
 
 
-def clear_area_m2(plan: Plan, room: int) -> float:
+def clear_area_m2(plan: FloorGrid, room: int) -> float:
     """Area between the wall faces of a room, m²."""
     around = sum(s.length for s in plan.segments if room in {s.before, s.after})
     return (plan.area_cm2(room) - HALF_WALL_CM * around + 4 * HALF_WALL_CM**2) / 1e4
 
 
-def _room_score(plan: Plan, room: int, spec: RoomSpec, *, lenient: bool) -> float | None:
+def _room_score(plan: FloorGrid, room: int, spec: RoomSpec, *, lenient: bool) -> float | None:
     """How far one room is from what it should be; None where it breaks its standard."""
     main = plan.main_rectangle(room)
     short, long = clear_size_m(main)
@@ -120,7 +120,7 @@ def _through_private(types: Sequence[str], tree: Sequence[tuple[int, int]]) -> f
     return score
 
 
-def _rooms_on_way(plan: Plan, tree: Sequence[tuple[int, int]]) -> float:
+def _rooms_on_way(plan: FloorGrid, tree: Sequence[tuple[int, int]]) -> float:
     """Mean number of rooms between points in two different rooms, by area, along the tree."""
     count = len(tree) + 1
     joined: list[list[int]] = [[] for _ in range(count)]
@@ -142,33 +142,33 @@ def _rooms_on_way(plan: Plan, tree: Sequence[tuple[int, int]]) -> float:
 
 
 def _best_tree(
-    plan: Plan,
+    plan: FloorGrid,
     types: Sequence[str],
     edges: Sequence[tuple[int, int]],
     rng: Generator,
-    rooms_on_way: float | None,
+    rooms_on_path: float | None,
 ) -> tuple[list[tuple[int, int]], float] | None:
     """Choose doors that reach all rooms: as usual as can be, and as deep as was asked for."""
     best: tuple[list[tuple[int, int]], float] | None = None
-    for whim in (0.6,) if rooms_on_way is None else WHIMS:
+    for whim in (0.6,) if rooms_on_path is None else WHIMS:
         found = door_tree(types, edges, rng, whim)
         if found is None:
             return None
         tree, cost = found
         score = 0.25 * cost + _through_private(types, tree)
-        if rooms_on_way is not None:
-            score += DEPTH_WEIGHT * abs(_rooms_on_way(plan, tree) - rooms_on_way)
+        if rooms_on_path is not None:
+            score += DEPTH_WEIGHT * abs(_rooms_on_way(plan, tree) - rooms_on_path)
         if best is None or score < best[1]:
             best = (tree, score)
     return best
 
 
 def judged(
-    plan: Plan,
+    plan: FloorGrid,
     specs: Sequence[RoomSpec],
     least_door_cm: int,
     rng: Generator,
-    rooms_on_way: float | None = None,
+    rooms_on_path: float | None = None,
     *,
     lenient: bool = False,
 ) -> FloorPlan | None:
@@ -188,7 +188,7 @@ def judged(
     edges = sorted(possible_doors(plan, least_door_cm))
     if _jogs(plan) or not _drawable(plan, len(specs)):
         return None
-    found = _best_tree(plan, types, edges, rng, rooms_on_way)
+    found = _best_tree(plan, types, edges, rng, rooms_on_path)
     if found is None:
         return None
     tree, tree_score = found
@@ -209,7 +209,7 @@ def judged(
     return FloorPlan(types, plan, tuple(tree), score)
 
 
-def _jogs(plan: Plan) -> bool:
+def _jogs(plan: FloorGrid) -> bool:
     """Whether two walls run beside each other so closely that it looks like a mistake."""
     segments = plan.segments
     for k, one in enumerate(segments):
@@ -224,7 +224,7 @@ def _jogs(plan: Plan) -> bool:
     return False
 
 
-def _drawable(plan: Plan, rooms: int) -> bool:
+def _drawable(plan: FloorGrid, rooms: int) -> bool:
     """Whether the outline and every room are simple polygons."""
     return bool(plan.polygon(frozenset(range(rooms)))) and all(
         plan.polygon(frozenset({room})) for room in range(rooms)
@@ -250,13 +250,13 @@ def choose_floor_plan(
         if best is not None and k >= config.candidates:
             break
         layout = draw_layout(specs, rng, config.wings)
-        plan = Plan.of([layout[k] for k in range(len(specs))])
-        found = judged(plan, specs, least, rng, config.rooms_on_way(len(specs)))
+        plan = FloorGrid.of([layout[k] for k in range(len(specs))])
+        found = judged(plan, specs, least, rng, config.rooms_on_path(len(specs)))
         if found is not None and (best is None or found.score < best.score):
             best = found
     if best is None:
         layout = row(specs)
-        plan = Plan.of([layout[k] for k in range(len(specs))])
+        plan = FloorGrid.of([layout[k] for k in range(len(specs))])
         best = judged(plan, specs, least, rng, lenient=True)
     if best is None:
         raise QuarantineError(

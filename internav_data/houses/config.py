@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 from internav_data.houses.standards import MAX_ROOMS, ROOM_TYPES
-from internav_data.records import Preset  # noqa: TC001 - fields' types are read at run time
+from internav_data.records import HousePreset  # noqa: TC001 - fields' types are read at run time
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ class RoomsRequest:
 class HouseConfig:
     """How houses are built. Every field is a lever a user may turn."""
 
-    preset: Preset = "paper"
+    preset: HousePreset = "paper"
     """`paper`: generous rooms of about 24 m², calibrated to the paper's Table 2; `realistic`:
     areas, widths and doors of real homes."""
     rooms: str = ""
@@ -93,7 +93,7 @@ class HouseConfig:
             by_size = self.scale_large
         return self.scale * by_size
 
-    def rooms_on_way(self, rooms: int) -> float | None:
+    def rooms_on_path(self, rooms: int) -> float | None:
         """Return how many rooms a way through a house of so many should cross; None: any."""
         medium, large = 3, 6
         if self.preset != "paper" or rooms < medium:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from internav_data.houses.openings import Opening
     from internav_data.houses.pieces import Group
-    from internav_data.houses.plan import Plan
+    from internav_data.houses.plan import FloorGrid
 
     Floats = NDArray[np.float64]
 
@@ -183,7 +183,7 @@ def _sided(opening: Opening, side: int, depth_cm: float, bottom: float, top: flo
     return np.array([*(v / 100.0 for v in flat), bottom, top])
 
 
-def _side_of(plan: Plan, room: int, opening: Opening) -> int:
+def _side_of(plan: FloorGrid, room: int, opening: Opening) -> int:
     """On which side of an opening a room lies."""
     stops, lines = (plan.xs, plan.ys) if opening.along_x else (plan.ys, plan.xs)
     m = next(k for k in range(len(stops) - 1) if stops[k + 1] > opening.low)
@@ -204,7 +204,7 @@ def _anchor(opening: Opening, side: int, origin: NDArray[np.int64]) -> tuple[int
 
 
 def room_state(
-    plan: Plan, room: int, name: str, openings: Sequence[Opening], ceiling_m: float
+    plan: FloorGrid, room: int, name: str, openings: Sequence[Opening], ceiling_m: float
 ) -> RoomState:
     """Return an empty room with its doors' and windows' clear boxes."""
     cells = plan.cells[room]

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING
 
 from internav_data.geometry import round_m
 from internav_data.houses.furnishing import RoomState, quarter_quaternion, room_state
-from internav_data.houses.groups import Place
+from internav_data.houses.groups import RoomContext
 from internav_data.houses.pieces import Picker, consistent
 from internav_data.houses.rules import RULES
-from internav_data.records import Purpose, Thing, generator
+from internav_data.records import Purpose, SceneObject, generator
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from internav_data.catalog import Catalogue
     from internav_data.houses.openings import Opening
-    from internav_data.houses.plan import Plan
+    from internav_data.houses.plan import FloorGrid
     from internav_data.houses.rules import Rule
 
 CERTAIN = 1.0
@@ -26,7 +26,7 @@ MOST = 4
 
 
 def furnish(
-    plan: Plan,
+    plan: FloorGrid,
     types: Sequence[str],
     openings: Sequence[Opening],
     ceiling_m: float,
@@ -35,9 +35,9 @@ def furnish(
     seed: int,
     scene: int,
     attempt: int,
-) -> tuple[Thing, ...]:
+) -> tuple[SceneObject, ...]:
     """Return the things of a house, by room and group."""
-    things: list[Thing] = []
+    things: list[SceneObject] = []
     for room, name in enumerate(types):
         state = room_state(plan, room, name, openings, ceiling_m)
         # Each room has numbers of its own: another room's luck does not change it.
@@ -47,7 +47,7 @@ def furnish(
     return tuple(things)
 
 
-def _groups(things: Sequence[Thing]) -> int:
+def _groups(things: Sequence[SceneObject]) -> int:
     return 1 + max((thing.group for thing in things), default=-1)
 
 
@@ -67,7 +67,7 @@ def _times(rule: Rule, picker: Picker, area_m2: float, density: float) -> int:
 
 def _furnish_room(state: RoomState, types: frozenset[str], picker: Picker, density: float) -> None:
     width, depth = float(state.inner[2] - state.inner[0]), float(state.inner[3] - state.inner[1])
-    place = Place(state.area_m2, state.short_m, max(width, depth), types)
+    place = RoomContext(state.area_m2, state.short_m, max(width, depth), types)
     for rule in RULES[state.type]:
         times = _times(rule, picker, state.area_m2, density)
         present = {item.asset.type for group, *_ in state.placed for item in group.items}
@@ -78,7 +78,7 @@ def _furnish_room(state: RoomState, types: frozenset[str], picker: Picker, densi
                 break
 
 
-def _try_rule(state: RoomState, rule: Rule, place: Place, picker: Picker) -> bool:
+def _try_rule(state: RoomState, rule: Rule, place: RoomContext, picker: Picker) -> bool:
     for group in rule.make(picker, place):
         if not consistent(picker, group):
             continue
@@ -92,9 +92,9 @@ def _try_rule(state: RoomState, rule: Rule, place: Place, picker: Picker) -> boo
     return False
 
 
-def _things(state: RoomState, first: int, first_group: int) -> list[Thing]:
+def _things(state: RoomState, first: int, first_group: int) -> list[SceneObject]:
     """Turn a room's groups into things with ids, in the order they were placed."""
-    out: list[Thing] = []
+    out: list[SceneObject] = []
     for number, (group, x, y, turn) in enumerate(state.placed):
         base = first + len(out)
         for item in group.items:
@@ -102,8 +102,8 @@ def _things(state: RoomState, first: int, first_group: int) -> list[Thing]:
                 turn
             ]
             out.append(
-                Thing(
-                    thing_id=first + len(out),
+                SceneObject(
+                    object_id=first + len(out),
                     asset_id=item.asset.asset_id,
                     type=item.asset.type,
                     room=state.room,

@@ -13,8 +13,8 @@ from internav_data.houses.pieces import (
     FACING_LEFT,
     FACING_RIGHT,
     Group,
-    Item,
     Picker,
+    PlacedAsset,
     against,
     in_front,
 )
@@ -32,7 +32,7 @@ EYE_LEVEL_M = 1.25
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class RoomContext:
     """What a maker may know of the room it furnishes."""
 
     area_m2: float
@@ -52,13 +52,13 @@ def within(low: float, high: float) -> Callable[[Asset], bool]:
     return lambda asset: low <= asset.size[0] <= high
 
 
-def _beside(item: Item, asset: Asset, side: int) -> Item:
+def _beside(item: PlacedAsset, asset: Asset, side: int) -> PlacedAsset:
     """Stand an asset against the wall beside another, left (-1) or right (1)."""
     x = item.x + side * (item.half[0] + asset.size[0] / 2.0 + SIDE_GAP_M)
     return against(asset, x)
 
 
-def bed(p: Picker, place: Place) -> list[Group]:
+def bed(p: Picker, place: RoomContext) -> list[Group]:
     """Make a bed with its head to the wall and a nightstand on either side."""
     double = place.area_m2 >= 11.5 and place.short_m >= 2.75  # noqa: PLR2004 - the stated minima
     asset = p.one("Bed", lambda a: (a.size[0] >= DOUBLE_BED_M) == double)
@@ -70,7 +70,7 @@ def bed(p: Picker, place: Place) -> list[Group]:
     foot = in_front(main, 0.45)
     plain = Group((main,), (foot,))
     stand = p.one("Nightstand", narrow(0.65))
-    lengthwise = Item(asset, 0.0, BACK_GAP_M + asset.size[0] / 2.0, FACING_RIGHT)
+    lengthwise = PlacedAsset(asset, 0.0, BACK_GAP_M + asset.size[0] / 2.0, FACING_RIGHT)
     corner = Group((lengthwise,), (in_front(lengthwise, 0.5, 0.5),))
     if stand is None:
         return [plain, corner, *_narrow_beds(p)]
@@ -91,16 +91,16 @@ def _narrow_beds(p: Picker) -> list[Group]:
     if asset is None:
         return []
     side = BACK_GAP_M + asset.size[0] / 2.0
-    turned = (Item(asset, 0.0, side, turn) for turn in (FACING_RIGHT, FACING_LEFT))
+    turned = (PlacedAsset(asset, 0.0, side, turn) for turn in (FACING_RIGHT, FACING_LEFT))
     return [Group((item,), (in_front(item, 0.4, 0.4),)) for item in (against(asset), *turned)]
 
 
 def _plain(
     *kinds: str, front: float = 0.3, share: float = 0.9
-) -> Callable[[Picker, Place], list[Group]]:
+) -> Callable[[Picker, RoomContext], list[Group]]:
     """One piece against a wall: any of some types."""
 
-    def make(p: Picker, place: Place) -> list[Group]:
+    def make(p: Picker, place: RoomContext) -> list[Group]:
         del place
         out: list[Group] = []
         start = int(float(p.rng.random()) * len(kinds))
@@ -139,7 +139,7 @@ shower = _plain("Shower", front=0.4, share=0.5)
 fridge = _plain("Fridge", front=0.6)
 
 
-def vanity(p: Picker, place: Place) -> list[Group]:
+def vanity(p: Picker, place: RoomContext) -> list[Group]:
     """Make a dressing table with a stool before it."""
     del place
     asset, seat = p.one("VanityTable"), p.one("Stool")
@@ -150,7 +150,7 @@ def vanity(p: Picker, place: Place) -> list[Group]:
     return [plain] if seat is None else [plain.with_items(p.tucked(top, seat, 0, 0.0)), plain]
 
 
-def side_table(p: Picker, place: Place) -> list[Group]:
+def side_table(p: Picker, place: RoomContext) -> list[Group]:
     """Make a small table against a wall, with something on it."""
     del place
     asset = p.one("SideTable")
@@ -165,14 +165,14 @@ def side_table(p: Picker, place: Place) -> list[Group]:
     return [group]
 
 
-def painting(p: Picker, place: Place) -> list[Group]:
+def painting(p: Picker, place: RoomContext) -> list[Group]:
     """Make a picture on the wall."""
     del place
     asset = p.one("Painting", narrow(1.3), any_size=True)
     return [Group((against(asset, z=EYE_LEVEL_M + 0.1),))] if asset else []
 
 
-def wall_mirror(p: Picker, place: Place) -> list[Group]:
+def wall_mirror(p: Picker, place: RoomContext) -> list[Group]:
     """Make a mirror on the wall."""
     del place
     asset = p.one("Mirror")
@@ -182,15 +182,15 @@ def wall_mirror(p: Picker, place: Place) -> list[Group]:
     return [Group((against(asset, z=round(hung, 2)),))]
 
 
-def rug(p: Picker, place: Place) -> list[Group]:
+def rug(p: Picker, place: RoomContext) -> list[Group]:
     """Make a rug on free floor."""
     asset = p.one(
         "Rug", lambda a: a.size[0] < 0.6 * place.long_m and a.size[1] < 0.6 * place.short_m
     )
-    return [Group((Item(asset, 0.0, 0.0, 0),))] if asset else []
+    return [Group((PlacedAsset(asset, 0.0, 0.0, 0),))] if asset else []
 
 
-def desk(p: Picker, place: Place) -> list[Group]:
+def desk(p: Picker, place: RoomContext) -> list[Group]:
     """Make a desk against the wall with its chair before it."""
     asset = p.one("Desk", narrow(max(1.2, 0.5 * place.long_m)), any_size=True)
     seat = p.one("OfficeChair") if p.chance(0.7) else p.one("Chair")
@@ -209,7 +209,7 @@ def desk(p: Picker, place: Place) -> list[Group]:
     return [group]
 
 
-def washbasin(p: Picker, place: Place) -> list[Group]:
+def washbasin(p: Picker, place: RoomContext) -> list[Group]:
     """Make a basin with a mirror over it."""
     del place
     glass = p.one("Mirror", narrow(0.9))
@@ -226,7 +226,7 @@ def washbasin(p: Picker, place: Place) -> list[Group]:
     return out
 
 
-def laundry(p: Picker, place: Place) -> list[Group]:
+def laundry(p: Picker, place: RoomContext) -> list[Group]:
     """Make washing machine and dryer side by side."""
     del place
     washer, dryer = p.one("WashingMachine"), p.one("ClothesDryer")

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from internav_data.houses.groups import narrow
-from internav_data.houses.pieces import FACING_WALL, Group, Item, Picker, against, in_front
+from internav_data.houses.pieces import FACING_WALL, Group, Picker, PlacedAsset, against, in_front
 
 if TYPE_CHECKING:
-    from internav_data.houses.groups import Place
+    from internav_data.houses.groups import RoomContext
     from internav_data.records import Asset
 
 SEAM_M = 0.008
@@ -23,7 +23,7 @@ def _run(p: Picker, kinds: tuple[str, ...], longest: float) -> Group | None:
     fixed: list[Asset | None] = [p.one(kind) if kind != "CounterTop" else None for kind in kinds]
     counters = kinds.count("CounterTop")
     spare = longest - sum(a.size[0] + SEAM_M for a in fixed if a is not None)
-    items: list[Item] = []
+    items: list[PlacedAsset] = []
     x = 0.0
     for kind, asset in zip(kinds, fixed, strict=True):
         piece = asset
@@ -71,7 +71,7 @@ _SHORT_RUNS: tuple[tuple[str, ...], ...] = (
 )
 
 
-def kitchen_run(p: Picker, place: Place) -> list[Group]:
+def kitchen_run(p: Picker, place: RoomContext) -> list[Group]:
     """Make everything one cooks with along one wall, as much as fits, then less."""
     start = 0 if place.area_m2 > 12 else 1  # noqa: PLR2004 - m², a roomy kitchen
     kinds = list(_RUNS[start:])
@@ -81,7 +81,7 @@ def kitchen_run(p: Picker, place: Place) -> list[Group]:
     return [_laid(p, run) for run in runs if run is not None]
 
 
-def short_run(p: Picker, place: Place) -> list[Group]:
+def short_run(p: Picker, place: RoomContext) -> list[Group]:
     """Make stove and sink where no whole run found room."""
     runs = [
         _run(p, k, length)
@@ -91,13 +91,13 @@ def short_run(p: Picker, place: Place) -> list[Group]:
     return [_laid(p, run) for run in runs if run is not None]
 
 
-def counter(p: Picker, place: Place) -> list[Group]:
+def counter(p: Picker, place: RoomContext) -> list[Group]:
     """Make another counter."""
     run = _run(p, ("CounterTop",), 0.6 * place.long_m)
     return [_laid(p, run)] if run is not None else []
 
 
-def sink_alone(p: Picker, place: Place) -> list[Group]:
+def sink_alone(p: Picker, place: RoomContext) -> list[Group]:
     """Make a sink by itself."""
     del place
     asset = p.one("Sink")
@@ -107,12 +107,12 @@ def sink_alone(p: Picker, place: Place) -> list[Group]:
     return [Group((item,), (in_front(item, 0.6),))]
 
 
-def island(p: Picker, place: Place) -> list[Group]:
+def island(p: Picker, place: RoomContext) -> list[Group]:
     """Make a free-standing counter with stools."""
     asset = p.one("KitchenIsland", lambda a: a.size[0] < 0.45 * place.long_m)
     if asset is None:
         return []
-    block = Item(asset, 0.0, 0.0, FACING_WALL)
+    block = PlacedAsset(asset, 0.0, 0.0, FACING_WALL)
     hx, hy = block.half
     around = (-hx - 0.8, -hy - 0.8, hx + 0.8, hy + 0.8)
     group = Group((block,), ())

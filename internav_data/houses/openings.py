@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from internav_data.houses.choice import FloorPlan
     from internav_data.houses.config import HouseConfig
-    from internav_data.houses.plan import Plan
+    from internav_data.houses.plan import FloorGrid
     from internav_data.records import DoorKind
 
 DOOR_HEIGHT_CM = 210
@@ -106,7 +106,7 @@ def _fitting(length: int, config: HouseConfig) -> tuple[DoorKind, int]:
 
 
 def _entrance(
-    plan: Plan, types: Sequence[str], config: HouseConfig, rng: Generator
+    plan: FloorGrid, types: Sequence[str], config: HouseConfig, rng: Generator
 ) -> Opening | None:
     """One closed door to the outside: at a hall's end if there is one."""
     width = 100 if config.preset == "paper" else 92

@@ -35,7 +35,7 @@ _BOXES: dict[tuple[str, str], Floats] = {}
 
 
 @dataclass(frozen=True, slots=True)
-class Item:
+class PlacedAsset:
     """An asset in a group's frame."""
 
     asset: Asset
@@ -57,7 +57,7 @@ class Item:
 class Group:
     """Things that belong together, and the boxes (n, 6) in front of them that stay clear."""
 
-    items: tuple[Item, ...]
+    items: tuple[PlacedAsset, ...]
     clear: tuple[tuple[float, float, float, float], ...] = ()
     related: bool = field(default=True)
 
@@ -96,7 +96,7 @@ class Group:
         """Extent along y."""
         return float(self.boxes[:, 3].max() - self.boxes[:, 1].min())
 
-    def with_items(self, *items: Item) -> Group:
+    def with_items(self, *items: PlacedAsset) -> Group:
         """Return the group with further items."""
         return Group((*self.items, *items), self.clear, self.related)
 
@@ -105,12 +105,14 @@ class Group:
         return Group(self.items, (*self.clear, *clear), self.related)
 
 
-def against(asset: Asset, x: float = 0.0, z: float = 0.0) -> Item:
+def against(asset: Asset, x: float = 0.0, z: float = 0.0) -> PlacedAsset:
     """Stand an asset with its back to the wall."""
-    return Item(asset, x, BACK_GAP_M + asset.size[1] / 2.0, FACING_ROOM, z)
+    return PlacedAsset(asset, x, BACK_GAP_M + asset.size[1] / 2.0, FACING_ROOM, z)
 
 
-def in_front(item: Item, depth: float, share: float = 1.0) -> tuple[float, float, float, float]:
+def in_front(
+    item: PlacedAsset, depth: float, share: float = 1.0
+) -> tuple[float, float, float, float]:
     """Box of some depth before an item that faces the room."""
     hx, hy = item.half
     return (item.x - hx * share, item.y + hy, item.x + hx * share, item.y + hy + depth)
@@ -143,7 +145,7 @@ class Picker:
         found = self.catalogue.of_type(kind)
         return min(found, key=lambda a: (a.size[0] * a.size[1], a.asset_id), default=None)
 
-    def parts(self, item: Item) -> Floats:
+    def parts(self, item: PlacedAsset) -> Floats:
         """Boxes around the parts of an item, (n, 6), in the group's frame."""
         key = (self.catalogue.digest, item.asset.asset_id)
         if key not in _BOXES:
@@ -159,10 +161,16 @@ class Picker:
         return out
 
     def resting(
-        self, below: Item, index: int, asset: Asset, dx: float, dy: float, turn: int = FACING_ROOM
-    ) -> Item | None:
+        self,
+        below: PlacedAsset,
+        index: int,
+        asset: Asset,
+        dx: float,
+        dy: float,
+        turn: int = FACING_ROOM,
+    ) -> PlacedAsset | None:
         """Stand an asset on an item, (dx, dy) from its middle; None where it finds no flat top."""
-        item = Item(asset, below.x + dx, below.y + dy, turn, support=index)
+        item = PlacedAsset(asset, below.x + dx, below.y + dy, turn, support=index)
         hx, hy = item.half
         parts = self.parts(below)
         over = (
@@ -185,7 +193,7 @@ class Picker:
         )
         return replace(item, z=top) if carries.any() else None
 
-    def tucked(self, table: Item, chair: Asset, side: int, along: float) -> Item:
+    def tucked(self, table: PlacedAsset, chair: Asset, side: int, along: float) -> PlacedAsset:
         """Push a chair under a table from a side (quarter turns from +y) as far as it goes.
 
         `along` is the offset from the table's middle along that side.
@@ -195,14 +203,14 @@ class Picker:
         turn = side % 4
         reach = (hy if dx == 0 else hx) + chair.size[1] / 2.0 + 0.03
         solid = self.parts(table)
-        best = Item(chair, 0.0, 0.0, turn)
+        best = PlacedAsset(chair, 0.0, 0.0, turn)
         # In steps of 4 cm, but the back of the chair stays outside.
         deepest = max(0.0, min(0.28, chair.size[1] - 0.22))
         for step in range(1 + int(deepest / 0.04)):
             offset = reach - 0.04 * step
             x = table.x + dx * offset + (along if dx == 0 else 0.0)
             y = table.y + dy * offset + (along if dy == 0 else 0.0)
-            trial = Item(chair, x, y, turn)
+            trial = PlacedAsset(chair, x, y, turn)
             if step > 0 and overlap(self.parts(trial), solid):
                 break
             best = trial

@@ -41,7 +41,7 @@ class Segment:
 
 
 @dataclass(frozen=True)
-class Plan:
+class FloorGrid:
     """A grid of cells: `owner[i][j]` is the room between xs[i], xs[i + 1] and ys[j], ys[j + 1]."""
 
     xs: tuple[int, ...]
@@ -49,7 +49,7 @@ class Plan:
     owner: tuple[tuple[int, ...], ...]
 
     @staticmethod
-    def of(rooms: Sequence[Iterable[Rect]]) -> Plan:
+    def of(rooms: Sequence[Iterable[Rect]]) -> FloorGrid:
         """Lay rooms, given as rectangles, on their common grid; later rooms win overlaps."""
         rooms = [list(rects) for rects in rooms]
         xs = sorted({x for rects in rooms for r in rects for x in (r[0], r[2])})
@@ -62,7 +62,7 @@ class Plan:
                 below, above = row[y0], row[y1]
                 for i in range(column[x0], column[x1]):
                     owner[i][below:above] = [room] * (above - below)
-        return Plan(tuple(xs), tuple(ys), tuple(tuple(cells) for cells in owner))
+        return FloorGrid(tuple(xs), tuple(ys), tuple(tuple(cells) for cells in owner))
 
     def at(self, i: int, j: int) -> int:
         """Owner of a cell; OUTSIDE beyond the grid."""

@@ -45,7 +45,7 @@ from internav_data.records.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from internav_data.houses.plan import Plan, Segment
+    from internav_data.houses.plan import FloorGrid, Segment
     from internav_data.records import DoorKind
 
 MOST_ROOMS = 40
@@ -190,7 +190,7 @@ def _room(name: object, names: Sequence[str], what: str) -> int:
 
 
 def _wall(
-    plan: Plan, rooms: tuple[int, int], at: tuple[int, int], low_high: tuple[int, int]
+    plan: FloorGrid, rooms: tuple[int, int], at: tuple[int, int], low_high: tuple[int, int]
 ) -> Segment | None:
     """Find the wall between two rooms that holds an opening."""
     before, after = low_high
@@ -205,7 +205,11 @@ def _wall(
 
 
 def _door(
-    entry: Mapping[str, Any], plan: Plan, names: Sequence[str], shift: tuple[int, int], number: int
+    entry: Mapping[str, Any],
+    plan: FloorGrid,
+    names: Sequence[str],
+    shift: tuple[int, int],
+    number: int,
 ) -> Opening:
     between = entry.get("between")
     what = f"door {number + 1}"
@@ -240,7 +244,11 @@ def _door(
 
 
 def _window(
-    entry: Mapping[str, Any], plan: Plan, names: Sequence[str], shift: tuple[int, int], number: int
+    entry: Mapping[str, Any],
+    plan: FloorGrid,
+    names: Sequence[str],
+    shift: tuple[int, int],
+    number: int,
 ) -> Opening:
     what = f"window {number + 1} of '{entry.get('room')}'"
     room = _room(entry.get("room"), names, what)

@@ -6,7 +6,7 @@ import itertools
 import math
 from typing import TYPE_CHECKING
 
-from internav_data.houses.plan import Plan
+from internav_data.houses.plan import FloorGrid
 from internav_data.houses.standards import HALF_WALL_CM
 from internav_data.records import OUTSIDE
 
@@ -98,7 +98,7 @@ def _covers(corners: Sequence[Corner], x: float, y: float) -> bool:
 
 def laid_out(
     polygons: Sequence[Sequence[Corner]], names: Sequence[str]
-) -> tuple[Plan, tuple[int, int]]:
+) -> tuple[FloorGrid, tuple[int, int]]:
     """Lay rooms on a grid; return the plan and how far it was moved (centimetres)."""
     left = min(x for corners in polygons for x, _ in corners) + HALF_WALL_CM
     low = min(y for corners in polygons for _, y in corners) + HALF_WALL_CM
@@ -120,12 +120,12 @@ def laid_out(
                 )
             if inside:
                 rooms[inside[0]].append((x0, y0, x1, y1))
-    plan = Plan.of(rooms)
+    plan = FloorGrid.of(rooms)
     _whole(plan, names)
     return plan, (left, low)
 
 
-def _whole(plan: Plan, names: Sequence[str]) -> None:
+def _whole(plan: FloorGrid, names: Sequence[str]) -> None:
     """Complain about gaps between rooms and about rooms too narrow to furnish."""
     for room, name in enumerate(names):
         x0, y0, x1, y1 = plan.main_rectangle(room)

@@ -12,7 +12,7 @@ from internav_data.houses import sitting as s
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from internav_data.houses.groups import Place
+    from internav_data.houses.groups import RoomContext
     from internav_data.houses.pieces import Group, Picker
 
 Prefer = Literal["corner", "centre", "sun", "any", "open"]
@@ -22,7 +22,7 @@ Prefer = Literal["corner", "centre", "sun", "any", "open"]
 class Rule:
     """One group that a type of room may have."""
 
-    make: Callable[[Picker, Place], list[Group]]
+    make: Callable[[Picker, RoomContext], list[Group]]
     prefer: Prefer = "any"
     """Where along the walls; `open` stands free."""
     share: float = 1.0

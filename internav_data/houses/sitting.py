@@ -11,19 +11,19 @@ from internav_data.houses.pieces import (
     FACING_RIGHT,
     FACING_WALL,
     Group,
-    Item,
     Picker,
+    PlacedAsset,
     against,
     in_front,
     overlap,
 )
 
 if TYPE_CHECKING:
-    from internav_data.houses.groups import Place
+    from internav_data.houses.groups import RoomContext
     from internav_data.records import Asset
 
 
-def seating(p: Picker, place: Place) -> list[Group]:
+def seating(p: Picker, place: RoomContext) -> list[Group]:
     """Make sofa facing a television, coffee table between, an armchair beside."""
     stand = p.one("TVStand")
     screen = p.one("Television", lambda a: stand is not None and a.size[0] <= stand.size[0] + 0.05)
@@ -41,7 +41,7 @@ def seating(p: Picker, place: Place) -> list[Group]:
     return out
 
 
-def _viewing_distances(place: Place, stand: Asset, sofa: Asset) -> list[float]:
+def _viewing_distances(place: RoomContext, stand: Asset, sofa: Asset) -> list[float]:
     """Gaps between television stand and sofa: to the opposite wall if that is near, else nearer."""
     gaps = []
     for span in (place.short_m, place.long_m):
@@ -51,25 +51,25 @@ def _viewing_distances(place: Place, stand: Asset, sofa: Asset) -> list[float]:
     return [*gaps, 2.4, 1.9, 1.5]
 
 
-def _around(p: Picker, screens: tuple[Item, ...], sofa: Asset, gap: float) -> list[Group]:
+def _around(p: Picker, screens: tuple[PlacedAsset, ...], sofa: Asset, gap: float) -> list[Group]:
     """Make sofa across from a screen, with and without what stands between and beside."""
     base = screens[0]
     front = base.y + base.half[1]
-    seat = Item(sofa, base.x, front + gap + sofa.size[1] / 2.0, FACING_WALL)
+    seat = PlacedAsset(sofa, base.x, front + gap + sofa.size[1] / 2.0, FACING_WALL)
     lane = (base.x - 0.4, front, base.x + 0.4, front + 0.5)
     plain = Group((*screens, seat), (lane,))
     coffee = p.one("CoffeeTable", lambda a: a.size[1] <= gap - 1.1 and a.size[0] <= sofa.size[0])
     if coffee is None:
         return [plain]
     middle = front + gap - 0.42 - coffee.size[1] / 2.0
-    table = Item(coffee, base.x, middle, FACING_WALL)
+    table = PlacedAsset(coffee, base.x, middle, FACING_WALL)
     with_table = plain.with_items(table)
     room = 2.0 * min(front + gap - 0.06 - middle, middle - front - 0.06)
     carpet = p.one(
         "Rug", lambda a: coffee.size[1] + 0.1 <= a.size[1] <= room and coffee.size[0] <= a.size[0]
     )
     if carpet is not None and p.chance(0.7):
-        lying = Item(carpet, base.x, middle, FACING_WALL)
+        lying = PlacedAsset(carpet, base.x, middle, FACING_WALL)
         on_it = p.resting(lying, len(plain.items), coffee, 0.0, 0.0, FACING_WALL)
         if on_it is not None:
             with_table = plain.with_items(lying, on_it)
@@ -78,12 +78,14 @@ def _around(p: Picker, screens: tuple[Item, ...], sofa: Asset, gap: float) -> li
         return [with_table, plain]
     side = 1 if p.chance(0.5) else -1
     away = sofa.size[0] / 2.0 + 0.15 + chair.size[1] / 2.0
-    beside = Item(chair, base.x + side * away, middle, FACING_LEFT if side > 0 else FACING_RIGHT)
+    beside = PlacedAsset(
+        chair, base.x + side * away, middle, FACING_LEFT if side > 0 else FACING_RIGHT
+    )
     full = with_table.with_items(beside)
     return [full, with_table, plain] if p.chance(0.6) else [with_table, plain]
 
 
-def sofa_alone(p: Picker, place: Place) -> list[Group]:
+def sofa_alone(p: Picker, place: RoomContext) -> list[Group]:
     """Make a sofa with its back to the wall."""
     asset = p.one("Sofa", narrow(max(1.6, 0.6 * place.long_m)), any_size=True)
     if asset is None:
@@ -95,7 +97,7 @@ def sofa_alone(p: Picker, place: Place) -> list[Group]:
     return out
 
 
-def television(p: Picker, place: Place) -> list[Group]:
+def television(p: Picker, place: RoomContext) -> list[Group]:
     """Make a television on its stand."""
     del place
     stand, screen = p.one("TVStand"), p.one("Television")
@@ -107,7 +109,7 @@ def television(p: Picker, place: Place) -> list[Group]:
     return [Group(items, (in_front(base, 0.5),))]
 
 
-def dining(p: Picker, place: Place) -> list[Group]:
+def dining(p: Picker, place: RoomContext) -> list[Group]:
     """Make a table with chairs pushed in, for as many as the room can take."""
     largest = 1.1 if place.area_m2 < 12 else 1.6 if place.area_m2 < 18 else 2.9  # noqa: PLR2004
     chair = p.one("Chair")
@@ -115,13 +117,13 @@ def dining(p: Picker, place: Place) -> list[Group]:
     for limit in (largest, 1.5, 1.0):
         asset = p.one("DiningTable", within(0.6 * limit, limit), any_size=True)
         if asset is not None and limit <= largest:
-            out.append(_seated(p, Item(asset, 0.0, 0.0, FACING_WALL), chair))
+            out.append(_seated(p, PlacedAsset(asset, 0.0, 0.0, FACING_WALL), chair))
     # A smaller table with all its chairs comes before a large one with few.
     many = [group for table in out for group in table[:-2]]
     return many + [group for table in out for group in table[-2:]]
 
 
-def _seated(p: Picker, table: Item, chair: Asset | None) -> list[Group]:
+def _seated(p: Picker, table: PlacedAsset, chair: Asset | None) -> list[Group]:
     """Seat people around a table, many first."""
     plain = Group((table,))
     if chair is None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from internav_data.records import Preset
+    from internav_data.records import HousePreset
 
 WALL_CM = 12
 """Thickness of every wall, around its centre line."""
@@ -84,7 +84,7 @@ _REALISTIC: Mapping[str, Standard] = {
     "storage": Standard(3.4, 2.2, 7.0, 1.3, 2.4),
     "studio": Standard(30.0, 22.0, 45.0, 3.6, 1.7),
 }
-STANDARDS: Mapping[Preset, Mapping[str, Standard]] = {"paper": _PAPER, "realistic": _REALISTIC}
+STANDARDS: Mapping[HousePreset, Mapping[str, Standard]] = {"paper": _PAPER, "realistic": _REALISTIC}
 
 DOUBLE_BEDROOM = Standard(13.0, 11.6, 17.0, 2.76, 1.6)
 """The realistic bedroom for two."""

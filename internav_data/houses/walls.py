@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from internav_data.houses.openings import Opening
-    from internav_data.houses.plan import Plan
+    from internav_data.houses.plan import FloorGrid
 
 _Run = tuple[int, int, int]
 """Line, low end, high end: centimetres."""
 
 
-def _runs(plan: Plan, *, along_x: bool) -> list[_Run]:
+def _runs(plan: FloorGrid, *, along_x: bool) -> list[_Run]:
     """Longest straight walls, whatever rooms lie beside them."""
     out: list[_Run] = []
     for segment in plan.segments:
@@ -81,7 +81,7 @@ def _pieces(
     return out
 
 
-def build_walls(plan: Plan, openings: Sequence[Opening], ceiling_cm: int) -> tuple[Wall, ...]:
+def build_walls(plan: FloorGrid, openings: Sequence[Opening], ceiling_cm: int) -> tuple[Wall, ...]:
     """Return the boxes of all walls: those along x own the corners."""
     along_x = _runs(plan, along_x=True)
     out: list[Wall] = []

@@ -35,7 +35,7 @@ SIDES: Final = 32
 """Sides of the prism round the agent's column: it stands out by 0.5 % of the radius at most."""
 
 
-class Outline(NamedTuple):
+class ConvexPrisms(NamedTuple):
     """The convex parts of a thing where it lies, as plans and heights, metres.
 
     Shapes: vertices (n, 2), counter-clockwise plan after plan; starts (parts + 1,) int64 into
@@ -48,23 +48,23 @@ class Outline(NamedTuple):
 
 
 @lru_cache(maxsize=8192)
-def outline_of(asset: Asset, pose: Pose) -> Outline:
+def outline_of(asset: Asset, pose: Pose) -> ConvexPrisms:
     """Outline of a thing where it lies; cached, read-only."""
     corners, starts = asset_corners(asset)
     placed = transform(corners, pose)
     boxes = np.empty((len(starts), 6))
     _boxes(placed, starts, boxes)
     vertices, firsts = _plans(placed, starts)
-    return Outline(vertices, firsts, boxes[:-1].copy())
+    return ConvexPrisms(vertices, firsts, boxes[:-1].copy())
 
 
-def outline_of_column(x: float, y: float, radius: float, low: float, high: float) -> Outline:
+def outline_of_column(x: float, y: float, radius: float, low: float, high: float) -> ConvexPrisms:
     """Outline of the prism round an upright cylinder, metres."""
     out = radius / math.cos(math.pi / SIDES)
     angles = [2.0 * math.pi * k / SIDES for k in range(SIDES)]
     vertices = [(x + out * math.cos(a), y + out * math.sin(a)) for a in angles]
     box = [x + radius, y + radius, radius - x, radius - y, high, -low]
-    return Outline(np.array(vertices), np.array([0, SIDES], dtype=np.int64), np.array([box]))
+    return ConvexPrisms(np.array(vertices), np.array([0, SIDES], dtype=np.int64), np.array([box]))
 
 
 @njit(cache=True)
@@ -189,7 +189,7 @@ def _met(
 
 
 def met_on_path(
-    asset: Asset, path: bytes, frame: Frame, others: Sequence[Outline], margin: float
+    asset: Asset, path: bytes, frame: Frame, others: Sequence[ConvexPrisms], margin: float
 ) -> list[bool]:
     """Which of some outlines a body comes within a margin of on its path.
 

@@ -15,7 +15,7 @@ from internav_data.records.agent import CLEARANCE_M
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from internav_data.world import Item, Stage, World
+    from internav_data.world import HouseModel, MovableObject, World
 
     Costs = NDArray[np.int32]
     Ints = NDArray[np.int64]
@@ -33,7 +33,7 @@ EVERYTHING: Final = (1 << THINGS_AT_MOST) - 1
 
 
 @lru_cache(maxsize=8)
-def _closed(stage: Stage) -> Flags:
+def _closed(stage: HouseModel) -> Flags:
     """(3, nodes) uint8: what is closed with every movable thing away; cached, read-only."""
     nx, ny = stage.lattice.shape
     blockers = np.zeros((3, nx, ny), dtype=np.int32)
@@ -46,7 +46,7 @@ def _closed(stage: Stage) -> Flags:
 
 
 @lru_cache(maxsize=2048)
-def _marks(item: Item, nx: int, ny: int) -> Ints:
+def _marks(item: MovableObject, nx: int, ny: int) -> Ints:
     """Which nodes and edges a thing blocks, as indices into a flat (3, nx, ny)."""
     blockers = np.zeros((3, nx, ny), dtype=np.int32)
     plan = item.footprint
@@ -55,7 +55,7 @@ def _marks(item: Item, nx: int, ny: int) -> Ints:
 
 
 @dataclass(frozen=True, slots=True)
-class Ground:
+class PlanningProblem:
     """A search's fixed part: which things have a bit, and what is closed for good."""
 
     ny: int
@@ -68,7 +68,7 @@ class Ground:
     """The poses at the goal."""
 
     @staticmethod
-    def of(world: World) -> Ground:
+    def of(world: World) -> PlanningProblem:
         """Gather what no action of a world can change."""
         nx, ny = world.stage.lattice.shape
         movable: list[int] = []
@@ -89,7 +89,7 @@ class Ground:
             flat[_marks(world.items[k], nx, ny)] = 1
         goal = 4 * (world.goal[0] * ny + world.goal[1])
         goals = np.arange(goal, goal + 4, dtype=np.int64)
-        return Ground(ny, (nx, ny), fixed, tuple(ranked[:THINGS_AT_MOST]), goals)
+        return PlanningProblem(ny, (nx, ny), fixed, tuple(ranked[:THINGS_AT_MOST]), goals)
 
     def masks(self, world: World) -> Ints:
         """(3, nodes) int64: who blocks what, as things lie."""

@@ -25,7 +25,7 @@ import numpy as np
 
 from internav_data.navigation import SPACING_M
 from internav_data.planner.cost_to_go import FAR, sightings
-from internav_data.planner.problem import EVERYTHING, PICK_PRICE, Ground
+from internav_data.planner.problem import EVERYTHING, PICK_PRICE, PlanningProblem
 from internav_data.planner.push_heuristic import clearing, marks_on
 from internav_data.records import Expert
 from internav_data.world import Action, World
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
     from internav_data.physics import PushModel
     from internav_data.records import Asset, Episode, Pose
-    from internav_data.world import Stage
+    from internav_data.world import HouseModel
 
 
 ALIKE_M: Final = 0.05
@@ -75,7 +75,7 @@ class State:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Visit:
+class SearchNode:
     """A world to look at, some things taken as fixed (bits), and the field of costs for that."""
 
     state: State
@@ -84,7 +84,7 @@ class Visit:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Try:
+class Candidate:
     """An interaction to ask of the world, from a pose, and what its world would begin with."""
 
     state: State
@@ -93,7 +93,7 @@ class Try:
     """Index into HORIZONS_DEG."""
     action: Action
     back: Costs
-    spare: Try | None = None
+    spare: Candidate | None = None
     """The same from another node, where the agent may be less in the way."""
     promise: int = 0
     last: tuple[int, int] = (-1, -1)
@@ -187,13 +187,13 @@ def plan(world: World, limit: int) -> tuple[int, ...] | None:
 
 class _Search:
     def __init__(self, world: World, limit: int) -> None:
-        self.ground = Ground.of(world)
+        self.ground = PlanningProblem.of(world)
         self.best: tuple[int, ...] | None = None
         self.bound = limit + 1
         """A plan has to be shorter than this."""
         self.tries_left = TRIES
         self.asked_left = ASKED
-        self.queue: list[tuple[int, int, int, Visit | Try]] = []
+        self.queue: list[tuple[int, int, int, SearchNode | Candidate]] = []
         self.entries = 0
         self.known: dict[tuple[object, ...], int] = {}
         self._enter(world.copy(), ())
@@ -205,13 +205,13 @@ class _Search:
             promise, _, _, entry = heappop(self.queue)
             if promise >= self.bound or (self.best and promise > self.bound * ENOUGH):
                 break
-            if isinstance(entry, Visit):
+            if isinstance(entry, SearchNode):
                 self._visit(entry, promise)
             else:
                 self._attempt(entry)
         return self.best
 
-    def _push(self, promise: int, rank: int, entry: Visit | Try) -> None:
+    def _push(self, promise: int, rank: int, entry: SearchNode | Candidate) -> None:
         if promise < self.bound:
             heappush(self.queue, (promise, rank, self.entries, entry))
             self.entries += 1
@@ -242,9 +242,9 @@ class _Search:
         costs = self.ground.costs(state.masks, banned, state.prices, here)
         ahead = int(costs[here])
         if ahead < FAR:
-            self._push(state.spent + ahead + 1 + state.doubt, 0, Visit(state, banned, costs))
+            self._push(state.spent + ahead + 1 + state.doubt, 0, SearchNode(state, banned, costs))
 
-    def _visit(self, visit: Visit, promise: int) -> None:
+    def _visit(self, visit: SearchNode, promise: int) -> None:
         state, ground = visit.state, self.ground
         pose = ground.pose(state.world)
         poses, entered = ground.way(state.masks, visit.banned, state.prices, visit.costs, pose)
@@ -288,7 +288,7 @@ class _Search:
                 self.tries_left = min(self.tries_left, TRIES_MORE)
             self.best, self.bound = actions, len(actions)
 
-    def _propose(self, visit: Visit, bit: int, reach: Costs, back: Costs, way: Ints) -> None:
+    def _propose(self, visit: SearchNode, bit: int, reach: Costs, back: Costs, way: Ints) -> None:
         """Propose to push a thing, or to pick it up, from the cheapest poses that see it."""
         state, ground = visit.state, self.ground
         thing = ground.things[bit]
@@ -341,11 +341,13 @@ class _Search:
                 if last != state.last and not clears[last[1]]:
                     doubt += UNLIKELY
             promise = state.spent + cost + 1 + doubt
-            entry = Try(state, pose, horizon, action, back, entry, promise, last, doubt)
+            entry = Candidate(state, pose, horizon, action, back, entry, promise, last, doubt)
         if entry is not None:
             self._push(entry.promise, _RANKS[action], entry)
 
-    def _propose_drops(self, visit: Visit, way: Sequence[int], reach: Costs, back: Costs) -> None:
+    def _propose_drops(
+        self, visit: SearchNode, way: Sequence[int], reach: Costs, back: Costs
+    ) -> None:
         """Propose to empty the hand on the way to the next thing to pick up, in any direction."""
         state, ground = visit.state, self.ground
         prices = state.prices.copy()
@@ -358,10 +360,10 @@ class _Search:
         for node in nodes:
             for pose in range(4 * node, 4 * node + 4):
                 cost = int(reach[pose]) + int(after[pose]) + 2 + state.doubt
-                entry = Try(state, pose, horizon, Action.DROP, back)
+                entry = Candidate(state, pose, horizon, Action.DROP, back)
                 self._push(state.spent + cost, _RANKS[Action.DROP], entry)
 
-    def _attempt(self, entry: Try) -> None:
+    def _attempt(self, entry: Candidate) -> None:
         """Ask the world; where it works, go on from there."""
         state, ground = entry.state, self.ground
         if entry.action in PUSH_TURNS and state.world.crowd(*entry.last) > CROWD:
@@ -413,7 +415,7 @@ def solve(world: World, limit: int = STEPS_AT_MOST) -> Expert | None:
 
 
 def expert_of(
-    stage: Stage,
+    stage: HouseModel,
     obstacles: Iterable[tuple[Asset, Pose]],
     start: tuple[int, int, int],
     goal: tuple[int, int],
@@ -442,7 +444,7 @@ def expert_of(
 
 
 def expert_of_episode(
-    stage: Stage, episode: Episode, assets: Mapping[str, Asset], model: PushModel = "force"
+    stage: HouseModel, episode: Episode, assets: Mapping[str, Asset], model: PushModel = "force"
 ) -> Expert | None:
     """Solve an episode.
 

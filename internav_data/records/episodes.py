@@ -54,9 +54,9 @@ class Outcome:
     """push_east, push_north, push_west, push_south (world directions +x, +y, -x, -y) or pick."""
     success: bool
     displacement_m: float
-    steps: int | None
+    path_steps_after: int | None
     """Lattice distance to the goal afterwards; None when cut off."""
-    way_m: float | None
+    path_m_after: float | None
     """Any-angle distance to the goal afterwards; None when cut off."""
     opened: bool
     seconds: float
@@ -128,22 +128,22 @@ class Episode:
     room_count: int
     mode: Mode
     sealed: bool
-    """No way for the agent's disc, on the lattice or off it: `way_m` is None."""
-    rooms_on_way: int
+    """No way for the agent's disc, on the lattice or off it: `obstructed_path_m` is None."""
+    rooms_on_path: int
     obstacle_count: int
-    clear_m: float
-    clear_steps: int
-    way_m: float | None
-    steps: int | None
+    shortest_path_m: float
+    shortest_path_steps: int
+    obstructed_path_m: float | None
+    obstructed_path_steps: int | None
     start: Start
     goal: Goal
     room_paths: tuple[tuple[int, ...], ...]
     """Simple room paths, shortest first (by number of rooms, then room ids), at most 64."""
-    room_paths_cut: bool
+    room_paths_truncated: bool
     """There were more than 64 room paths."""
     node_paths: tuple[NodePath, ...]
     """At most 64, in the order of `room_paths`."""
-    node_paths_cut: bool
+    node_paths_truncated: bool
     obstacles: tuple[Obstacle, ...]
     expert: Expert | None
     physics: Physics

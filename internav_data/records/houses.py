@@ -11,7 +11,7 @@ from internav_data.records.poses import Pose, Vec2
 
 Split = Literal["train", "val", "test"]
 DoorKind = Literal["opening", "doorway", "single", "wide", "double", "entrance"]
-Preset = Literal["paper", "realistic"]
+HousePreset = Literal["paper", "realistic"]
 
 OUTSIDE = -1
 """Room id of the world outside the house."""
@@ -77,10 +77,10 @@ class Wall:
 
 
 @dataclass(frozen=True, slots=True)
-class Thing:
+class SceneObject:
     """A piece of furniture where it stands."""
 
-    thing_id: int
+    object_id: int
     asset_id: str
     type: str
     room: int
@@ -91,7 +91,7 @@ class Thing:
     group: int
     """Things of one group belong together (table and chairs); -1 for none."""
     support: int
-    """thing_id it stands on, -1 for the floor."""
+    """object_id it stands on, -1 for the floor."""
 
     @property
     def pose(self) -> Pose:
@@ -125,7 +125,7 @@ class House:
     doors: tuple[Door, ...]
     windows: tuple[Window, ...]
     walls: tuple[Wall, ...]
-    things: tuple[Thing, ...]
+    objects: tuple[SceneObject, ...]
     materials: tuple[Material, ...]
     room_graph: tuple[tuple[int, int], ...]
     """Pairs of rooms joined by at least one open door, ascending."""

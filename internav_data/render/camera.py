@@ -1,8 +1,8 @@
 """What the agent sees: colour, depth and instance ids, by a rasteriser on the processor.
 
-A `Scenery` is made once for each house, `Props` say where its things and an episode's obstacles
-are now, a `View` adds an eye, and a `Camera` draws any number of views at once. A picture depends
-on its own view alone: not on the batch, on what was drawn before, or on the process.
+A `StaticScene` is made once for each house, `Props` say where its things and an episode's obstacles
+are now, a `CameraView` adds an eye, and a `Camera` draws any number of views at once. A picture
+depends on its own view alone: not on the batch, on what was drawn before, or on the process.
 
 Instance ids (int32):
 
@@ -13,7 +13,7 @@ Instance ids (int32):
 -3     wall: walls, lintels, breasts and the casings painted on them
 -4     leaf of a closed door
 -5     window
-1 + k  instance k of the props: thing k of the house for k < len(house.things), then the obstacles
+1 + k  instance k of the props: thing k of the house for k < len(house.objects), then the obstacles
 ====== ==========================================================
 """
 
@@ -58,7 +58,7 @@ class Frames(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Scenery:
+class StaticScene:
     """What never moves in a house: made once, shared by all views of it."""
 
     house: House
@@ -72,14 +72,14 @@ class Scenery:
     def props(self, obstacles: Iterable[tuple[Asset, Pose]] = ()) -> Props:
         """Return the house's things where they stand, then some obstacles."""
         assets = self.house.assets
-        things = [(assets[t.asset_id], t.pose) for t in self.house.things]
+        things = [(assets[t.asset_id], t.pose) for t in self.house.objects]
         return Props([*things, *obstacles])
 
 
 class Props:
     """Where everything that stands in a house is now; cheap to change between pictures.
 
-    Instance k is thing k of the house, or obstacle k - len(house.things). Its id is 1 + k. The
+    Instance k is thing k of the house, or obstacle k - len(house.objects). Its id is 1 + k. The
     arrays `models` (n,), `poses` (n, 12) and `present` (n,) are what the kernels read.
     """
 
@@ -117,10 +117,10 @@ class Props:
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class CameraView:
     """An eye in a house."""
 
-    scenery: Scenery
+    scenery: StaticScene
     props: Props
     x: float
     y: float
@@ -160,7 +160,7 @@ class Camera:
             np.zeros((*shape, 3), np.uint8), np.zeros(shape, np.float32), np.zeros(shape, np.int32)
         )
 
-    def render(self, views: Sequence[View], out: Frames | None = None) -> Frames:
+    def render(self, views: Sequence[CameraView], out: Frames | None = None) -> Frames:
         """Draw views into `out` (its first len(views) pictures) or into new arrays."""
         target = self.frames(len(views)) if out is None else out
         shape = (self.size, self.size)
@@ -175,7 +175,7 @@ class Camera:
 
     def _draw(
         self,
-        view: View,
+        view: CameraView,
         rgb: NDArray[np.uint8],
         depth: NDArray[np.float32],
         ids: NDArray[np.int32],

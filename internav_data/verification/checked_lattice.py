@@ -40,7 +40,7 @@ class Free:
     edges: Bools
 
 
-class Ground:
+class CheckedLattice:
     """The lattice of one house: free nodes and edges without obstacles.
 
     Nodes are numbered i * columns + j; node (i, j) lies at (i, j) * 0.25 m.

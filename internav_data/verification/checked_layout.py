@@ -13,7 +13,7 @@ import shapely
 from shapely import Point, Polygon, box
 
 from internav_data.records import OUTSIDE
-from internav_data.verification.checked_lattice import KEEP_M, Ground
+from internav_data.verification.checked_lattice import KEEP_M, CheckedLattice
 from internav_data.verification.portals import Portals
 from internav_data.verification.shapes import AGENT_HEIGHT_M, STEP_OVER_M
 from internav_data.verification.ways import COARSE, FINE, Sight, grown
@@ -32,7 +32,7 @@ MOST_PATHS = 64
 RoomPaths = tuple[tuple[int, ...], ...]
 
 
-class Site:
+class CheckedLayout:
     """A house, its footprints, its lattice and its visibility graph without obstacles."""
 
     def __init__(
@@ -49,17 +49,17 @@ class Site:
         ]
         known = prints or {}
         self.prints: dict[int, list[Geometry]] = {
-            t.thing_id: known.get(t.thing_id) or shapes.footprint(t.asset_id, t.pose)
-            for t in house.things
+            t.object_id: known.get(t.object_id) or shapes.footprint(t.asset_id, t.pose)
+            for t in house.objects
         }
         self.blockers = self.walls + [plan for plans in self.prints.values() for plan in plans]
-        self.ground = Ground(self.blockers, self.outline)
+        self.ground = CheckedLattice(self.blockers, self.outline)
         self._room_paths: dict[tuple[int, int], tuple[RoomPaths, bool]] = {}
 
-    def without(self, gone: frozenset[int]) -> Site:
+    def without(self, gone: frozenset[int]) -> CheckedLayout:
         """Return the house without some of its things (ids)."""
-        things = tuple(t for t in self.house.things if t.thing_id not in gone)
-        return Site(replace(self.house, things=things), self.shapes, self.prints)
+        things = tuple(t for t in self.house.objects if t.object_id not in gone)
+        return CheckedLayout(replace(self.house, objects=things), self.shapes, self.prints)
 
     @cached_property
     def components(self) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from shapely import Geometry
 
     from internav_data.records import Episode, Goal, Start
-    from internav_data.verification.checked_layout import Site
-    from internav_data.verification.findings import Collector
+    from internav_data.verification.checked_layout import CheckedLayout
+    from internav_data.verification.findings import FindingCollector
 
 LEAST_CLEAR_M = 2.0
 ROUNDED_M = 1e-4
@@ -24,7 +24,9 @@ ROUNDED_M = 1e-4
 YAWS_DEG = (0, 90, 180, 270)
 
 
-def check_episode(site: Site, episode: Episode, report: Collector, *, exact: bool) -> bool:
+def check_episode(
+    site: CheckedLayout, episode: Episode, report: FindingCollector, *, exact: bool
+) -> bool:
     """Judge every predicate of one episode; `exact` adds the finely cut visibility graph.
 
     Returns
@@ -47,7 +49,7 @@ def check_episode(site: Site, episode: Episode, report: Collector, *, exact: boo
 class _Judge:
     """One episode before its predicates."""
 
-    def __init__(self, site: Site, episode: Episode, report: Collector) -> None:
+    def __init__(self, site: CheckedLayout, episode: Episode, report: FindingCollector) -> None:
         self.site = site
         self.episode = episode
         self.report = report
@@ -111,13 +113,17 @@ class _Judge:
         ends = (episode.start.room, episode.goal.room)
         paths, cut = self.site.room_paths(*ends)
         self.expect(episode.room_paths == paths, "room-paths", paths, episode.room_paths)
-        self.expect(episode.room_paths_cut == cut, "room-paths-cut", cut, episode.room_paths_cut)
+        self.expect(
+            episode.room_paths_truncated == cut, "room-paths-cut", cut, episode.room_paths_truncated
+        )
         least = len(paths[0]) if paths else 0
-        self.expect(episode.rooms_on_way == least, "rooms-on-way", least, episode.rooms_on_way)
+        self.expect(episode.rooms_on_path == least, "rooms-on-way", least, episode.rooms_on_path)
         doors, cut = self.site.door_paths(*ends)
         stored = tuple(path.doors for path in episode.node_paths)
         self.expect(stored == doors, "node-paths", doors, stored)
-        self.expect(episode.node_paths_cut == cut, "node-paths-cut", cut, episode.node_paths_cut)
+        self.expect(
+            episode.node_paths_truncated == cut, "node-paths-cut", cut, episode.node_paths_truncated
+        )
         centres = {door.door_id: (door.x, door.y) for door in self.site.house.doors}
         for path in episode.node_paths:
             if not set(path.doors) <= set(centres):
@@ -134,8 +140,12 @@ class _Judge:
             self.expect(free.nodes[node], f"{name}-uncovered", "no obstacle over it", "one")
         found = site.ground.distances(self.goal, free)[self.start]
         steps = int(found) if math.isfinite(found) else None
-        self.expect(episode.clear_steps == clear, "clear-steps", clear, episode.clear_steps)
-        self.expect(episode.steps == steps, "steps", steps, episode.steps)
+        self.expect(
+            episode.shortest_path_steps == clear, "clear-steps", clear, episode.shortest_path_steps
+        )
+        self.expect(
+            episode.obstructed_path_steps == steps, "steps", steps, episode.obstructed_path_steps
+        )
         if episode.mode == "blocked":
             self.expect(steps is None, "blocked", "no way on the lattice", f"{steps} steps")
         else:
@@ -147,26 +157,39 @@ class _Judge:
         episode, site = self.episode, self.site
         straight = math.dist(self.from_xy, self.to_xy)
         self.expect(
-            episode.clear_m >= LEAST_CLEAR_M, "clear-least", f"{LEAST_CLEAR_M} m", episode.clear_m
+            episode.shortest_path_m >= LEAST_CLEAR_M,
+            "clear-least",
+            f"{LEAST_CLEAR_M} m",
+            episode.shortest_path_m,
         )
-        self._bounds("clear-m", episode.clear_m, straight, episode.clear_steps)
+        self._bounds("clear-m", episode.shortest_path_m, straight, episode.shortest_path_steps)
         self.expect(
-            episode.sealed == (episode.way_m is None), "sealed-way", episode.sealed, episode.way_m
+            episode.sealed == (episode.obstructed_path_m is None),
+            "sealed-way",
+            episode.sealed,
+            episode.obstructed_path_m,
         )
         clear = Between(site, self.from_xy, self.to_xy)
-        agrees = clear.agrees(episode.clear_m)
-        found = episode.clear_m if agrees else f"{clear.length():.4f} m"
-        self.expect(agrees, "clear-m", found, episode.clear_m)
+        agrees = clear.agrees(episode.shortest_path_m)
+        found = episode.shortest_path_m if agrees else f"{clear.length():.4f} m"
+        self.expect(agrees, "clear-m", found, episode.shortest_path_m)
         way = Between(site, self.from_xy, self.to_xy, taken)
-        if episode.way_m is None:
+        if episode.obstructed_path_m is None:
             shut = not way.connected(stated=False)
             self.expect(shut, "sealed", "not sealed: the disc can pass", "sealed")
         else:
-            self._bounds("way-m", episode.way_m, episode.clear_m, episode.steps)
-            self._open_way(way, episode.way_m)
+            self._bounds(
+                "way-m",
+                episode.obstructed_path_m,
+                episode.shortest_path_m,
+                episode.obstructed_path_steps,
+            )
+            self._open_way(way, episode.obstructed_path_m)
         if exact:
-            close = clear.agrees_exactly(episode.clear_m)
-            self.expect(close, "clear-m-exact", "the finely cut graph's length", episode.clear_m)
+            close = clear.agrees_exactly(episode.shortest_path_m)
+            self.expect(
+                close, "clear-m-exact", "the finely cut graph's length", episode.shortest_path_m
+            )
 
     def _bounds(self, name: str, length: float, least: float, steps: int | None) -> None:
         low = length >= least - ROUNDED_M

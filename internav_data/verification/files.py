@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 from typing import TYPE_CHECKING
 
-from internav_data.dataset import TABLES, logical_digest, read_manifest, read_table
+from internav_data.dataset import TABLES, logical_digest, read_manifest
 from internav_data.dataset.manifest import MANIFEST
+from internav_data.dataset.parquet import read_as_written
 from internav_data.records.errors import CorruptDataError, InternavError, UsageError
-from internav_data.verification.findings import Collector
+from internav_data.verification.findings import FindingCollector
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 BLOCK_BYTES = 1 << 20
 
 
-def check_manifest(root: Path, report: Collector) -> Manifest | None:
+def check_manifest(root: Path, report: FindingCollector) -> Manifest | None:
     """Judge the manifest; None where it cannot be read.
 
     Raises
@@ -43,7 +44,7 @@ def check_manifest(root: Path, report: Collector) -> Manifest | None:
     return manifest
 
 
-def check_listing(root: Path, manifest: Manifest, report: Collector) -> None:
+def check_listing(root: Path, manifest: Manifest, report: FindingCollector) -> None:
     """Judge what lies in `data/`: exactly the files that the manifest names, and its counts."""
     listed = [file.path for file in manifest.files]
     report.file = MANIFEST
@@ -65,9 +66,9 @@ def check_listing(root: Path, manifest: Manifest, report: Collector) -> None:
         report.expect(name in listed, "files.unlisted", "only files of the manifest", "another")
 
 
-def check_file(root: Path, file: DataFile) -> Collector:
+def check_file(root: Path, file: DataFile) -> FindingCollector:
     """Judge one Parquet file: bytes, hashes, rows, page checksums."""
-    report = Collector(file.path)
+    report = FindingCollector(file.path)
     report.counts["files"] += 1
     path = root / file.path
     if not report.expect(path.is_file(), "files.present", "a file", "none"):
@@ -88,7 +89,7 @@ def check_file(root: Path, file: DataFile) -> Collector:
     if spec is None:
         return report
     try:
-        table = read_table(path, spec)
+        table = read_as_written(path, spec)
     except InternavError as error:
         report.expect(False, "files.readable", "a whole Parquet file of its table", error)  # noqa: FBT003
         return report

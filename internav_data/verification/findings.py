@@ -86,7 +86,7 @@ class Findings:
             raise ValidationError(f"{self.found[0]}{rest}; generate the dataset again")
 
 
-class Collector:
+class FindingCollector:
     """Judges predicates of one file or scene and keeps what fails."""
 
     def __init__(self, file: str = "", scene: str = "") -> None:
@@ -111,7 +111,7 @@ class Collector:
             )
         return False
 
-    def absorb(self, other: Collector) -> None:
+    def absorb(self, other: FindingCollector) -> None:
         """Take over what another collector found and counted."""
         self.found = sorted(self.found + other.found)[:KEPT]
         self.counts += other.counts
@@ -130,9 +130,9 @@ class Collector:
         )
 
 
-def join(collectors: Iterable[Collector]) -> Collector:
+def join(collectors: Iterable[FindingCollector]) -> FindingCollector:
     """Gather several collectors into one."""
-    whole = Collector()
+    whole = FindingCollector()
     for collector in collectors:
         whole.absorb(collector)
     return whole

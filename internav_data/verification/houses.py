@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from shapely import Geometry
 
     from internav_data.records import Door, House, Vec2, Window
-    from internav_data.verification.findings import Collector
+    from internav_data.verification.findings import FindingCollector
 
 AREA_M2 = 1e-6
 """Areas that should vanish stay below."""
@@ -34,7 +34,7 @@ def _rectilinear(ring: Sequence[Vec2]) -> bool:
     return all((a[0] == b[0]) != (a[1] == b[1]) for a, b in sides)
 
 
-def _proper(report: Collector, name: str, ring: Sequence[Vec2], what: str) -> Polygon | None:
+def _proper(report: FindingCollector, name: str, ring: Sequence[Vec2], what: str) -> Polygon | None:
     """Judge a stored polygon by itself; None where it is none."""
     predicate = f"house.{name}-polygon"
     if not report.expect(
@@ -48,7 +48,7 @@ def _proper(report: Collector, name: str, ring: Sequence[Vec2], what: str) -> Po
     return polygon if valid else None
 
 
-def check_rooms(house: House, report: Collector) -> dict[int, Polygon]:
+def check_rooms(house: House, report: FindingCollector) -> dict[int, Polygon]:
     """Judge outline and rooms: proper polygons, stated areas, a tiling. Return the rooms."""
     outline = _proper(report, "outline", house.outline, "outline")
     rooms: dict[int, Polygon] = {}
@@ -101,7 +101,7 @@ def _outside_of(line: LineString, area: Geometry) -> float:
     return float(shapely.length(shapely.difference(line, shapely.buffer(area, 1e-6))))
 
 
-def check_doors(house: House, rooms: dict[int, Polygon], report: Collector) -> None:
+def check_doors(house: House, rooms: dict[int, Polygon], report: FindingCollector) -> None:
     """Judge doors, windows and the room graph against the rooms' borders."""
     if len(rooms) < len(house.rooms):
         return
@@ -138,7 +138,7 @@ def check_doors(house: House, rooms: dict[int, Polygon], report: Collector) -> N
     )
 
 
-def check_walls(house: House, rooms: dict[int, Polygon], report: Collector) -> None:
+def check_walls(house: House, rooms: dict[int, Polygon], report: FindingCollector) -> None:
     """Judge the walls at every height: solid along all borders, open exactly at openings."""
     if len(rooms) < len(house.rooms) or not rooms:
         return

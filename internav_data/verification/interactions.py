@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from internav_data.records import Episode, Expert, Obstacle, Outcome
-    from internav_data.verification.findings import Collector
+    from internav_data.verification.findings import FindingCollector
 
 PUSH_OUTCOMES = ("push_east", "push_north", "push_west", "push_south")
 PICK_OUTCOME = "pick"
@@ -30,7 +30,7 @@ ROUNDED_M = 1e-4
 class _Judge:
     """One episode before its predicates."""
 
-    def __init__(self, episode: Episode, report: Collector) -> None:
+    def __init__(self, episode: Episode, report: FindingCollector) -> None:
         self._episode = episode
         self._report = report
 
@@ -82,36 +82,38 @@ class _Judge:
 
     def _distances(self, outcome: Outcome, what: str, *, pick: bool) -> None:
         episode = self._episode
-        steps, way_m = outcome.steps, outcome.way_m
-        opened = outcome.success and episode.steps is None and steps is not None
+        steps, obstructed_path_m = outcome.path_steps_after, outcome.path_m_after
+        opened = outcome.success and episode.obstructed_path_steps is None and steps is not None
         self.expect(
             outcome.opened == opened, "outcomes.opened", f"{what}: {opened}", outcome.opened
         )
         if not outcome.success:
-            before = (episode.steps, episode.way_m)
-            same = (steps, way_m) == before
-            self.expect(same, "outcomes.unchanged", f"{what}: {before}", (steps, way_m))
+            before = (episode.obstructed_path_steps, episode.obstructed_path_m)
+            same = (steps, obstructed_path_m) == before
+            self.expect(same, "outcomes.unchanged", f"{what}: {before}", (steps, obstructed_path_m))
             return
         straight = math.dist((episode.start.x, episode.start.y), (episode.goal.x, episode.goal.y))
-        least = max(straight, episode.clear_m) if pick else straight
+        least = max(straight, episode.shortest_path_m) if pick else straight
         most = math.inf if steps is None else steps * SPACING_M
-        if pick and episode.way_m is not None:
-            most = min(most, episode.way_m)
+        if pick and episode.obstructed_path_m is not None:
+            most = min(most, episode.obstructed_path_m)
         # A way on the lattice is a way; less in it makes no way longer.
-        length = math.inf if way_m is None else way_m
+        length = math.inf if obstructed_path_m is None else obstructed_path_m
         self.expect(
             least - ROUNDED_M <= length <= most + ROUNDED_M,
-            "outcomes.way_m",
+            "outcomes.path_m_after",
             f"{what}: {least:.4f} … {most:.4f} m",
-            way_m,
+            obstructed_path_m,
         )
         if pick:
             far = math.inf if steps is None else steps
-            longest = math.inf if episode.steps is None else episode.steps
+            longest = (
+                math.inf if episode.obstructed_path_steps is None else episode.obstructed_path_steps
+            )
             self.expect(
-                episode.clear_steps <= far <= longest,
-                "outcomes.steps",
-                f"{what}: {episode.clear_steps} … {longest}",
+                episode.shortest_path_steps <= far <= longest,
+                "outcomes.path_steps_after",
+                f"{what}: {episode.shortest_path_steps} … {longest}",
                 steps,
             )
 
@@ -142,7 +144,7 @@ class _Judge:
         self.expect(by_turns, "expert.hands", "Pickup and Drop by turns", hands)
 
 
-def check_interactions(episode: Episode, report: Collector, *, solvable: bool) -> None:
+def check_interactions(episode: Episode, report: FindingCollector, *, solvable: bool) -> None:
     """Judge the outcomes and the expert of an episode, where it has them.
 
     Parameters

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from shapely import Geometry
 
-    from internav_data.verification.checked_layout import Site
+    from internav_data.verification.checked_layout import CheckedLayout
 
 AGREE = 0.0005
 """Any-angle distances agree with the visibility graph within this share …"""
@@ -40,7 +40,7 @@ def slack(length: float) -> float:
 class Between:
     """Two points of a house, and what is between them beyond the house: footprints `taken`."""
 
-    site: Site
+    site: CheckedLayout
     here: tuple[float, float]
     there: tuple[float, float]
     taken: Sequence[Geometry] = ()

@@ -12,7 +12,7 @@ from internav_data.dataset.parquet import open_parquet, read_group
 from internav_data.records import Purpose, generator
 from internav_data.records.errors import UsageError
 from internav_data.verification.files import check_file, check_listing, check_manifest
-from internav_data.verification.findings import LEVELS, Collector, Findings, Level, join
+from internav_data.verification.findings import LEVELS, FindingCollector, Findings, Level, join
 from internav_data.verification.scenes import check_scene
 from internav_data.verification.settings import Settings, settings_of
 from internav_data.verification.shapes import Shapes
@@ -33,7 +33,7 @@ SCENES_A_UNIT = 10
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class ShardRef:
     """Where a scene's rows lie: files and row groups; no episodes where `episodes` is None."""
 
     scene_id: str
@@ -47,7 +47,7 @@ class Unit:
 
     root: Path
     assets: DataFile
-    places: tuple[Place, ...]
+    places: tuple[ShardRef, ...]
     physics: Settings | None = None
     """To play the episodes again; None to leave physics alone."""
 
@@ -94,7 +94,7 @@ def validate(
     """
     _check_arguments(level, sample, workers)
     tell: Progress = progress or (lambda *_: None)
-    whole = Collector()
+    whole = FindingCollector()
     manifest = check_manifest(path, whole)
     if manifest is None:
         return whole.findings(level)
@@ -106,7 +106,7 @@ def validate(
             damaged |= {file.path}
         whole.absorb(report)
         tell("files", done, len(manifest.files))
-    tables = Collector()
+    tables = FindingCollector()
     if level != "files":
         tell("schema", 0, 1)
         tables = check_tables(path, manifest, damaged)
@@ -136,7 +136,7 @@ def _check_scenes(
     root: Path,
     manifest: Manifest,
     damaged: frozenset[str],
-    whole: Collector,
+    whole: FindingCollector,
     sample: int | None,
     workers: int,
     tell: Progress,
@@ -161,7 +161,7 @@ def _check_scenes(
         tell("geometry" if physics is None else "physics", done, len(places))
 
 
-def _judged(units: Sequence[Unit], workers: int) -> Iterator[Collector]:
+def _judged(units: Sequence[Unit], workers: int) -> Iterator[FindingCollector]:
     """Yield what is found in each unit, in order."""
     if workers == 1 or len(units) == 1:
         yield from map(check_unit, units)
@@ -170,7 +170,7 @@ def _judged(units: Sequence[Unit], workers: int) -> Iterator[Collector]:
         yield from pool.map(check_unit, units)
 
 
-def _places(root: Path, manifest: Manifest, damaged: frozenset[str]) -> list[Place]:
+def _places(root: Path, manifest: Manifest, damaged: frozenset[str]) -> list[ShardRef]:
     """Find every scene's rows, in order of scenes."""
     found: dict[str, dict[str, tuple[str, int]]] = {"scenes": {}, "episodes": {}}
     for name, spec in (("scenes", SCENES), ("episodes", EPISODES)):
@@ -179,11 +179,11 @@ def _places(root: Path, manifest: Manifest, damaged: frozenset[str]) -> list[Pla
                 continue
             with open_parquet(root / file.path, spec) as parquet:
                 for group in range(parquet.num_row_groups):
-                    column = read_group(root / file.path, parquet, group, ["scene_id"])
+                    column = read_group(root / file.path, parquet, group, spec, ["scene_id"])
                     for scene_id in column.column(0).unique().to_pylist():
                         found[name].setdefault(scene_id, (file.path, group))
     return [
-        Place(scene_id, found["scenes"][scene_id], found["episodes"].get(scene_id))
+        ShardRef(scene_id, found["scenes"][scene_id], found["episodes"].get(scene_id))
         for scene_id in sorted(found["scenes"], key=lambda s: (number_of(s), s))
     ]
 
@@ -200,16 +200,16 @@ class _Reader:
             file, group = place
             spec = SCENES if name == "scenes" else EPISODES
             with open_parquet(self._root / file, spec) as parquet:
-                table = read_group(self._root / file, parquet, group)
+                table = read_group(self._root / file, parquet, group, spec)
             extra: dict[str, Any] | None = {"assets": {}} if name == "scenes" else None
             self._last[name] = (place, from_table(table, spec, extra))
         return self._last[name][1]
 
-    def house(self, place: Place) -> House:
+    def house(self, place: ShardRef) -> House:
         houses: list[House] = self._group("scenes", place.house)
         return next(house for house in houses if house.scene_id == place.scene_id)
 
-    def episodes(self, place: Place) -> list[Episode]:
+    def episodes(self, place: ShardRef) -> list[Episode]:
         if place.episodes is None:
             return []
         group = self._group("episodes", place.episodes)
@@ -220,7 +220,7 @@ _SHAPES: dict[str, Shapes] = {}
 """Of this process, by sha256 of the assets' file: worked out once for all its units."""
 
 
-def check_unit(unit: Unit) -> Collector:
+def check_unit(unit: Unit) -> FindingCollector:
     """Judge the geometry of some scenes, and the physics if asked."""
     key = unit.assets.sha256
     if key not in _SHAPES:

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from shapely import Geometry
 
     from internav_data.records import Episode, Obstacle
-    from internav_data.verification.checked_layout import Site
-    from internav_data.verification.findings import Collector
+    from internav_data.verification.checked_layout import CheckedLayout
+    from internav_data.verification.findings import FindingCollector
 
 MAX_SETTLE_S = 1.0
 MAX_PENETRATION_M = 0.002
@@ -32,7 +32,9 @@ class Expect(Protocol):
         """Keep a finding where it does not hold; return whether it holds."""
 
 
-def check_obstacles(site: Site, episode: Episode, report: Collector) -> list[Geometry] | None:
+def check_obstacles(
+    site: CheckedLayout, episode: Episode, report: FindingCollector
+) -> list[Geometry] | None:
     """Judge the obstacles; return their footprints, None where an asset is unknown."""
     name = episode.episode_id
 
@@ -81,7 +83,7 @@ def check_obstacles(site: Site, episode: Episode, report: Collector) -> list[Geo
     return [plan for plans in prints for plan in plans]
 
 
-def _check_asset(site: Site, obstacle: Obstacle, what: str, expect: Expect) -> None:
+def _check_asset(site: CheckedLayout, obstacle: Obstacle, what: str, expect: Expect) -> None:
     asset = site.shapes.assets[obstacle.asset_id]
     expect(asset.spawnable, "obstacle.spawnable", f"{what}: a spawnable asset", "another")
     for name in ("type", "mass_kg", "friction", "pushable", "pickable"):
@@ -116,7 +118,7 @@ def _check_rest(obstacle: Obstacle, what: str, expect: Expect) -> None:
 
 
 def _check_place(
-    site: Site, prints: list[list[Geometry]], number: int, what: str, expect: Expect
+    site: CheckedLayout, prints: list[list[Geometry]], number: int, what: str, expect: Expect
 ) -> None:
     own = prints[number]
     for plan in own:

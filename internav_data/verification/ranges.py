@@ -15,7 +15,7 @@ from internav_data.verification.interactions import OUTCOMES, PICK_REASONS, PUSH
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from internav_data.verification.findings import Collector
+    from internav_data.verification.findings import FindingCollector
 
 METRES = 4
 """Positions and lengths are rounded to 0.1 mm."""
@@ -55,8 +55,8 @@ FROM_ZERO = Rule(0.0, 1.0)
 OUTCOME_RULES: Mapping[str, Rule] = {
     "action": Rule(choices=OUTCOMES),
     "displacement_m": Rule(0.0, 1e4, digits=METRES),
-    "steps": Rule(1),
-    "way_m": Rule(0.0, 1e4, digits=METRES),
+    "path_steps_after": Rule(1),
+    "path_m_after": Rule(0.0, 1e4, digits=METRES),
     "seconds": Rule(0.0, MOST_PUSH_S),
     "reason": Rule(choices=tuple(sorted({*PUSH_REASONS, *PICK_REASONS}))),
 }
@@ -68,12 +68,12 @@ EPISODE_RULES: Mapping[str, Rule] = {
     "seed": Rule(0),
     "room_count": Rule(1),
     "mode": Rule(choices=("blocked", "lengthened")),
-    "rooms_on_way": Rule(1),
+    "rooms_on_path": Rule(1),
     "obstacle_count": Rule(1),
-    "clear_m": Rule(0.0, 1e4, digits=METRES),
-    "clear_steps": Rule(1),
-    "way_m": Rule(0.0, 1e4, digits=METRES),
-    "steps": Rule(1),
+    "shortest_path_m": Rule(0.0, 1e4, digits=METRES),
+    "shortest_path_steps": Rule(1),
+    "obstructed_path_m": Rule(0.0, 1e4, digits=METRES),
+    "obstructed_path_steps": Rule(1),
     "start.yaw_deg": Rule(choices=(0, 90, 180, 270)),
     **{f"{end}.{axis}": Rule(0) for end in ("start", "goal") for axis in "ij"},
     **{f"{end}.{axis}": Rule(0.0, 1e4, digits=2) for end in ("start", "goal") for axis in "xy"},
@@ -127,14 +127,14 @@ SCENE_RULES: Mapping[str, Rule] = {
     "windows.element.height_m": SIZE,
     "windows.element.sill_m": Rule(0.0, 20.0, digits=METRES),
     **{f"walls.element.{axis}_{end}": COORDINATE for axis in "xyz" for end in ("min", "max")},
-    "things.element.thing_id": ID,
-    "things.element.asset_id": NAME,
-    "things.element.room": ID,
-    **{f"things.element.{axis}": COORDINATE for axis in "xyz"},
-    **{f"things.element.quaternion.{axis}": TURN for axis in "xyz"},
-    "things.element.quaternion.w": Rule(0.0, 1.0, digits=TURNS),
-    "things.element.group": ID_OR_NONE,
-    "things.element.support": ID_OR_NONE,
+    "objects.element.object_id": ID,
+    "objects.element.asset_id": NAME,
+    "objects.element.room": ID,
+    **{f"objects.element.{axis}": COORDINATE for axis in "xyz"},
+    **{f"objects.element.quaternion.{axis}": TURN for axis in "xyz"},
+    "objects.element.quaternion.w": Rule(0.0, 1.0, digits=TURNS),
+    "objects.element.group": ID_OR_NONE,
+    "objects.element.support": ID_OR_NONE,
     "room_graph.element.element": ID,
     "area_m2": Rule(1e-4, 1e6),
 }
@@ -168,7 +168,7 @@ def _leaves(path: str, array: pa.Array) -> Iterator[tuple[str, pa.Array]]:
         yield path, array
 
 
-def check_ranges(table: pa.Table, name: str, report: Collector) -> None:
+def check_ranges(table: pa.Table, name: str, report: FindingCollector) -> None:
     """Judge every value of a table by the rule of its column."""
     rules = RULES[name]
     turns: dict[str, list[np.ndarray[Any, Any]]] = {}
@@ -189,7 +189,7 @@ def check_ranges(table: pa.Table, name: str, report: Collector) -> None:
             _none(report, f"schema.{name}.{stem}", "a unit quaternion", wrong)
 
 
-def _check_leaf(array: pa.Array, rule: Rule, predicate: str, report: Collector) -> None:
+def _check_leaf(array: pa.Array, rule: Rule, predicate: str, report: FindingCollector) -> None:
     if pa.types.is_string(array.type):
         words = array.unique().to_pylist()
         if rule.choices:
@@ -211,6 +211,6 @@ def _check_leaf(array: pa.Array, rule: Rule, predicate: str, report: Collector) 
         _none(report, predicate, f"{rule.digits} decimals", wrong)
 
 
-def _none(report: Collector, predicate: str, expected: str, wrong: Any) -> None:  # noqa: ANN401 - values of any column
+def _none(report: FindingCollector, predicate: str, expected: str, wrong: Any) -> None:  # noqa: ANN401 - values of any column
     got = "" if len(wrong) == 0 else f"{wrong[0]} ({len(wrong)} such values)"
     report.expect(len(wrong) == 0, predicate, expected, got)

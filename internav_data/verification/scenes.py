@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from internav_data.verification.checked_layout import Site
+from internav_data.verification.checked_layout import CheckedLayout
 from internav_data.verification.episodes import check_episode
-from internav_data.verification.findings import Collector
+from internav_data.verification.findings import FindingCollector
 from internav_data.verification.houses import check_doors, check_rooms, check_walls
 from internav_data.verification.things import check_things, check_ways_through
 
@@ -26,7 +26,7 @@ def check_scene(
     shapes: Shapes,
     file: str = "",
     physics: Settings | None = None,
-) -> Collector:
+) -> FindingCollector:
     """Judge a house and its episodes, sharing what they have in common.
 
     Parameters
@@ -44,7 +44,7 @@ def check_scene(
         How the episodes were made, to play them again; None to leave physics alone.
 
     """
-    report = Collector(file, house.scene_id)
+    report = FindingCollector(file, house.scene_id)
     report.counts["scenes"] += 1
     site = _check_house(house, shapes, report)
     true: list[Episode] = []
@@ -63,9 +63,9 @@ def check_scene(
     return report
 
 
-def _check_house(house: House, shapes: Shapes, report: Collector) -> Site | None:
+def _check_house(house: House, shapes: Shapes, report: FindingCollector) -> CheckedLayout | None:
     """Judge a house; None where nothing can be measured in it."""
-    unknown = sorted({t.asset_id for t in house.things} - set(shapes.assets))
+    unknown = sorted({t.asset_id for t in house.objects} - set(shapes.assets))
     rooms = check_rooms(house, report)
     check_doors(house, rooms, report)
     check_walls(house, rooms, report)
@@ -73,16 +73,18 @@ def _check_house(house: House, shapes: Shapes, report: Collector) -> Site | None
         return None
     if len(rooms) < len(house.rooms) or "house.outline-polygon" in report.by_predicate:
         return None  # nothing can be measured in a house without proper rooms
-    site = Site(house, shapes)
+    site = CheckedLayout(house, shapes)
     check_things(house, rooms, site.shapes, report)
     check_ways_through(house, rooms, site.prints, site.ground, report)
     return site
 
 
-def _replay(site: Site, episodes: Sequence[Episode], settings: Settings, report: Collector) -> None:
+def _replay(
+    site: CheckedLayout, episodes: Sequence[Episode], settings: Settings, report: FindingCollector
+) -> None:
     """Play episodes again. The engine is imported here: geometry does without."""
-    from internav_data.verification.replay import Theatre, replay_episode  # noqa: PLC0415
+    from internav_data.verification.replay import CheckedScene, replay_episode  # noqa: PLC0415
 
-    theatre = Theatre(site, settings)
+    theatre = CheckedScene(site, settings)
     for episode in episodes:
         replay_episode(theatre, episode, report)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from internav_data.dataset import ASSETS, EPISODES, SCENES, TABLES, from_table, read_table
 from internav_data.records import OUTSIDE
 from internav_data.records.errors import InternavError
-from internav_data.verification.findings import Collector
+from internav_data.verification.findings import FindingCollector
 from internav_data.verification.interactions import check_interactions
 from internav_data.verification.ranges import check_ranges
 from internav_data.verification.settings import settings_of
@@ -56,9 +56,9 @@ def number_of(scene_id: str) -> int:
     return int(digits) if digits.isdecimal() else -1
 
 
-def check_tables(root: Path, manifest: Manifest, damaged: frozenset[str]) -> Collector:
+def check_tables(root: Path, manifest: Manifest, damaged: frozenset[str]) -> FindingCollector:
     """Judge all tables of a dataset; files that `files` found damaged are left out."""
-    whole = Collector()
+    whole = FindingCollector()
     keys = Keys()
     for name in ("assets", "scenes", "episodes"):
         for file in manifest.of(name):
@@ -69,8 +69,8 @@ def check_tables(root: Path, manifest: Manifest, damaged: frozenset[str]) -> Col
     return whole
 
 
-def _check_table(root: Path, manifest: Manifest, file: DataFile, keys: Keys) -> Collector:
-    report = Collector(file.path)
+def _check_table(root: Path, manifest: Manifest, file: DataFile, keys: Keys) -> FindingCollector:
+    report = FindingCollector(file.path)
     spec = next(spec for spec in TABLES if spec.name == file.table)
     try:
         table = read_table(root / file.path, spec)
@@ -88,7 +88,7 @@ def _check_table(root: Path, manifest: Manifest, file: DataFile, keys: Keys) -> 
     return report
 
 
-def _check_assets(table: pa.Table, keys: Keys, report: Collector) -> None:
+def _check_assets(table: pa.Table, keys: Keys, report: FindingCollector) -> None:
     ids = table.column("asset_id").to_pylist()
     report.expect(ids == sorted(ids), "schema.assets.order", "rows by asset_id", "another order")
     report.expect(len(set(ids)) == len(ids), "schema.assets.unique", "each asset once", "one twice")
@@ -98,7 +98,7 @@ def _check_assets(table: pa.Table, keys: Keys, report: Collector) -> None:
 
 
 def _check_scenes(
-    table: pa.Table, manifest: Manifest, file: DataFile, keys: Keys, report: Collector
+    table: pa.Table, manifest: Manifest, file: DataFile, keys: Keys, report: FindingCollector
 ) -> None:
     houses = from_table(table, SCENES, {"assets": {}})
     numbers = [house.scene for house in houses]
@@ -129,7 +129,7 @@ def _check_scenes(
     report.scene = ""
 
 
-def _check_links(house: House, keys: Keys, report: Collector) -> None:
+def _check_links(house: House, keys: Keys, report: FindingCollector) -> None:
     """Judge a house's ids: unique, and known where they refer to others."""
 
     def expect(name: str, wrong: Sequence[Any], expected: str) -> None:
@@ -145,7 +145,7 @@ def _check_links(house: House, keys: Keys, report: Collector) -> None:
     for name, ids in (
         ("door-ids", [d.door_id for d in house.doors]),
         ("window-ids", [w.window_id for w in house.windows]),
-        ("thing-ids", [t.thing_id for t in house.things]),
+        ("thing-ids", [t.object_id for t in house.objects]),
     ):
         expect(name, sorted(i for i, n in Counter(ids).items() if n > 1), "each id once")
     known = {*rooms, OUTSIDE}
@@ -156,16 +156,16 @@ def _check_links(house: House, keys: Keys, report: Collector) -> None:
         "two room ids, ascending",
     )
     expect("window-room", [w.window_id for w in house.windows if w.room not in rooms], "a room")
-    expect("thing-room", [t.thing_id for t in house.things if t.room not in rooms], "a room")
-    things = {t.thing_id for t in house.things}
+    expect("thing-room", [t.object_id for t in house.objects if t.room not in rooms], "a room")
+    things = {t.object_id for t in house.objects}
     expect(
         "thing-support",
-        [t.thing_id for t in house.things if t.support != -1 and t.support not in things],
+        [t.object_id for t in house.objects if t.support != -1 and t.support not in things],
         "a thing or -1",
     )
     expect(
         "thing-asset",
-        sorted({t.asset_id for t in house.things} - keys.assets),
+        sorted({t.asset_id for t in house.objects} - keys.assets),
         "assets of assets.parquet",
     )
     names = {material.name for material in house.materials}
@@ -175,7 +175,7 @@ def _check_links(house: House, keys: Keys, report: Collector) -> None:
 
 
 def _check_episodes(
-    table: pa.Table, manifest: Manifest, file: DataFile, keys: Keys, report: Collector
+    table: pa.Table, manifest: Manifest, file: DataFile, keys: Keys, report: FindingCollector
 ) -> None:
     columns = ("scene_id", "index", "episode_id", "split", "seed", "room_count", "obstacle_count")
     rows = list(zip(*(table.column(name).to_pylist() for name in columns), strict=True))
@@ -213,7 +213,9 @@ def _lengths(table: pa.Table, name: str) -> list[int]:
     return [n for chunk in table.column(name).chunks for n in chunk.value_lengths().to_pylist()]
 
 
-def _check_references(table: pa.Table, keys: Keys, report: Collector, *, solvable: bool) -> None:
+def _check_references(
+    table: pa.Table, keys: Keys, report: FindingCollector, *, solvable: bool
+) -> None:
     """Judge the room, door and asset ids that episodes name, and what their interactions say."""
     for episode in from_table(table, EPISODES):
         scene = keys.scenes.get(episode.scene_id)
@@ -240,7 +242,7 @@ def _check_references(table: pa.Table, keys: Keys, report: Collector, *, solvabl
     report.scene = ""
 
 
-def _check_counts(manifest: Manifest, keys: Keys, report: Collector) -> None:
+def _check_counts(manifest: Manifest, keys: Keys, report: FindingCollector) -> None:
     """Judge that every scene asked for is there, with as many episodes as the config says."""
     given_up = {q.scene_id for q in manifest.quarantined}
     wanted = {f"scene-{k:06d}" for k in range(manifest.scenes)} - given_up

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from shapely import Geometry
 
-    from internav_data.records import Door, House, Thing
-    from internav_data.verification.checked_lattice import Ground
-    from internav_data.verification.findings import Collector
+    from internav_data.records import Door, House, SceneObject
+    from internav_data.verification.checked_lattice import CheckedLattice
+    from internav_data.verification.findings import FindingCollector
     from internav_data.verification.shapes import Shapes
 
 DOOR_CLEAR_M = 0.65
@@ -43,7 +43,7 @@ def wall_slabs(house: House) -> list[Slab]:
 
 
 def check_things(
-    house: House, rooms: dict[int, Polygon], shapes: Shapes, report: Collector
+    house: House, rooms: dict[int, Polygon], shapes: Shapes, report: FindingCollector
 ) -> None:
     """Judge furniture: inside its room, nothing through walls or other things, held up."""
     slabs: list[Slab] = []
@@ -53,17 +53,17 @@ def check_things(
         owners.append(WALL_ID)
     within = {room: shapely.buffer(shape, DEPTH_M) for room, shape in rooms.items()}
     shapely.prepare(list(within.values()))
-    groups = {thing.thing_id: thing.group for thing in house.things}
-    own = {t.thing_id: shapes.slabs(t.asset_id, t.pose) for t in house.things}
-    for thing in house.things:
-        name = f"thing {thing.thing_id} ({thing.asset_id})"
+    groups = {thing.object_id: thing.group for thing in house.objects}
+    own = {t.object_id: shapes.slabs(t.asset_id, t.pose) for t in house.objects}
+    for thing in house.objects:
+        name = f"thing {thing.object_id} ({thing.asset_id})"
         asset = shapes.assets[thing.asset_id]
         report.expect(thing.type == asset.type, "thing.type", f"{name}: {asset.type}", thing.type)
-        slabs += own[thing.thing_id]
-        owners += [thing.thing_id] * len(own[thing.thing_id])
+        slabs += own[thing.object_id]
+        owners += [thing.object_id] * len(own[thing.object_id])
         room = within.get(thing.room)
         if room is not None:
-            inside = shapely.covers(room, _plans(own[thing.thing_id])).all()
+            inside = shapely.covers(room, _plans(own[thing.object_id])).all()
             report.expect(inside, "thing.room", f"{name} in room {thing.room}", "beyond it")
         _check_support(house, thing, own, report)
 
@@ -74,7 +74,7 @@ def check_things(
     for a, b in overlapping_slabs(slabs, owners, may_interlock):
         what = "a wall" if a == WALL_ID else f"thing {a}"
         report.expect(False, "thing.overlap", f"thing {b} clear of {what}", "an overlap")  # noqa: FBT003
-    report.counts["predicates"] += len(house.things)
+    report.counts["predicates"] += len(house.objects)
 
 
 def _plans(slabs: list[Slab]) -> NDArray[np.object_]:
@@ -82,11 +82,11 @@ def _plans(slabs: list[Slab]) -> NDArray[np.object_]:
 
 
 def _check_support(
-    house: House, thing: Thing, own: dict[int, list[Slab]], report: Collector
+    house: House, thing: SceneObject, own: dict[int, list[Slab]], report: FindingCollector
 ) -> None:
     """Judge that a thing stands on the floor or on its support, or hangs on a wall or ceiling."""
-    name = f"thing {thing.thing_id}"
-    slabs = own[thing.thing_id]
+    name = f"thing {thing.object_id}"
+    slabs = own[thing.object_id]
     low, high = min(slab.low for slab in slabs), max(slab.high for slab in slabs)
     if thing.support >= 0:
         held = any(
@@ -131,8 +131,8 @@ def check_ways_through(
     house: House,
     rooms: dict[int, Polygon],
     prints: dict[int, list[Geometry]],
-    ground: Ground,
-    report: Collector,
+    ground: CheckedLattice,
+    report: FindingCollector,
 ) -> None:
     """Judge that doors are clear of furniture and every room can be walked to."""
     for door in house.doors:
@@ -140,7 +140,7 @@ def check_ways_through(
             continue
         before = _before(door)
         shapely.prepare(before)
-        for thing_id, plans in prints.items():
+        for object_id, plans in prints.items():
             if any(
                 shapely.intersects(before, plan) and plans_overlap(before, plan) for plan in plans
             ):
@@ -148,7 +148,7 @@ def check_ways_through(
                     False,  # noqa: FBT003 - reached only where it fails
                     "house.door-clear",
                     f"0.65 m free before door {door.door_id}",
-                    f"thing {thing_id}",
+                    f"thing {object_id}",
                 )
         report.counts["predicates"] += 1
     labels = ground.components()

@@ -9,7 +9,7 @@ import numpy as np
 
 from internav_data.catalog import SHEETS
 from internav_data.records.errors import UsageError
-from internav_data.views.orthographic import Surface, View, asset_surface, draw_surface
+from internav_data.views.orthographic import OrthographicView, Surface, asset_surface, draw_surface
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -63,7 +63,7 @@ def draw_assets(
     scale = min(0.92 * width / spans[0], 0.86 * height / spans[1])
     middle = float(down.max() + down.min()) / 2.0
     centre = (float(right.max() + right.min()) / 2.0, -middle / math.sin(tilt), 0.0)
-    view = View(width, height, scale, centre, yaw_deg=0.0, pitch_deg=pitch)
+    view = OrthographicView(width, height, scale, centre, yaw_deg=0.0, pitch_deg=pitch)
     return draw_surface(whole, view)
 
 

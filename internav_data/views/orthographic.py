@@ -151,7 +151,7 @@ def _view(yaw_deg: float, pitch_deg: float) -> Floats:
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class OrthographicView:
     """Where the viewer stands and how large the picture is."""
 
     width: int
@@ -224,7 +224,7 @@ def _shade(
                 out[row, column, axis] = min(255.0, colours[t, axis] * value)
 
 
-def draw_surface(surface: Surface, view: View) -> Image:
+def draw_surface(surface: Surface, view: OrthographicView) -> Image:
     """Draw a surface, shape (height, width, 3) uint8, red first.
 
     The same surface and view give the same picture on any processor of one numba release.
@@ -268,7 +268,7 @@ def draw_surface(surface: Surface, view: View) -> Image:
     return image
 
 
-def _shadow_map(surface: Surface, whole: Surface, view: View) -> tuple[Floats, Floats]:
+def _shadow_map(surface: Surface, whole: Surface, view: OrthographicView) -> tuple[Floats, Floats]:
     """See the things from the light: all corners in its pixels, and how far light gets."""
     axes = _view(view.yaw_deg + _LIGHT_DEG[0], _LIGHT_DEG[1])
     low, high = surface.corners.min(axis=(0, 1)), surface.corners.max(axis=(0, 1))

@@ -68,7 +68,7 @@ def house_line(house: House) -> str:
     """Return one line about a house, as written below its picture."""
     count = len(house.rooms)
     rooms = "1 room" if count == 1 else f"{count} rooms"
-    parts = [house.scene_id, rooms, f"{house.area_m2:.0f} m2", f"{len(house.things)} things"]
+    parts = [house.scene_id, rooms, f"{house.area_m2:.0f} m2", f"{len(house.objects)} things"]
     return "   ".join([*parts, house.split, house.preset])
 
 
@@ -100,7 +100,7 @@ def paint_house(
             canvas.blend(canvas.mask([room.polygon]), colour, strength)
     seen = [
         outline
-        for thing in house.things
+        for thing in house.objects
         for outline in outlines(house.assets[thing.asset_id], thing.pose)
         if outline.low_m < _OVERHEAD_M
     ]
@@ -213,7 +213,7 @@ def paint_labels(canvas: Canvas, house: House, taken: Sequence[Floats]) -> None:
     """
     seen = [
         o
-        for thing in house.things
+        for thing in house.objects
         for o in outlines(house.assets[thing.asset_id], thing.pose)
         if o.low_m < _OVERHEAD_M
     ]

@@ -13,7 +13,7 @@ import numpy as np
 from internav_data.records.errors import UsageError
 from internav_data.views.replay_panels import EyePainter, Footer, Header, MapPainter, title_card
 from internav_data.views.replay_story import Moment, Shot, Story, played, shots
-from internav_data.world import Stage
+from internav_data.world import HouseModel
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -50,7 +50,7 @@ class Replay:
     @classmethod
     def of(
         cls,
-        house: House | Stage,
+        house: House | HouseModel,
         episode: Episode,
         assets: Mapping[str, Asset],
         actions: Sequence[int] | None = None,
@@ -59,7 +59,7 @@ class Replay:
         model: PushModel = "force",
     ) -> Self:
         """Play an episode; draw it later, as often as wanted. Parameters as in `replay_frames`."""
-        stage = house if isinstance(house, Stage) else Stage.of(house)
+        stage = house if isinstance(house, HouseModel) else HouseModel.of(house)
         who = title or ("expert" if actions is None else "given actions")
         return cls(played(stage, episode, assets, actions, model), who)
 
@@ -96,7 +96,7 @@ class Replay:
 
 
 def replay_frames(
-    house: House | Stage,
+    house: House | HouseModel,
     episode: Episode,
     assets: Mapping[str, Asset],
     actions: Sequence[int] | None = None,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 import cv2
 import numpy as np
 
-from internav_data.render.camera import Camera, Scenery, View
+from internav_data.render.camera import Camera, CameraView, StaticScene
 from internav_data.views.asset_sheet import draw_assets
 from internav_data.views.canvas import Canvas
 from internav_data.views.plan import INK, PAPER, paint_house, paint_labels
@@ -121,8 +121,8 @@ class MapPainter:
     def _drawn_once(self) -> Image:
         story, canvas = self._story, self._canvas
         house, episode = story.stage.house, story.episode
-        gone = {story.stage.thing_ids[k] for k in story.moved}
-        still = replace(house, things=tuple(t for t in house.things if t.thing_id not in gone))
+        gone = {story.stage.object_ids[k] for k in story.moved}
+        still = replace(house, objects=tuple(t for t in house.objects if t.object_id not in gone))
         margin = 10.0 / canvas.scale
         corner = (self._low[0] + margin, self._low[1] + margin)
         on_way = episode.room_paths[0] if episode.room_paths else None
@@ -291,12 +291,12 @@ class EyePainter:
         self._story, self._size = story, size
         house, first = story.stage.house, story.moments[0]
         world = first.world
-        self._scenery = Scenery.of(house)
+        self._scenery = StaticScene.of(house)
         things = [(world.items[k].asset, world.items[k].pose) for k in world.obstacles]
         self._props = self._scenery.props([(a, p) for a, p in things if p is not None])
-        rows = {thing.thing_id: row for row, thing in enumerate(house.things)}
-        self._instances = [rows[t] for t in story.stage.thing_ids]
-        self._instances += [len(house.things) + k for k in range(len(things))]
+        rows = {thing.object_id: row for row, thing in enumerate(house.objects)}
+        self._instances = [rows[t] for t in story.stage.object_ids]
+        self._instances += [len(house.objects) + k for k in range(len(things))]
         self._camera = Camera(size)
         self._icons: dict[int, Image] = {}
 
@@ -310,7 +310,9 @@ class EyePainter:
             else:
                 self._props.move(self._instances[item], pose)
                 self._props.show(self._instances[item])
-        view = View(self._scenery, self._props, shot.x, shot.y, shot.yaw_deg, shot.horizon_deg)
+        view = CameraView(
+            self._scenery, self._props, shot.x, shot.y, shot.yaw_deg, shot.horizon_deg
+        )
         frames = self._camera.render([view])
         picture: Image = frames.rgb[0]
         if shot.target >= 0:
@@ -482,12 +484,16 @@ def _title_rows(story: Story, title: str) -> list[tuple[RGB | None, int, str]]:
     """Colour of a mark, number in it, text."""
     episode = story.episode
     rooms = "1 room" if episode.room_count == 1 else f"{episode.room_count} rooms"
-    way = "cut off" if episode.steps is None else f"{episode.steps} steps"
+    way = (
+        "cut off"
+        if episode.obstructed_path_steps is None
+        else f"{episode.obstructed_path_steps} steps"
+    )
     said = "blocked: something must be moved" if episode.interactive else "lengthened: a detour"
     rows: list[tuple[RGB | None, int, str]] = [
         (None, 0, f"{episode.episode_id}, {rooms}"),
         (None, 0, said),
-        (None, 0, f"goal: {way}, without obstacles {episode.clear_steps} steps"),
+        (None, 0, f"goal: {way}, without obstacles {episode.shortest_path_steps} steps"),
         (None, 0, _summary(story, title)),
         (START, 0, "start"),
         (GOAL, 0, "goal"),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, Literal
 from internav_data.navigation import SPACING_M
 from internav_data.records import Pose
 from internav_data.records.errors import UsageError
-from internav_data.world import Action, Stage, World
+from internav_data.world import Action, HouseModel, World
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -79,7 +79,7 @@ class Story:
     """An episode played: `moments[k]` is after k actions."""
 
     episode: Episode
-    stage: Stage
+    stage: HouseModel
     moments: tuple[Moment, ...]
     moved: tuple[int, ...]
     """Furniture (indices of the stage's items) that lies elsewhere at some time."""
@@ -103,7 +103,7 @@ class Story:
 
 
 def played(
-    stage: Stage,
+    stage: HouseModel,
     episode: Episode,
     assets: Mapping[str, Asset],
     actions: Sequence[int] | None = None,

@@ -107,7 +107,7 @@ def episode_lines(episode: Episode) -> list[str]:
     first = [
         episode.episode_id,
         mode,
-        f"clear {episode.clear_steps} steps, {episode.clear_m:.2f} m",
+        f"clear {episode.shortest_path_steps} steps, {episode.shortest_path_m:.2f} m",
         f"with obstacles {_with_obstacles(episode)}",
     ]
     things = [
@@ -118,10 +118,12 @@ def episode_lines(episode: Episode) -> list[str]:
 
 
 def _with_obstacles(episode: Episode) -> str:
-    if episode.steps is not None:
-        return f"{episode.steps} steps, {episode.way_m or math.nan:.2f} m"
-    if episode.way_m is not None:
-        return f"cut off on the grid, {episode.way_m:.2f} m off it"
+    if episode.obstructed_path_steps is not None:
+        return (
+            f"{episode.obstructed_path_steps} steps, {episode.obstructed_path_m or math.nan:.2f} m"
+        )
+    if episode.obstructed_path_m is not None:
+        return f"cut off on the grid, {episode.obstructed_path_m:.2f} m off it"
     return "cut off"
 
 

@@ -24,7 +24,7 @@ from internav_data.views.tasks import (
     paint_obstacle,
     paint_start,
 )
-from internav_data.world import Action, Stage
+from internav_data.world import Action, HouseModel
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -50,7 +50,7 @@ _MARK_M: Final = 0.11
 
 
 def draw_trajectory(
-    house: House | Stage,
+    house: House | HouseModel,
     episode: Episode,
     assets: Mapping[str, Asset],
     actions: Sequence[int] | None = None,
@@ -86,7 +86,7 @@ def draw_trajectory(
     UsageError
         The house or an asset is another's, there is no expert, or no such action.
     """
-    stage = house if isinstance(house, Stage) else Stage.of(house)
+    stage = house if isinstance(house, HouseModel) else HouseModel.of(house)
     story = played(stage, episode, assets, actions, model)
     canvas = house_canvas(stage.house, pixels)
     on_way = episode.room_paths[0] if episode.room_paths else None

@@ -48,7 +48,7 @@ NEAR_M: Final = 0.5
 _AHEAD: Final = tuple((math.cos(math.radians(b)), math.sin(math.radians(b))) for b in BEARINGS_DEG)
 
 
-class Ground(NamedTuple):
+class DropObstructions(NamedTuple):
     """What a dropped thing must keep clear of."""
 
     walls: Polygons
@@ -58,7 +58,7 @@ class Ground(NamedTuple):
     """Gathers what reaches into an octagon of the house."""
 
 
-def drop(asset: Asset, agent: Vec2, heading: int, ground: Ground) -> SettleResult | None:
+def drop(asset: Asset, agent: Vec2, heading: int, ground: DropObstructions) -> SettleResult | None:
     """Try gap after gap at bearing after bearing; None where there is no room.
 
     The thing stands upright, turned as the agent is.
@@ -89,7 +89,7 @@ def _spot(plan: Polygons, agent: Vec2, ux: float, uy: float, gap: float) -> Vec2
     return round_m(agent[0] + far * ux), round_m(agent[1] + far * uy)
 
 
-def _fits(plan: Polygons, spot: Vec2, agent: Vec2, ground: Ground) -> bool:
+def _fits(plan: Polygons, spot: Vec2, agent: Vec2, ground: DropObstructions) -> bool:
     """Whether there is room, and no wall in between."""
     there = Polygons(plan.vertices + np.array(spot), plan.offsets)
     if any(clearance(there, other, ROOM_M) < ROOM_M for other in ground.solid):
@@ -107,7 +107,7 @@ def _crosses(ax: float, ay: float, bx: float, by: float, vertices: Floats, offse
     return False
 
 
-def _let_go(asset: Asset, pose: Pose, agent: Vec2, ground: Ground) -> SettleResult | None:
+def _let_go(asset: Asset, pose: Pose, agent: Vec2, ground: DropObstructions) -> SettleResult | None:
     reach = math.hypot(asset.size[0], asset.size[1]) / 2.0 + NEAR_M
     around = square_round(pose.x, pose.y, reach)
     settled = settle(asset, pose, ROOM_M, lambda: ground.bodies(around))

@@ -28,7 +28,7 @@ WAYS_KEPT: Final = 16
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Item:
+class MovableObject:
     """A thing that can move: where it lies, or that it is held."""
 
     asset: Asset
@@ -40,12 +40,12 @@ class Item:
     high_m: float
 
     @staticmethod
-    def at(asset: Asset, pose: Pose | None) -> Item:
+    def at(asset: Asset, pose: Pose | None) -> MovableObject:
         """Put an asset somewhere, or into a hand."""
         if pose is None:
-            return Item(asset, None, Polygons.of([]), NOWHERE, np.inf, -np.inf)
+            return MovableObject(asset, None, Polygons.of([]), NOWHERE, np.inf, -np.inf)
         extent = extent_of(asset, pose)
-        return Item(
+        return MovableObject(
             asset, pose, footprint(asset, pose), extent.octagon, extent.low_m, extent.high_m
         )
 
@@ -56,7 +56,7 @@ def is_movable(asset: Asset) -> bool:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stage:
+class HouseModel:
     """What all worlds in a house share. Nothing in it is ever changed."""
 
     house: House
@@ -67,9 +67,9 @@ class Stage:
     walls: Polygons
     footprints: Polygons
     """Of all that is fixed, walls first."""
-    items: tuple[Item, ...]
+    items: tuple[MovableObject, ...]
     """Furniture that can move, in the house's order."""
-    thing_ids: tuple[int, ...]
+    object_ids: tuple[int, ...]
     """Which thing of the house each item is."""
     lattice: Lattice
     """With all furniture in its place; never changed."""
@@ -78,17 +78,17 @@ class Stage:
     _ways: dict[tuple[int, ...], TangentGraph] = field(default_factory=dict)
 
     @staticmethod
-    def of(house: House) -> Stage:
+    def of(house: House) -> HouseModel:
         """Prepare a house for any number of worlds."""
         bodies = [wall_body(wall) for wall in house.walls]
         octagons = [octagon_of_rectangle(w.x_min, w.y_min, w.x_max, w.y_max) for w in house.walls]
         walls = wall_footprints(house.walls)
-        plans, items, thing_ids = [walls], [], []
-        for thing in house.things:
+        plans, items, object_ids = [walls], [], []
+        for thing in house.objects:
             asset = house.assets[thing.asset_id]
             if is_movable(asset):
-                items.append(Item.at(asset, thing.pose))
-                thing_ids.append(thing.thing_id)
+                items.append(MovableObject.at(asset, thing.pose))
+                object_ids.append(thing.object_id)
             elif asset.blocks:
                 bodies.append(Body(asset, thing.pose, moves=False))
                 octagons.append(extent_of(asset, thing.pose).octagon)
@@ -96,14 +96,14 @@ class Stage:
         footprints = Polygons.joined(plans)
         lattice = Lattice.of_polygons(footprints, house.outline)
         handles = tuple(lattice.add(item.footprint) for item in items)
-        return Stage(
+        return HouseModel(
             house=house,
             fixed=tuple(bodies),
             octagons=np.array(octagons, dtype=np.float64).reshape(-1, 8),
             walls=walls,
             footprints=footprints,
             items=tuple(items),
-            thing_ids=tuple(thing_ids),
+            object_ids=tuple(object_ids),
             lattice=lattice,
             handles=handles,
         )
@@ -120,7 +120,7 @@ class Stage:
             self._ways[displaced] = finder
         return finder
 
-    def clear_m(self, here: Vec2, goal: Vec2) -> float | None:
+    def shortest_path_m(self, here: Vec2, goal: Vec2) -> float | None:
         """Any-angle distance with all furniture in its place and no obstacle.
 
         Where the agent stands off the clear ground (furniture was moved away there), that of the
@@ -146,6 +146,6 @@ def _node(point: Vec2) -> tuple[int, int]:
     return round(point[0] / SPACING_M), round(point[1] / SPACING_M)
 
 
-def octagon_rows(items: Iterable[Item]) -> Floats:
+def octagon_rows(items: Iterable[MovableObject]) -> Floats:
     """Octagons of items, (n, 8)."""
     return np.array([item.octagon for item in items], dtype=np.float64).reshape(-1, 8)

@@ -21,7 +21,7 @@ POINTS_AT_MOST: Final = 32
 """Visibility points of an asset: all parts' centres first, then corners, evenly chosen."""
 
 
-class Shell(NamedTuple):
+class OcclusionShape(NamedTuple):
     """A thing's convex parts and visibility points.
 
     Shapes: planes (m, 4) float64, a point p is inside a part where n . p <= d for all its rows
@@ -74,12 +74,12 @@ def moved_planes(planes: Floats, matrix: Floats, shift: tuple[float, float, floa
 
 
 @lru_cache(maxsize=2048)
-def shell_of(asset: Asset) -> Shell:
+def shell_of(asset: Asset) -> OcclusionShape:
     """Shell in the asset's frame; cached, read-only."""
     planes = [_part_planes(part) for part in asset.parts]
     starts = np.cumsum([0, *(len(p) for p in planes)]).astype(np.int64)
     points, owners = _visibility_points(asset)
-    return Shell(np.vstack(planes), starts, points, owners)
+    return OcclusionShape(np.vstack(planes), starts, points, owners)
 
 
 def _visibility_points(asset: Asset) -> tuple[Floats, Ints]:
@@ -96,7 +96,7 @@ def _visibility_points(asset: Asset) -> tuple[Floats, Ints]:
 
 
 @lru_cache(maxsize=4096)
-def placed_shell(asset: Asset, pose: Pose) -> Shell:
+def placed_shell(asset: Asset, pose: Pose) -> OcclusionShape:
     """Shell of a thing where it lies in the house; cached, read-only."""
     own = shell_of(asset)
     matrix = rotation_matrix(pose.quaternion)
@@ -106,4 +106,4 @@ def placed_shell(asset: Asset, pose: Pose) -> Shell:
     for axis, offset in enumerate((pose.x, pose.y, pose.z)):
         row = matrix[axis]
         points[:, axis] = row[0] * x + row[1] * y + row[2] * z + offset
-    return Shell(planes, own.starts, points, own.owners)
+    return OcclusionShape(planes, own.starts, points, own.owners)

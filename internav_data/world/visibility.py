@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.geometry import Polygons
-    from internav_data.world.occlusion import Shell
+    from internav_data.world.occlusion import OcclusionShape
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
@@ -100,7 +100,7 @@ def axis_distance(x: float, y: float, polygons: Polygons) -> float:
     return float(_axis_distance(x, y, polygons.vertices, polygons.offsets))
 
 
-class View(NamedTuple):
+class CameraPose(NamedTuple):
     """Where the camera is and looks."""
 
     eye: Floats
@@ -120,15 +120,15 @@ _DOWN: Final = {
 }
 
 
-def view_from(x: float, y: float, ahead: tuple[float, float], horizon_deg: int) -> View:
+def view_from(x: float, y: float, ahead: tuple[float, float], horizon_deg: int) -> CameraPose:
     """Return the view of an agent that stands at (x, y) and looks so far down."""
-    return View(np.array([x, y, CAMERA_M]), *ahead, *_DOWN[horizon_deg])
+    return CameraPose(np.array([x, y, CAMERA_M]), *ahead, *_DOWN[horizon_deg])
 
 
-class Screen:
+class Occluders:
     """Everything near the agent that can hide something, gathered once for several questions."""
 
-    def __init__(self, shells: Sequence[Shell]) -> None:
+    def __init__(self, shells: Sequence[OcclusionShape]) -> None:
         self._shells = shells
         planes = [shell.planes for shell in shells]
         counts = [0]
@@ -141,7 +141,7 @@ class Screen:
         self._planes: Floats = np.concatenate(planes) if planes else np.empty((0, 4))
         self._starts: Ints = np.array(counts, dtype=np.int64)
 
-    def seen(self, view: View, place: int) -> bool:
+    def seen(self, view: CameraPose, place: int) -> bool:
         """Whether the thing of one of the shells is seen and within reach."""
         shell = self._shells[place]
         return bool(

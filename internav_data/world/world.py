@@ -25,10 +25,10 @@ from internav_data.world.actions import (
     Reason,
     StepResult,
 )
-from internav_data.world.drop import Ground, drop
-from internav_data.world.house_model import Item, Stage, octagon_rows
+from internav_data.world.drop import DropObstructions, drop
+from internav_data.world.house_model import HouseModel, MovableObject, octagon_rows
 from internav_data.world.occlusion import placed_shell
-from internav_data.world.visibility import REACH_M, Screen, axis_distance, view_from
+from internav_data.world.visibility import REACH_M, Occluders, axis_distance, view_from
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -123,7 +123,7 @@ def _push(world: World, action: Action) -> StepResult:
 def _lies_on_agent(world: World, moved: tuple[tuple[int, Pose], ...]) -> bool:
     x, y = world.position
     return any(
-        axis_distance(x, y, Item.at(world.items[k].asset, pose).footprint) < CLEARANCE_M
+        axis_distance(x, y, MovableObject.at(world.items[k].asset, pose).footprint) < CLEARANCE_M
         for k, pose in moved
     )
 
@@ -167,7 +167,7 @@ def _drop(world: World, action: Action) -> StepResult:
     def bodies(octagon: Dop8) -> Sequence[Body]:
         return [body for _, body in world.near(octagon)]
 
-    ground = Ground(world.stage.walls, solid, bodies)
+    ground = DropObstructions(world.stage.walls, solid, bodies)
     settled = drop(world.items[target].asset, world.position, world.quarter, ground)
     if settled is None:
         return StepResult(action, success=False, reason="no room to drop it", target=target)
@@ -245,22 +245,22 @@ class World:
         "stage",
     )
 
-    stage: Stage
-    items: tuple[Item, ...]
+    stage: HouseModel
+    items: tuple[MovableObject, ...]
     lattice: Lattice
     _octagons: NDArray[np.float64]
     _handles: tuple[int, ...]
 
     def __init__(
         self,
-        stage: Stage,
+        stage: HouseModel,
         obstacles: Iterable[tuple[Asset, Pose]],
         start: tuple[int, int, int],
         goal: tuple[int, int],
         model: PushModel = "force",
     ) -> None:
         """Put obstacles and an agent (node i, j and quarter turn) into a house."""
-        extra = [Item.at(asset, pose) for asset, pose in obstacles]
+        extra = [MovableObject.at(asset, pose) for asset, pose in obstacles]
         self.stage = stage
         self.lattice = stage.lattice.copy()
         self._handles = stage.handles + tuple(self.lattice.add(e.footprint) for e in extra)
@@ -274,7 +274,7 @@ class World:
 
     @staticmethod
     def of_episode(
-        stage: Stage, episode: Episode, assets: Mapping[str, Asset], model: PushModel = "force"
+        stage: HouseModel, episode: Episode, assets: Mapping[str, Asset], model: PushModel = "force"
     ) -> World:
         """Set up an episode at its start.
 
@@ -322,7 +322,7 @@ class World:
         """Lattice distance to the goal, things as they lie; None when cut off."""
         return self.lattice.distance((self.i, self.j), self.goal)
 
-    def way_m(self) -> float | None:
+    def obstructed_path_m(self) -> float | None:
         """Any-angle distance to the goal, things as they lie; None when cut off."""
         return self.way_between(self.position, self.goal_point)
 
@@ -345,9 +345,9 @@ class World:
         loose = [self.items[k].footprint for k in (*displaced, *self.obstacles)]
         return self.stage.ways(displaced), Polygons.joined(loose)
 
-    def clear_m(self) -> float | None:
+    def shortest_path_m(self) -> float | None:
         """Any-angle distance to the goal without obstacles, furniture in its place."""
-        way = self.stage.clear_m(self.position, self.goal_point)
+        way = self.stage.shortest_path_m(self.position, self.goal_point)
         return None if way is None else round_m(way)
 
     def target(self, *, pick: bool) -> int:
@@ -364,7 +364,7 @@ class World:
             return -1
         shells = [placed_shell(item.asset, pose) for k in near for item, pose in [self._at(k)]]
         fixed = [self.stage.fixed[k] for k in touching(self.stage.octagons, round_here)]
-        screen = Screen(shells + [placed_shell(body.asset, body.pose) for body in fixed])
+        screen = Occluders(shells + [placed_shell(body.asset, body.pose) for body in fixed])
         view = view_from(x, y, HEADINGS[self.quarter], self.horizon_deg)
         for _, k in sorted(wanted):
             if screen.seen(view, near.index(k)):
@@ -404,7 +404,7 @@ class World:
                 lattice.remove(handles[k])
             home = self.stage.items[k] if k < len(self.stage.items) else None
             back = home is not None and home.pose == pose
-            items[k] = home if back and home is not None else Item.at(items[k].asset, pose)
+            items[k] = home if back and home is not None else MovableObject.at(items[k].asset, pose)
             octagons[k] = items[k].octagon
             handles[k] = -1 if pose is None else lattice.add(items[k].footprint)
         self.lattice, self.items = lattice, tuple(items)
@@ -435,7 +435,7 @@ class World:
         """Where the goal is, metres."""
         return SPACING_M * self.goal[0], SPACING_M * self.goal[1]
 
-    def _at(self, index: int) -> tuple[Item, Pose]:
+    def _at(self, index: int) -> tuple[MovableObject, Pose]:
         item = self.items[index]
         if item.pose is None:
             raise UsageError(

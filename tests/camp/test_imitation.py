@@ -87,7 +87,7 @@ def test_hrl_decides_at_every_step_and_never_waits():
 
 def test_labels_are_what_the_model_could_have_done(config):
     """Played by the state machine of the agent, labels give the same open options."""
-    from internav_data.camp.agents.options import advanced
+    from internav_data.camp.agents.options import option_step
 
     rng = np.random.default_rng(0)
     for _ in range(20):
@@ -98,7 +98,7 @@ def test_labels_are_what_the_model_could_have_done(config):
             assert (label["open"][k], label["used"][k]) == (opened.item(), used.item())
             assert label["decide"][k] == (opened.item() == 0)
             assert opened.item() in {0, option}
-            opened, used, handed, _ = advanced(
+            opened, used, handed, _ = option_step(
                 torch.tensor([option]), torch.tensor([label["choice"][k]]), used
             )
             assert bool(handed) == (label["action"][k] == WAIT)

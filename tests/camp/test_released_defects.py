@@ -8,7 +8,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from internav_data.camp.agents import AGENTS, Agent, make_agent  # noqa: E402
-from internav_data.camp.agents.options import NAVIGATE, PICK, PUSH, advanced  # noqa: E402
+from internav_data.camp.agents.options import NAVIGATE, PICK, PUSH, option_step  # noqa: E402
 from internav_data.camp.collect import Collector, orders_of, uniforms_of  # noqa: E402
 from internav_data.camp.ppo import update  # noqa: E402
 from internav_data.records.errors import NotFiniteError  # noqa: E402
@@ -79,7 +79,7 @@ def test_defect_4_a_move_counts_once():
 
     tally = EpisodeStatistics(moves=4)
     tally.tried["push"] = tally.done["push"] = 7
-    said = metrics(tally, success=True, clear_m=1.0, steps=12, distance_m=0.0)
+    said = metrics(tally, success=True, shortest_path_m=1.0, steps=12, distance_m=0.0)
     assert said["path_m"] == 1.0
     assert said["spl"] == 1.0
 
@@ -134,7 +134,7 @@ def test_defect_8_a_forced_end_is_told_to_the_networks(config):
     told = []
     for _ in range(12):
         told.append(option_inputs(opened, used)[0].tolist())
-        opened, used, _, forced = advanced(torch.tensor([PUSH]), torch.tensor([5]), used)
+        opened, used, _, forced = option_step(torch.tensor([PUSH]), torch.tensor([5]), used)
     assert told[0] == told[11] == [0.0, 0.0, 0.0]
     assert told[10] == [1.0, 0.0, pytest.approx(10 / 11)]
     assert not forced

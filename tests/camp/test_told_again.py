@@ -6,7 +6,7 @@ torch = pytest.importorskip("torch")
 
 from internav_data.camp.agents import Auxiliary, make_agent  # noqa: E402
 from internav_data.camp.agents.options import NAVIGATE, PICK, PUSH  # noqa: E402
-from internav_data.camp.networks import Course  # noqa: E402
+from internav_data.camp.networks import EpisodeSegments  # noqa: E402
 
 LEARNERS = [
     ("ppo", {}),
@@ -83,7 +83,7 @@ def test_chunks_of_a_gru_are_its_steps():
     inputs, hidden = torch.randn(13, 4, 5), torch.randn(4, 7)
     starts = torch.rand(13, 4) < 0.15
     assert starts.any()
-    out, after = Course(starts).run(gru, inputs, hidden)
+    out, after = EpisodeSegments(starts).run(gru, inputs, hidden)
     h = hidden
     for t in range(13):
         h = h * (~starts[t]).unsqueeze(-1)
@@ -97,8 +97,8 @@ def test_a_chunk_is_one_call():
     """Boundaries are only where an episode begins."""
     starts = torch.zeros(10, 3, dtype=torch.bool)
     starts[4, 1] = starts[4, 2] = starts[7, 0] = True
-    assert Course(starts).bounds == [0, 4, 7, 10]
-    assert Course(torch.zeros(10, 3, dtype=torch.bool)).bounds == [0, 10]
+    assert EpisodeSegments(starts).bounds == [0, 4, 7, 10]
+    assert EpisodeSegments(torch.zeros(10, 3, dtype=torch.bool)).bounds == [0, 10]
 
 
 def test_a_rollout_goes_on_where_the_last_one_stopped(collected):

@@ -195,11 +195,11 @@ def test_resume_refuses_another_dataset_and_damage(request_for, scenes, houses):
 
 
 def test_episodes_are_those_that_are_asked_for(scenes):
-    near = TrainingData(scenes, ["clear_m<=3"]).episodes()
+    near = TrainingData(scenes, ["shortest_path_m<=3"]).episodes()
     assert 0 < len(near) < len(TrainingData(scenes).episodes())
-    assert all(episode.clear_m <= 3.0 for episode in near)
+    assert all(episode.shortest_path_m <= 3.0 for episode in near)
     with pytest.raises(UsageError, match="for which --where holds"):
-        TrainingData(scenes, ["clear_m<=0"])
+        TrainingData(scenes, ["shortest_path_m<=0"])
     with pytest.raises(UsageError, match="COLUMN=VALUE"):
         TrainingData(scenes, ["near"])
 

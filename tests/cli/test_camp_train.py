@@ -75,7 +75,7 @@ def test_a_run_is_trained_and_measured(call, dataset, tmp_path):
         (("DATA", "--set", "ppo.minibatches=5"), 2, ["minibatches", "divide"]),
         (("DATA", "--config", "nowhere.toml"), 2, ["nowhere.toml"]),
         (("DATA", "--stages", "all,single"), 2, ["--stages", "order"]),
-        (("DATA", "--where", "clear_m<=0"), 2, ["no training episodes", "--where"]),
+        (("DATA", "--where", "shortest_path_m<=0"), 2, ["no training episodes", "--where"]),
         (("DATA", "--where", "room=1"), 2, ["room"]),
         (("DATA", "--device", "cuda"), 2, ["no GPU"]),
         (("DATA", "--resume", "--out", "nothing"), 2, ["nothing", "no last checkpoint"]),

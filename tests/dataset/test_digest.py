@@ -80,7 +80,7 @@ def test_empty_list_and_null_differ():
     assert len(digests) == 3
 
 
-@pytest.mark.parametrize("change", [{"index": 1}, {"clear_m": 0.1}, {"mode": "lengthened"}])
+@pytest.mark.parametrize("change", [{"index": 1}, {"shortest_path_m": 0.1}, {"mode": "lengthened"}])
 def test_any_change_changes_the_digest(change):
     one, other = (to_table([strategies.plain(Episode, **v)], EPISODES) for v in ({}, change))
     assert logical_digest(one) != logical_digest(other)

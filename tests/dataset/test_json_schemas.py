@@ -66,7 +66,7 @@ def test_no_dictionary_type_and_no_unknown_unit():
     for spec in TABLES:
         assert "dictionary" not in str(arrow_type(spec.node))
     units = {f.name: f.unit for spec in TABLES for f in spec.node.fields}
-    assert units["clear_m"] == "m"
+    assert units["shortest_path_m"] == "m"
     assert units["mass_kg"] == "kg"
     assert units["area_m2"] == "m^2"
     assert units["mode"] is None

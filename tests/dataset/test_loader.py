@@ -59,8 +59,8 @@ CONDITIONS = st.sampled_from(
         ("room_count", "in", [1, 3]),
         ("mode", "==", "blocked"),
         ("sealed", "==", True),
-        ("clear_m", "<", 9.5),
-        ("steps", ">", 30),
+        ("shortest_path_m", "<", 9.5),
+        ("obstructed_path_steps", ">", 30),
         ("scene_id", "!=", "scene-000002"),
         ("mode", "not in", ["blocked"]),
     ]
@@ -124,12 +124,12 @@ def test_unknown_split_and_column(ds):
 
 
 def test_columns_give_dictionaries(ds, everything):
-    part = load_dataset(ds.path, "val", columns=["obstacles", "clear_m"])
+    part = load_dataset(ds.path, "val", columns=["obstacles", "shortest_path_m"])
     expected = [e for e in everything if e.split == "val"]
-    rows = [{"obstacles": e.obstacles, "clear_m": e.clear_m} for e in expected]
+    rows = [{"obstacles": e.obstacles, "shortest_path_m": e.shortest_path_m} for e in expected]
     assert list(part) == rows
     assert part[3] == rows[3]
-    assert part.to_table().column_names == ["obstacles", "clear_m"]
+    assert part.to_table().column_names == ["obstacles", "shortest_path_m"]
     assert list(part.iterable(shuffle=False)) == rows
 
 
@@ -139,7 +139,7 @@ def test_scene_comes_with_its_assets(ds):
         assert isinstance(house, House)
         assert house.scene_id == episode.scene_id
         assert len(house.rooms) == episode.room_count
-        assert {t.asset_id for t in house.things} <= house.assets.keys()
+        assert {t.asset_id for t in house.objects} <= house.assets.keys()
         assert {o.asset_id for o in episode.obstacles} <= ds.assets.keys()
         assert ds.scene(episode.scene_id) is house
     with pytest.raises(UsageError, match="scene-17"):
@@ -159,8 +159,10 @@ def test_pickled_by_path(ds):
 
 def test_pandas_has_the_scalars(ds, everything):
     frame = ds.to_pandas()
-    assert frame["clear_m"].tolist() == [e.clear_m for e in everything]
-    assert frame["steps"].isna().sum() == sum(e.steps is None for e in everything)
+    assert frame["shortest_path_m"].tolist() == [e.shortest_path_m for e in everything]
+    assert frame["obstructed_path_steps"].isna().sum() == sum(
+        e.obstructed_path_steps is None for e in everything
+    )
     assert "obstacles" not in frame
 
 
@@ -237,7 +239,7 @@ def test_pandas_reads_every_file(dataset_folder):
 
 def test_numbers_of_a_row_are_plain_python(ds):
     episode = ds[0]
-    assert type(episode.clear_m) is float
+    assert type(episode.shortest_path_m) is float
     assert type(episode.index) is int
     assert type(episode.sealed) is bool
     assert type(episode.obstacles[0].quaternion) is tuple

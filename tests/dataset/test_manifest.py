@@ -27,9 +27,38 @@ def test_manifest_returns_as_written(dataset_folder, tmp_path):
 
 
 def test_newer_version_says_upgrade(damaged_folder):
-    edit(damaged_folder, lambda raw: raw.update(format_version=2, news=[1]))
+    edit(damaged_folder, lambda raw: raw.update(format_version=3, news=[1]))
     with pytest.raises(CorruptDataError, match="upgrade"):
         load_dataset(damaged_folder)
+
+
+def test_version_1_says_generate_anew(damaged_folder):
+    edit(damaged_folder, lambda raw: raw.update(format_version=1))
+    with pytest.raises(CorruptDataError, match="generate the dataset anew"):
+        load_dataset(damaged_folder)
+
+
+def test_unknown_keys_are_ignored_unless_required(damaged_folder):
+    before = read_manifest(damaged_folder)
+
+    def add(raw):
+        raw.update(news=[1])
+        raw["files"][0].update(news=2)
+        raw["counts"]["train"].update(news=3)
+
+    edit(damaged_folder, add)
+    assert read_manifest(damaged_folder) == before
+    edit(damaged_folder, lambda raw: raw.update(requires=["counts", "episodes.sealed"]))
+    assert read_manifest(damaged_folder).requires == ("counts", "episodes.sealed")
+    edit(damaged_folder, lambda raw: raw.update(requires=["news"]))
+    with pytest.raises(CorruptDataError, match="does not know news"):
+        read_manifest(damaged_folder)
+
+
+def test_keys_with_a_default_may_be_absent(damaged_folder):
+    before = read_manifest(damaged_folder)
+    edit(damaged_folder, lambda raw: raw.pop("requires"))
+    assert read_manifest(damaged_folder) == before
 
 
 @pytest.mark.parametrize("version", [None, "1", 0, True, 1.5])

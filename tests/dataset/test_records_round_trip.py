@@ -68,7 +68,7 @@ def test_any_run_of_rows_of_a_sliced_table_is_read(records, data):
 @pytest.mark.parametrize(
     ("values", "column"),
     [
-        ({"clear_m": math.nan}, "clear_m"),
+        ({"shortest_path_m": math.nan}, "shortest_path_m"),
         ({"room_count": 1 << 15}, "room_count"),
         ({"mode": "shut"}, "mode"),
         ({"index": None}, "index"),

@@ -31,8 +31,8 @@ def test_statistics_are_those_of_the_records(dataset_folder, split):
         if part:
             mean = {
                 "obstacle_num": statistics.mean(len(e.obstacles) for e in part),
-                "distance_m": statistics.mean(0.25 * e.clear_steps for e in part),
-                "cross_room_num": statistics.mean(e.rooms_on_way for e in part),
+                "distance_m": statistics.mean(0.25 * e.shortest_path_steps for e in part),
+                "cross_room_num": statistics.mean(e.rooms_on_path for e in part),
             }
             assert {k: row[k] for k in mean} == pytest.approx(mean, abs=1e-6)
         assert row["blocked"] == sum(e.mode == "blocked" for e in part)
@@ -47,10 +47,12 @@ def test_statistics_are_those_of_the_records(dataset_folder, split):
     share = sum(e.sealed for e in blocked) / len(blocked)
     assert stats["sealed_share_of_blocked"] == pytest.approx(share, abs=1e-6)
     assert stats["room_count"] == Counter(str(e.room_count) for e in episodes)
-    longer = [e.steps - e.clear_steps for e in episodes if e.mode == "lengthened"]
+    longer = [
+        e.obstructed_path_steps - e.shortest_path_steps for e in episodes if e.mode == "lengthened"
+    ]
     assert stats["detour_steps"]["median"] == statistics.median(longer)
-    assert stats["clear_m"]["mean"] == pytest.approx(
-        statistics.mean(e.clear_m for e in episodes), abs=1e-6
+    assert stats["shortest_path_m"]["mean"] == pytest.approx(
+        statistics.mean(e.shortest_path_m for e in episodes), abs=1e-6
     )
 
 
@@ -58,8 +60,11 @@ def test_statistics_are_those_of_the_records(dataset_folder, split):
 def test_interactions_are_those_of_the_records(dataset_folder, split):
     episodes = list(load_dataset(dataset_folder, split))
     stats = compute_stats(str(dataset_folder), split)
-    spl = [e.clear_m / max(e.clear_m, e.expert.path_m) if e.expert else 0.0 for e in episodes]
-    sts = [e.clear_m / 0.25 / e.expert.steps if e.expert else 0.0 for e in episodes]
+    spl = [
+        e.shortest_path_m / max(e.shortest_path_m, e.expert.path_m) if e.expert else 0.0
+        for e in episodes
+    ]
+    sts = [e.shortest_path_m / 0.25 / e.expert.steps if e.expert else 0.0 for e in episodes]
     solved = [e.expert for e in episodes if e.expert]
     assert 0 < len(solved) < len(episodes), "some have none"
     said = stats["expert"]

@@ -174,9 +174,13 @@ def test_to_torch(dataset_folder):
     ds = load_dataset(dataset_folder)
     tensors = ds.to_torch()
     episodes = list(ds)
-    assert tensors["clear_m"].dtype == torch.float64
+    assert tensors["shortest_path_m"].dtype == torch.float64
     assert tensors["mode"].tolist() == [int(e.mode == "lengthened") for e in episodes]
-    assert tensors["steps"].tolist() == [-1 if e.steps is None else e.steps for e in episodes]
-    assert tensors["way_m"].isnan().tolist() == [e.way_m is None for e in episodes]
+    assert tensors["obstructed_path_steps"].tolist() == [
+        -1 if e.obstructed_path_steps is None else e.obstructed_path_steps for e in episodes
+    ]
+    assert tensors["obstructed_path_m"].isnan().tolist() == [
+        e.obstructed_path_m is None for e in episodes
+    ]
     assert tensors["sealed"].tolist() == [e.sealed for e in episodes]
     assert "episode_id" not in tensors

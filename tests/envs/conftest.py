@@ -6,8 +6,8 @@ from types import MappingProxyType
 
 import pytest
 
-from internav_data.envs.episode import Play, Rules
-from internav_data.envs.source import Place
+from internav_data.envs.episode import EpisodeRun, TaskConfig
+from internav_data.envs.source import LoadedHouse
 from internav_data.generation import generate, load_config
 from internav_data.records import (
     Asset,
@@ -78,7 +78,7 @@ def hand_house(*, divided):
     ]
     return House(
         scene_id="scene-000003", scene=3, seed=0, split="train", preset="paper", outline=outline,
-        rooms=tuple(rooms), doors=doors, windows=(), walls=tuple(walls), things=(),
+        rooms=tuple(rooms), doors=doors, windows=(), walls=tuple(walls), objects=(),
         materials=(
             Material("oak", (190, 150, 105), "planks"),
             Material("white", (240, 240, 236), "plain"),
@@ -87,7 +87,7 @@ def hand_house(*, divided):
     )  # fmt: skip
 
 
-def hand_episode(x, start_i, goal_i, *, pickable, clear_m, goal_j=6):
+def hand_episode(x, start_i, goal_i, *, pickable, shortest_path_m, goal_j=6):
     """A crate at (x, 1.5) and an agent at (start_i, 6) that looks along +x."""
     kind = "Box" if pickable else "Stool"
     obstacle = Obstacle(
@@ -97,11 +97,12 @@ def hand_episode(x, start_i, goal_i, *, pickable, clear_m, goal_j=6):
     goal = (0.25 * goal_i, 0.25 * goal_j)
     return Episode(
         episode_id="scene-000003/0001", scene_id="scene-000003", split="train", index=1, seed=0,
-        room_count=1, mode="blocked", sealed=True, rooms_on_way=1, obstacle_count=1,
-        clear_m=clear_m, clear_steps=goal_i - start_i, way_m=None, steps=None,
+        room_count=1, mode="blocked", sealed=True, rooms_on_path=1, obstacle_count=1,
+        shortest_path_m=shortest_path_m, shortest_path_steps=goal_i - start_i,
+        obstructed_path_m=None, obstructed_path_steps=None,
         start=Start(start_i, 6, 0.25 * start_i, 1.5, 0, 0), goal=Goal(goal_i, goal_j, *goal, 0),
-        room_paths=((0,),), room_paths_cut=False,
-        node_paths=(NodePath((), ((0.25 * start_i, 1.5), goal)),), node_paths_cut=False,
+        room_paths=((0,),), room_paths_truncated=False,
+        node_paths=(NodePath((), ((0.25 * start_i, 1.5), goal)),), node_paths_truncated=False,
         obstacles=(obstacle,), expert=None, physics=Physics("bullet", "3.2.7", 0.1, 0.0),
     )  # fmt: skip
 
@@ -109,14 +110,14 @@ def hand_episode(x, start_i, goal_i, *, pickable, clear_m, goal_j=6):
 @pytest.fixture(scope="session")
 def hand_play():
     """Make a play: a crate in a door (divided) or in the middle of a room."""
-    places = {d: Place.of(hand_house(divided=d)) for d in (False, True)}
+    places = {d: LoadedHouse.of(hand_house(divided=d)) for d in (False, True)}
 
     def make(*, divided, pickable=True, **rules):
         if divided:
-            episode = hand_episode(3.0, 8, 20, pickable=pickable, clear_m=3.0)
+            episode = hand_episode(3.0, 8, 20, pickable=pickable, shortest_path_m=3.0)
         else:
-            episode = hand_episode(2.0, 4, 20, pickable=pickable, clear_m=4.0)
-        return Play(episode, places[divided], ASSETS, Rules(**rules))
+            episode = hand_episode(2.0, 4, 20, pickable=pickable, shortest_path_m=4.0)
+        return EpisodeRun(episode, places[divided], ASSETS, TaskConfig(**rules))
 
     return make
 

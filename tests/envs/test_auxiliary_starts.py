@@ -6,7 +6,7 @@ from internav_data.dataset import load_dataset
 from internav_data.envs import InterNavEnv, InterNavVectorEnv
 from internav_data.envs.auxiliary import auxiliary_starts, is_cleared, world_at
 from internav_data.records.errors import UsageError
-from internav_data.world import Action, Stage
+from internav_data.world import Action, HouseModel
 
 
 @pytest.mark.parametrize("kind", ["push", "pick"])
@@ -14,7 +14,7 @@ def test_agents_stand_opposite_to_the_goal_and_can_act(small, kind):
     dataset = load_dataset(small)
     seen = 0
     for episode in dataset:
-        stage = Stage.of(dataset.scene(episode.scene_id))
+        stage = HouseModel.of(dataset.scene(episode.scene_id))
         starts = auxiliary_starts(stage, episode, dataset.assets, kind)
         assert starts == auxiliary_starts(stage, episode, dataset.assets, kind)
         assert len(set(starts)) == len(starts)
@@ -36,10 +36,10 @@ def test_no_start_is_in_a_pocket_that_nothing_leads_out_of(small, monkeypatch):
     """Where the goal stays out of reach with every obstacle gone, no distance is finite."""
     dataset = load_dataset(small)
     episode = next(e for e in dataset if any(o.pickable for o in e.obstacles))
-    stage = Stage.of(dataset.scene(episode.scene_id))
+    stage = HouseModel.of(dataset.scene(episode.scene_id))
     starts = auxiliary_starts(stage, episode, dataset.assets, "pick")
     for start in starts:
-        assert stage.clear_m((start.i / 4, start.j / 4), (episode.goal.x, episode.goal.y))
+        assert stage.shortest_path_m((start.i / 4, start.j / 4), (episode.goal.x, episode.goal.y))
     pocket = starts[0][:2]
     real = type(stage.lattice).distances
 
@@ -65,7 +65,7 @@ def test_what_cleared_means(before, after, cleared):
 def test_an_environment_begins_at_a_start(small):
     dataset = load_dataset(small)
     episode = next(e for e in dataset if any(o.pickable for o in e.obstacles))
-    stage = Stage.of(dataset.scene(episode.scene_id))
+    stage = HouseModel.of(dataset.scene(episode.scene_id))
     start = auxiliary_starts(stage, episode, dataset.assets, "pick")[0]
     env = InterNavEnv(small, 16)
     options = {"episode_id": episode.episode_id, "start": start[:3]}

@@ -10,13 +10,13 @@ from gymnasium.utils.env_checker import check_env
 
 import internav_data.envs
 from internav_data.dataset import load_dataset
-from internav_data.envs import EnvState, InterNavVectorEnv
+from internav_data.envs import EpisodeSnapshot, InterNavVectorEnv
 from internav_data.envs.order import EpisodeOrder
-from internav_data.envs.source import FIELDS_KEPT, Places, open_source
+from internav_data.envs.source import FIELDS_KEPT, LoadedHouses, open_source
 from internav_data.generation import generate, load_config
 from internav_data.navigation import TangentGraph
 from internav_data.records.errors import CorruptDataError, UsageError
-from internav_data.world import Action, Stage, World
+from internav_data.world import Action, HouseModel, World
 
 WEIGHTS = np.array([8, 1.5, 1.5, 0.3, 0.3, 1, 1, 1, 1, 1.5, 1.5, 0.4])
 
@@ -160,7 +160,7 @@ def test_metrics_agree_with_another_count(small):
     env = make(small)
     env.reset(options={"episode_id": episode.episode_id})
     house = dataset.scene(episode.scene_id)
-    world = World.of_episode(Stage.of(house), episode, dataset.assets)
+    world = World.of_episode(HouseModel.of(house), episode, dataset.assets)
     ways, goal = TangentGraph.of(house), (episode.goal.x, episode.goal.y)
     path, drops, total = 0.0, 0.0, 0.0
     chosen = [a for a in actions(11, 150).tolist() if a != Action.DONE]
@@ -346,7 +346,7 @@ def test_vector_states(small):
     for _ in steps_of(env, 2, 25):
         pass
     states = env.state()
-    assert all(isinstance(state, EnvState) for state in states)
+    assert all(isinstance(state, EpisodeSnapshot) for state in states)
     other = InterNavVectorEnv(2, small, 16)
     other.restore(states)
     for row in actions(5, 30, 2):
@@ -361,7 +361,7 @@ def test_registered_once():
 
 def test_so_many_houses_are_kept(small):
     source = open_source(small)
-    places = Places(2)
+    places = LoadedHouses(2)
     first = source.episode(0)
     house = source.dataset.scene(first.scene_id)
     assert places.of("d", house) is places.of("d", house)

@@ -21,7 +21,7 @@ from internav_data.physics.scene import UPRIGHT
 from internav_data.planner.search import replay
 from internav_data.records import Pose
 from internav_data.records.errors import QuarantineError, UsageError
-from internav_data.world import Action, Stage, World
+from internav_data.world import Action, HouseModel, World
 
 SCENES = (0, 1, 6)
 
@@ -93,11 +93,11 @@ def test_modes_take_turns_and_hold(episodes):
         for episode in batch:
             assert episode.mode == mode_of(scene, episode.index)
             if episode.mode == "blocked":
-                assert episode.steps is None
+                assert episode.obstructed_path_steps is None
             else:
-                assert episode.steps > episode.clear_steps
+                assert episode.obstructed_path_steps > episode.shortest_path_steps
                 assert not episode.sealed
-            assert episode.sealed == (episode.way_m is None)
+            assert episode.sealed == (episode.obstructed_path_m is None)
 
 
 def test_steps_are_those_of_networkx_and_shapely(houses, episodes):
@@ -106,9 +106,9 @@ def test_steps_are_those_of_networkx_and_shapely(houses, episodes):
         for episode in episodes[scene][:2]:
             start, goal = (episode.start.i, episode.start.j), (episode.goal.i, episode.goal.j)
             still, *obstacles = everything(house, episode)
-            assert steps_by_networkx(house, still, start, goal) == episode.clear_steps
+            assert steps_by_networkx(house, still, start, goal) == episode.shortest_path_steps
             crowded = [*still, *itertools.chain(*obstacles)]
-            assert steps_by_networkx(house, crowded, start, goal) == episode.steps
+            assert steps_by_networkx(house, crowded, start, goal) == episode.obstructed_path_steps
 
 
 def test_the_last_obstacle_is_what_made_the_difference(houses, episodes):
@@ -121,7 +121,7 @@ def test_the_last_obstacle_is_what_made_the_difference(houses, episodes):
         steps = steps_by_networkx(house, before, start, goal)
         assert steps is not None
         if episode.mode == "lengthened":
-            assert steps == episode.clear_steps
+            assert steps == episode.shortest_path_steps
 
 
 def test_obstacles_touch_nothing(houses, episodes):
@@ -138,10 +138,10 @@ def test_start_and_goal_are_apart_and_in_two_rooms(houses, episodes):
             for place in (episode.start, episode.goal):
                 assert rooms[place.room].covers(shapely.Point(place.x, place.y))
                 assert (place.x, place.y) == (0.25 * place.i, 0.25 * place.j)
-            assert episode.clear_m >= 2.0
+            assert episode.shortest_path_m >= 2.0
             assert (episode.start.room == episode.goal.room) == (episode.room_count == 1)
             assert (
-                episode.clear_m
+                episode.shortest_path_m
                 >= math.dist((episode.start.x, episode.start.y), (episode.goal.x, episode.goal.y))
                 - 1e-4
             )
@@ -181,7 +181,7 @@ def test_obstacles_stay_at_rest_in_a_whole_scene_of_bullet(houses, episodes):
                 [shapely.Polygon(p) for p in footprint(assets[obstacle.asset_id], obstacle.pose)]
             )
             others = [o for j, o in enumerate(episode.obstacles) if j != k]
-            things = [t for t in houses[1].things if assets[t.asset_id].blocks]
+            things = [t for t in houses[1].objects if assets[t.asset_id].blocks]
             near = [
                 Body(assets[t.asset_id], t.pose, moves=False)
                 for t in (*things, *others)
@@ -207,7 +207,7 @@ def test_obstacles_stay_at_rest_in_a_whole_scene_of_bullet(houses, episodes):
 
 def test_outcomes_and_expert_are_those_of_a_fresh_world(houses, episodes):
     for scene, batch in episodes.items():
-        stage = Stage.of(houses[scene])
+        stage = HouseModel.of(houses[scene])
         for episode in batch:
 
             def world(stage=stage, episode=episode):
@@ -216,7 +216,10 @@ def test_outcomes_and_expert_are_those_of_a_fresh_world(houses, episodes):
             assert tuple(o.outcomes for o in episode.obstacles) == outcomes_of(world())
             assert replay(world(), episode.expert.actions) == episode.expert
             # What the columns say of the start is what the world says.
-            assert (world().steps(), world().way_m()) == (episode.steps, episode.way_m)
+            assert (world().steps(), world().obstructed_path_m()) == (
+                episode.obstructed_path_steps,
+                episode.obstructed_path_m,
+            )
 
 
 def test_the_expert_acts_where_the_grid_is_blocked(episodes):
@@ -256,7 +259,7 @@ def test_kept_without_expert_it_is_marked_and_has_outcomes(refused, pool):
     assert episode.expert is None
     assert "no expert" not in kept.redraws
     assert episode != batch.episodes[0]
-    world = World.of_episode(Stage.of(house), episode, catalogue().assets)
+    world = World.of_episode(HouseModel.of(house), episode, catalogue().assets)
     assert tuple(o.outcomes for o in episode.obstacles) == outcomes_of(world)
 
 
@@ -273,7 +276,7 @@ def test_redraws_of_a_batch_are_those_of_its_episodes(houses, pool):
 
 def test_the_push_model_is_the_configs(houses, pool):
     kick = EpisodeConfig(push_model="kick", keep_unsolvable=True)
-    stage = Stage.of(houses[1])
+    stage = HouseModel.of(houses[1])
     made = build_episodes(houses[1], 3, pool, kick)
     for episode in made:
         world = World.of_episode(stage, episode, catalogue().assets, "kick")
@@ -286,14 +289,20 @@ def test_the_push_model_is_the_configs(houses, pool):
 
 
 def test_an_impossible_episode_is_quarantined_and_named(houses, pool):
-    config = EpisodeConfig(redraws=2, least_clear_m=1000.0)
+    config = EpisodeConfig(redraws=2, min_shortest_path_m=1000.0)
     with pytest.raises(QuarantineError, match=r"scene-000006, episode 0: .*blocked in 2 draws"):
         build_episodes(houses[6], 1, pool, config)
 
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("spots", 0), ("redraws", -1), ("gap_m", -0.1), ("least_clear_m", 0.0), ("sideways_m", -1.0)],
+    [
+        ("spots", 0),
+        ("redraws", -1),
+        ("gap_m", -0.1),
+        ("min_shortest_path_m", 0.0),
+        ("sideways_m", -1.0),
+    ],
 )
 def test_settings_that_cannot_be_meant_are_refused(field, value):
     with pytest.raises(UsageError, match=f"episodes.{field}: expected .* got {value}"):

@@ -10,7 +10,7 @@ from internav_data.episodes.outcomes import PICK, PUSHES, outcomes_of
 from internav_data.geometry import Polygons
 from internav_data.houses import HouseConfig, build_house
 from internav_data.navigation import Lattice, TangentGraph
-from internav_data.world import Stage, World
+from internav_data.world import HouseModel, World
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +18,7 @@ def tables():
     out = []
     for scene in (0, 6):
         house = build_house(0, scene, HouseConfig(), catalogue())
-        stage = Stage.of(house)
+        stage = HouseModel.of(house)
         for episode in build_episodes(house, 3, catalogue().spawnable):
             world = World.of_episode(stage, episode, catalogue().assets)
             before = world.digest()
@@ -37,7 +37,9 @@ def test_every_obstacle_has_five(tables):
             for outcome in outcomes:
                 assert outcome.success == (not outcome.reason)
                 assert outcome.opened == (
-                    outcome.success and episode.steps is None and outcome.steps is not None
+                    outcome.success
+                    and episode.obstructed_path_steps is None
+                    and outcome.path_steps_after is not None
                 )
 
 
@@ -45,7 +47,10 @@ def test_failed_ones_leave_the_distances(tables):
     for episode, _, table in tables:
         for outcome in itertools.chain.from_iterable(table):
             if not outcome.success:
-                assert (outcome.steps, outcome.way_m) == (episode.steps, episode.way_m)
+                assert (outcome.path_steps_after, outcome.path_m_after) == (
+                    episode.obstructed_path_steps,
+                    episode.obstructed_path_m,
+                )
                 assert outcome.displacement_m == 0.0
             elif outcome.action != PICK:
                 assert outcome.displacement_m >= 0.05
@@ -69,10 +74,12 @@ def test_distances_are_those_of_fresh_graphs(tables):
                 loose = [item.footprint for item in there.items]
                 everything = Polygons.joined([world.stage.footprints, *loose])
                 fresh = Lattice.of_polygons(everything, world.stage.house.outline)
-                assert outcome.steps == fresh.distance(start, goal)
+                assert outcome.path_steps_after == fresh.distance(start, goal)
                 way = TangentGraph.of_polygons(everything).distance(
                     (episode.start.x, episode.start.y), (episode.goal.x, episode.goal.y)
                 )
-                assert outcome.way_m == (None if way is None else pytest.approx(way, abs=2e-4))
+                assert outcome.path_m_after == (
+                    None if way is None else pytest.approx(way, abs=2e-4)
+                )
                 checked += 1
     assert checked >= 10

@@ -27,7 +27,7 @@ def row():
         said = {
             "episode_id": f"scene-{scene:06d}/{number:04d}", "scene_id": f"scene-{scene:06d}",
             "room_count": 2, "obstacle_count": 1, "mode": "blocked", "success": True, "steps": 40,
-            "distance_m": 0.0, "clear_m": 5.0, "path_m": 6.25, "spl": 0.8, "sts": 0.5,
+            "distance_m": 0.0, "shortest_path_m": 5.0, "path_m": 6.25, "spl": 0.8, "sts": 0.5,
             "pushes_tried": 0, "pushes_done": 0, "picks_tried": 0, "picks_done": 0,
             "drops_tried": 0, "drops_done": 0, "interaction_m": 0.0, "openings": 0, "closings": 0,
             "reward_sum": 10.0, "actions": (11,),

@@ -5,11 +5,11 @@ import pytest
 
 from internav_data.dataset import load_dataset
 from internav_data.envs.single import InterNavEnv
-from internav_data.evaluation.evaluate import Settings, chosen, episode_generator, evaluate
+from internav_data.evaluation.evaluate import EvaluationConfig, chosen, episode_generator, evaluate
 from internav_data.evaluation.reference_policies import RandomPlayer, ScriptedPlayer, oracle
 from internav_data.records.errors import UsageError
 
-SHORT = Settings(batch=3, max_steps=30)
+SHORT = EvaluationConfig(batch=3, max_steps=30)
 
 
 class Looking(RandomPlayer):
@@ -24,22 +24,25 @@ class Looking(RandomPlayer):
 
 @pytest.fixture(scope="module")
 def alone(played_data):
-    return evaluate(Looking(), played_data, Settings(batch=1, max_steps=30))
+    return evaluate(Looking(), played_data, EvaluationConfig(batch=1, max_steps=30))
 
 
 @pytest.mark.parametrize("batch", [2, 5, 64])
 def test_the_batch_changes_nothing(played_data, alone, batch):
-    assert evaluate(Looking(), played_data, Settings(batch=batch, max_steps=30)) == alone
+    assert evaluate(Looking(), played_data, EvaluationConfig(batch=batch, max_steps=30)) == alone
 
 
 def test_processes_change_nothing(played_data, alone):
-    assert evaluate(Looking(), played_data, Settings(batch=4, workers=2, max_steps=30)) == alone
+    assert (
+        evaluate(Looking(), played_data, EvaluationConfig(batch=4, workers=2, max_steps=30))
+        == alone
+    )
 
 
 def test_neither_neighbours_nor_order_change_an_episode(played_data, alone):
     known = {result.episode_id: result for result in alone}
     assert [result.episode_id for result in alone] == [e.episode_id for e in played_data]
-    few = evaluate(Looking(), played_data, Settings(batch=2, max_steps=30, limit=5))
+    few = evaluate(Looking(), played_data, EvaluationConfig(batch=2, max_steps=30, limit=5))
     assert len(few) == 5
     assert all(known[result.episode_id] == result for result in few)
     only = load_dataset(played_data.path, "test")
@@ -49,7 +52,7 @@ def test_neither_neighbours_nor_order_change_an_episode(played_data, alone):
 
 
 def test_the_seed_changes_what_is_drawn(played_data, alone):
-    other = evaluate(Looking(), played_data, Settings(seed=1, batch=4, max_steps=30))
+    other = evaluate(Looking(), played_data, EvaluationConfig(seed=1, batch=4, max_steps=30))
     assert [r.actions for r in other] != [r.actions for r in alone]
 
 
@@ -69,7 +72,7 @@ def test_what_was_done_can_be_played_again(played_data, alone):
 
 def test_long_episodes_are_cut_off(played_data):
     turning = ScriptedPlayer("turning", lambda _: [1] * 100)
-    results = evaluate(turning, played_data, Settings(max_steps=7, limit=4))
+    results = evaluate(turning, played_data, EvaluationConfig(max_steps=7, limit=4))
     assert [(r.steps, r.success, r.path_m) for r in results] == [(7, False, 0.0)] * 4
     assert [len(r.actions) for r in results] == [7] * 4
 
@@ -78,7 +81,7 @@ def test_seats_of_ended_episodes_wait_for_the_last(played_data):
     """One long episode among short ones, over many more steps than an idle seat may wait."""
     first = played_data[0].episode_id
     script = ScriptedPlayer("one long", lambda e: [1] * 40 if e.episode_id == first else [11])
-    results = evaluate(script, played_data, Settings(batch=16, max_steps=40))
+    results = evaluate(script, played_data, EvaluationConfig(batch=16, max_steps=40))
     assert [r.steps for r in results] == [40] + [1] * (len(played_data) - 1)
 
 
@@ -117,7 +120,7 @@ def test_random_numbers_belong_to_the_episode(hand_episode):
 )
 def test_settings_that_cannot_be_meant(played_data, wrong):
     with pytest.raises(UsageError, match=next(iter(wrong))):
-        evaluate(RandomPlayer(), played_data, Settings(**wrong))
+        evaluate(RandomPlayer(), played_data, EvaluationConfig(**wrong))
 
 
 def test_nothing_to_play_says_so(played_data):

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from internav_data.dataset import from_table, to_table
-from internav_data.evaluation.evaluate import Settings, evaluate
+from internav_data.evaluation.evaluate import EvaluationConfig, evaluate
 from internav_data.evaluation.metrics import GROUPS, MEASURES, RESULTS, result_of, summary
 from internav_data.evaluation.reference_policies import oracle
-from internav_data.verification.checked_layout import Site
+from internav_data.verification.checked_layout import CheckedLayout
 from internav_data.verification.lengths import Between
 from internav_data.verification.shapes import Shapes
-from internav_data.world import Action, Stage, World
+from internav_data.world import Action, HouseModel, World
 
 KINDS = {
     **dict.fromkeys(range(Action.PUSH_AHEAD, Action.PUSH_LEFT + 1), "pushes"),
@@ -88,7 +88,7 @@ def test_an_unreachable_end_is_a_failure_that_counts(hand_episode):
     }  # fmt: skip
     result = result_of(hand_episode, said, [0, 0, 11])
     assert (result.success, result.spl, result.sts) == (False, 0.0, 0.0)
-    assert result.distance_m == hand_episode.clear_m
+    assert result.distance_m == hand_episode.shortest_path_m
     near = result_of(hand_episode, said | {"distance_to_goal_m": 0.0}, [0, 0, 11])
     assert (near.success, near.spl, near.distance_m) == (True, 0.9, 0.0)
     assert summary([result, near]).values["success"] == 0.5
@@ -140,14 +140,16 @@ def played_again(stage, episode, assets, actions):
 @pytest.mark.parametrize("who", ["expert", "random", "planner"])
 def test_the_environment_says_what_the_definitions_say(played_data, who):
     """Every metric again: by networkx and the validator's visibility graph, from the actions."""
-    settings = Settings(max_steps=60)
+    settings = EvaluationConfig(max_steps=60)
     results = evaluate(oracle(who, played_data), played_data, settings)
     assert len(results) == len(played_data)
     worked = moved = 0
     for result, episode in zip(results, played_data, strict=True):
         house = played_data.scene(episode.scene_id)
-        found, world = played_again(Stage.of(house), episode, played_data.assets, result.actions)
-        length, steps = episode.clear_m, len(result.actions)
+        found, world = played_again(
+            HouseModel.of(house), episode, played_data.assets, result.actions
+        )
+        length, steps = episode.shortest_path_m, len(result.actions)
         assert result.steps == steps <= settings.max_steps
         assert result.success == found["reached"]
         assert result.path_m == pytest.approx(0.25 * found["moves"])
@@ -160,7 +162,9 @@ def test_the_environment_says_what_the_definitions_say(played_data, who):
         sts = length / 0.25 / steps if found["reached"] else 0.0
         assert result.spl == pytest.approx(spl)
         assert result.sts == pytest.approx(sts)
-        between = Between(Site(house, Shapes(played_data.assets)), world.position, world.goal_point)
+        between = Between(
+            CheckedLayout(house, Shapes(played_data.assets)), world.position, world.goal_point
+        )
         assert between.agrees(result.distance_m), "any-angle, no obstacle about"
         assert MEASURES["distance_m"].of([result]) == result.distance_m
         worked += result.pushes_done + result.picks_done

@@ -4,12 +4,12 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from internav_data.evaluation.evaluate import Settings, evaluate
+from internav_data.evaluation.evaluate import EvaluationConfig, evaluate
 from internav_data.evaluation.metrics import summary
 from internav_data.evaluation.reference_policies import nearest, oracle, planner_of, shortest
 from internav_data.navigation import Lattice
 from internav_data.records.errors import UsageError
-from internav_data.world import Action, Stage, World
+from internav_data.world import Action, HouseModel, World
 
 STEPS = ((1, 0), (0, 1), (-1, 0), (0, -1))
 INTERACTIONS = set(range(Action.PUSH_AHEAD, Action.DROP + 1))
@@ -22,7 +22,7 @@ def rows(played_data):
 
 
 def world_of(dataset, episode):
-    return World.of_episode(Stage.of(dataset.scene(episode.scene_id)), episode, dataset.assets)
+    return World.of_episode(HouseModel.of(dataset.scene(episode.scene_id)), episode, dataset.assets)
 
 
 def test_the_expert_does_what_is_stored_and_solves_all(played_data, rows):
@@ -37,15 +37,15 @@ def test_the_planner_touches_nothing_and_walks_the_shortest_way(played_data, row
     assert {e.mode for e in played_data} == {"blocked", "lengthened"}
     for result, episode in zip(rows["planner"], played_data, strict=True):
         assert not INTERACTIONS & set(result.actions)
-        assert result.success == (episode.steps is not None)
-        if episode.steps is not None:
-            assert result.path_m == pytest.approx(0.25 * episode.steps)
+        assert result.success == (episode.obstructed_path_steps is not None)
+        if episode.obstructed_path_steps is not None:
+            assert result.path_m == pytest.approx(0.25 * episode.obstructed_path_steps)
 
 
 def test_where_cut_off_the_planner_walks_as_near_as_it_can(played_data, rows):
     blocked = 0
     for result, episode in zip(rows["planner"], played_data, strict=True):
-        if episode.steps is not None:
+        if episode.obstructed_path_steps is not None:
             continue
         blocked += 1
         world = world_of(played_data, episode)
@@ -118,7 +118,10 @@ def test_ties_of_the_nearest_go_by_the_walk():
 def test_chance_is_even_and_of_the_episode(played_data, rows):
     counts = np.bincount([a for r in rows["random"] for a in r.actions], minlength=12)
     assert (counts > 0).all()
-    assert evaluate(oracle("random", played_data), played_data, Settings(batch=2)) == rows["random"]
+    assert (
+        evaluate(oracle("random", played_data), played_data, EvaluationConfig(batch=2))
+        == rows["random"]
+    )
     player = oracle("random", played_data)
     player.begin(1, 0)
     drawn = []

@@ -7,14 +7,14 @@ import types
 import numpy as np
 import pytest
 
-from internav_data.camp.policy import AgentPlayer, candidate, oracles_beside, row_name
-from internav_data.evaluation.evaluate import Settings, episode_generator, evaluate
+from internav_data.camp.policy import AgentPolicy, candidate, oracles_beside, row_name
+from internav_data.evaluation.evaluate import EvaluationConfig, episode_generator, evaluate
 from internav_data.records.errors import UsageError
 
 torch = pytest.importorskip("torch")
 agents = pytest.importorskip("internav_data.camp.agents")
 
-SHORT = Settings(batch=3, max_steps=12, limit=6)
+SHORT = EvaluationConfig(batch=3, max_steps=12, limit=6)
 
 
 @pytest.fixture(scope="module")
@@ -39,14 +39,16 @@ def make():
 
 
 def player(agent, *, greedy=False):
-    return AgentPlayer("someone", agent, 16, greedy=greedy)
+    return AgentPolicy("someone", agent, 16, greedy=greedy)
 
 
 @pytest.mark.parametrize("method", ["ppo", "ppo-intent", "hrl", "camp"])
 def test_agents_play_the_same_in_any_batch(played_data, make, method):
     agent = make(method)
     results = {
-        batch: evaluate(player(agent), played_data, Settings(batch=batch, max_steps=12, limit=6))
+        batch: evaluate(
+            player(agent), played_data, EvaluationConfig(batch=batch, max_steps=12, limit=6)
+        )
         for batch in (1, 4)
     }
     assert results[1] == results[4]
@@ -89,7 +91,7 @@ class Recorder:
 
 def test_state_begins_anew_with_each_episode_and_numbers_are_the_episodes(played_data):
     agent = Recorder()
-    results = evaluate(player(agent), played_data, Settings(seed=5, batch=1, limit=3))
+    results = evaluate(player(agent), played_data, EvaluationConfig(seed=5, batch=1, limit=3))
     assert [r.steps for r in results] == [4, 4, 4], "a state that leaked would end at once"
     assert agent.starts == [[k % 4 == 0] for k in range(12)]
     drawn = torch.cat(agent.uniforms).numpy()

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from internav_data.evaluation.archive import About, Evaluation
-from internav_data.evaluation.evaluate import Settings, evaluate
+from internav_data.evaluation.evaluate import EvaluationConfig, evaluate
 from internav_data.evaluation.reference_policies import oracle
 from internav_data.evaluation.report import (
     data_of,
@@ -27,7 +27,7 @@ from internav_data.records.errors import UsageError
 
 @pytest.fixture(scope="module")
 def settings():
-    return Settings(max_steps=25, limit=6)
+    return EvaluationConfig(max_steps=25, limit=6)
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,7 @@
 import io
 
 from internav_data.core.progress import clock
-from internav_data.generation.progress import Progress
+from internav_data.generation.progress import GenerationProgress
 
 
 class Terminal(io.StringIO):
@@ -23,7 +23,7 @@ def test_clock():
 
 
 def begun(stream, ago):
-    progress = Progress(stream)
+    progress = GenerationProgress(stream)
     progress.begin(scenes=100, done=40, episodes_left=600)
     progress._began -= ago
     progress._told -= ago

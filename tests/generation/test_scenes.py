@@ -99,10 +99,10 @@ def test_a_dataset_that_holds_something_else_is_told(dataset, monkeypatch):
     import internav_data.generation.reproduce as module
 
     true = module.made_again(CONFIG, 2, 1)
-    moved = dataclasses.replace(true.episodes[1], clear_m=99.0)
+    moved = dataclasses.replace(true.episodes[1], shortest_path_m=99.0)
     false = dataclasses.replace(true, episodes=(true.episodes[0], moved))
     monkeypatch.setattr(module, "made_again", lambda *_: false)
-    with pytest.raises(ValidationError, match=r"scene-000002/0001 differs.*: clear_m$"):
+    with pytest.raises(ValidationError, match=r"scene-000002/0001 differs.*: shortest_path_m$"):
         scene_again(CONFIG, 2, 1, dataset)
 
 

@@ -157,7 +157,7 @@ def test_a_houses_footprints_are_its_walls_then_its_things(hand_house):
     assert [tuple(p[0]) for p in walls] == [(w.x_min, w.y_min) for w in low]
     everything = list(house_footprints(hand_house))
     things = [
-        p for t in hand_house.things for p in footprint(hand_house.assets[t.asset_id], t.pose)
+        p for t in hand_house.objects for p in footprint(hand_house.assets[t.asset_id], t.pose)
     ]
     assert len(everything) == len(walls) + len(things)
     assert all(np.array_equal(a, b) for a, b in zip(everything[len(walls) :], things, strict=True))

@@ -79,7 +79,7 @@ def check_doors(house):
             if room.room_id in door.rooms:
                 clear = clear_polygon(room).buffer(1e-6)
                 assert sum(clear.covers(zone) for zone in zones.values()) == 1, (door, room)
-        for thing in house.things:
+        for thing in house.objects:
             for plan, low, high in parts_of(house, thing):
                 if low < door.height_m and high > 0.02:
                     assert all(zone.intersection(plan).area < 1e-6 for zone in zones.values()), (
@@ -125,22 +125,22 @@ def check_walls(house):
 
 
 def check_things(house):
-    parts = [parts_of(house, thing) for thing in house.things]
+    parts = [parts_of(house, thing) for thing in house.objects]
     bounds = [shapely.union_all([plan for plan, _, _ in ps]).bounds for ps in parts]
-    for k, thing in enumerate(house.things):
-        assert thing.thing_id == k
+    for k, thing in enumerate(house.objects):
+        assert thing.object_id == k
         room = clear_polygon(house.rooms[thing.room])
         for plan, low, high in parts[k]:
             assert room.covers(plan), thing
             assert low >= -1e-9, thing
             assert high <= house.rooms[thing.room].ceiling_m + 1e-9, thing
         if thing.support >= 0:
-            below = house.things[thing.support]
+            below = house.objects[thing.support]
             tops = [high for _, _, high in parts[thing.support]]
             assert below.room == thing.room
             assert any(abs(top - thing.z) < 1e-3 for top in tops), (thing, below)
     for a, b in itertools.combinations(range(len(parts)), 2):
-        if house.things[a].room != house.things[b].room:
+        if house.objects[a].room != house.objects[b].room:
             continue
         ax, ay, bx, by = bounds[a]
         cx, cy, dx, dy = bounds[b]
@@ -148,7 +148,7 @@ def check_things(house):
             continue
         for (pa, la, ha), (pb, lb, hb) in itertools.product(parts[a], parts[b]):
             if min(ha, hb) - max(la, lb) > 1e-4:
-                assert pa.intersection(pb).area < 1e-6, (house.things[a], house.things[b])
+                assert pa.intersection(pb).area < 1e-6, (house.objects[a], house.objects[b])
 
 
 def widest_rectangle(polygon, least_area):
@@ -177,7 +177,7 @@ def check_realistic(house):
         if room.type == "hall":
             assert widest_rectangle(clear, 0.0) >= 0.91, room
             assert not clear.buffer(-0.455).is_empty, room
-        beds = [t for t in house.things if t.room == room.room_id and t.type == "Bed"]
+        beds = [t for t in house.objects if t.room == room.room_id and t.type == "Bed"]
         if room.type == "bedroom" and any(house.assets[t.asset_id].size[0] >= 1.3 for t in beds):
             assert clear.area >= 11.5, room
             assert widest_rectangle(clear, 0.0) >= 2.75 - 1e-9, room
@@ -192,7 +192,7 @@ def blocked_area(house):
         for w in house.walls
         if w.z_min < 1.8 and w.z_max > 0.02
     ]
-    for thing in house.things:
+    for thing in house.objects:
         if house.assets[thing.asset_id].blocks:
             solids += [
                 plan for plan, low, high in parts_of(house, thing) if low < 1.8 and high > 0.02

@@ -58,13 +58,13 @@ def test_the_lattice_agrees_that_one_component_holds_every_room(sample):
 def test_the_oracle_sees_a_blocked_door_a_stray_thing_and_a_moved_wall(sample, oracle):
     house = next(h for h in sample["paper"] if len(h.rooms) == 4)
     door = next(d for d in house.doors if d.open)
-    thing = next(t for t in house.things if t.support < 0)
+    thing = next(t for t in house.objects if t.support < 0)
     blocked = dataclasses.replace(thing, x=door.x, y=door.y)
-    things = tuple(blocked if t is thing else t for t in house.things)
+    things = tuple(blocked if t is thing else t for t in house.objects)
     with pytest.raises(AssertionError):
-        oracle.check_doors(dataclasses.replace(house, things=things))
+        oracle.check_doors(dataclasses.replace(house, objects=things))
     with pytest.raises(AssertionError):
-        oracle.check_things(dataclasses.replace(house, things=things))
+        oracle.check_things(dataclasses.replace(house, objects=things))
     wall = dataclasses.replace(house.walls[0], x_max=house.walls[0].x_max + 0.05)
     with pytest.raises(AssertionError):
         oracle.check_walls(dataclasses.replace(house, walls=(wall, *house.walls[1:])))
@@ -82,7 +82,7 @@ def test_one_closed_entrance_leads_outside(sample):
 def test_tall_things_do_not_stand_before_windows(sample):
     for house in sample["paper"]:
         for window in house.windows:
-            for thing in house.things:
+            for thing in house.objects:
                 asset = house.assets[thing.asset_id]
                 if thing.room != window.room or thing.z + asset.size[2] <= window.sill_m:
                     continue
@@ -113,7 +113,7 @@ def test_rooms_have_what_they_are_named_after(sample):
     for preset in PRESETS:
         for house in sample[preset]:
             for room in house.rooms:
-                types = {t.type for t in house.things if t.room == room.room_id}
+                types = {t.type for t in house.objects if t.room == room.room_id}
                 if room.type in wanted:
                     seen += 1
                     found += wanted[room.type] <= types
@@ -150,7 +150,7 @@ def test_attempts_differ_and_keep_the_number_of_rooms(assets):
     first = build_house(3, 7, HouseConfig(), assets, 0)
     second = build_house(3, 7, HouseConfig(), assets, 1)
     assert len(first.rooms) == len(second.rooms)
-    assert first.things != second.things
+    assert first.objects != second.objects
 
 
 @pytest.mark.parametrize("rooms", ["kitchen,living,bedroom:2", "bathroom:10", "hall,storage:3"])
@@ -167,7 +167,7 @@ def test_a_programme_is_kept(assets, oracle, rooms):
 def test_more_furnishing_means_more_things(assets):
     def things(furnishing):
         config = HouseConfig(rooms="6", furnishing=furnishing)
-        return sum(len(build_house(2, k, config, assets).things) for k in range(8))
+        return sum(len(build_house(2, k, config, assets).objects) for k in range(8))
 
     assert things(0.2) < things(1.0) < things(1.8)
 
@@ -213,7 +213,7 @@ def test_an_example_of_a_users_plan_becomes_a_house(assets, oracle):
     assert house.rooms[0].ceiling_m == 2.6
     other = build_house(1, 1, HouseConfig(floor_plan=str(path)), assets)
     assert other.rooms[0].polygon == house.rooms[0].polygon
-    assert other.things != house.things
+    assert other.objects != house.objects
 
 
 @pytest.mark.parametrize(

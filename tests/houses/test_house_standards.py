@@ -75,7 +75,7 @@ def test_candidates_make_plans_better():
 def test_the_plain_row_serves_every_programme(oracle):
     from internav_data.houses.choice import LEAST_DOOR_CM, judged
     from internav_data.houses.layouts import row
-    from internav_data.houses.plan import Plan
+    from internav_data.houses.plan import FloorGrid
     from internav_data.records import Purpose, generator
 
     for preset in ("paper", "realistic"):
@@ -83,7 +83,7 @@ def test_the_plain_row_serves_every_programme(oracle):
             config = HouseConfig(preset=preset)
             specs = programme(2, scene, config, 0)
             layout = row(specs)
-            plan = Plan.of([layout[k] for k in range(len(specs))])
+            plan = FloorGrid.of([layout[k] for k in range(len(specs))])
             rng = generator(0, Purpose.FLOOR_PLAN)
             least = LEAST_DOOR_CM[preset]
             assert judged(plan, specs, least, rng, lenient=True) is not None, (preset, scene)

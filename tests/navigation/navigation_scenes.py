@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from internav_data.geometry import Polygons, round_m, yaw_quaternion
-from internav_data.records import Asset, Door, House, Part, Room, Thing, Wall
+from internav_data.records import Asset, Door, House, Part, Room, SceneObject, Wall
 
 HALF = 0.06
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -118,8 +118,8 @@ def house_of(rooms, doors, graph, walls=(), things=(), outline=None):
         doors=tuple(doors),
         windows=(),
         walls=tuple(walls),
-        things=tuple(
-            Thing(n, "Table_0", "Table", 0, x, y, 0.0, yaw_quaternion(yaw), -1, -1)
+        objects=tuple(
+            SceneObject(n, "Table_0", "Table", 0, x, y, 0.0, yaw_quaternion(yaw), -1, -1)
             for n, (x, y, yaw) in enumerate(things)
         ),
         materials=(),

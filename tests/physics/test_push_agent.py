@@ -13,7 +13,7 @@ from internav_data.physics.kdop import overlap
 from internav_data.physics.push import crowd
 from internav_data.physics.sweep import extent_of
 from internav_data.records import Asset, Part, Pose, Wall
-from internav_data.world import Action, Stage, World
+from internav_data.world import Action, HouseModel, World
 from internav_data.world.house_model import WAYS_KEPT
 from internav_data.world.visibility import axis_distance
 
@@ -112,7 +112,7 @@ def test_the_agent_is_named_where_it_alone_hinders(heading):
 def test_pulling_onto_the_agent_says_so_and_changes_nothing(hand_house):
     crate = box("pulled", (0.6, 0.6, 0.3))
     world = World(
-        Stage.of(hand_house), [(crate, Pose(3.51, 1.0, 0.0, UPRIGHT))], (12, 4, 0), (1, 1)
+        HouseModel.of(hand_house), [(crate, Pose(3.51, 1.0, 0.0, UPRIGHT))], (12, 4, 0), (1, 1)
     )
     before = world.digest()
     result = world.step(Action.PUSH_BACK)
@@ -166,7 +166,7 @@ def crowd_of(pose, loose, wall, asset=CRATE):
 
 def test_a_crowd_is_never_fewer_than_what_moves():
     house = build_house(0, 6, HouseConfig(), catalogue())
-    stage = Stage.of(house)
+    stage = HouseModel.of(house)
     world = World(stage, [], (4, 4, 0), (8, 8))
     checked = 0
     for index, heading in itertools.product(range(0, len(world.items), 2), range(4)):
@@ -178,7 +178,7 @@ def test_a_crowd_is_never_fewer_than_what_moves():
 
 
 def test_the_graph_with_all_furniture_is_kept():
-    stage = Stage.of(build_house(0, 6, HouseConfig(), catalogue()))
+    stage = HouseModel.of(build_house(0, 6, HouseConfig(), catalogue()))
     home = stage.ways()
     sets = list(itertools.combinations(range(len(stage.items)), 2))[:20]
     assert len(sets) == 20

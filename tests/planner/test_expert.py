@@ -15,10 +15,10 @@ from internav_data.episodes import build_episodes
 from internav_data.houses import HouseConfig, build_house
 from internav_data.navigation import Lattice
 from internav_data.planner.cost_to_go import FAR
-from internav_data.planner.problem import EVERYTHING, Ground
+from internav_data.planner.problem import EVERYTHING, PlanningProblem
 from internav_data.planner.search import expert_of, expert_of_episode, replay, solve
 from internav_data.records import Asset, House, Part, Pose, Room, Wall
-from internav_data.world import ACTION_COUNT, Action, Stage, World
+from internav_data.world import ACTION_COUNT, Action, HouseModel, World
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 HALF = 0.06
@@ -67,7 +67,7 @@ def room(width, depth, *inner):
         doors=(),
         windows=(),
         walls=tuple(Wall(*side, 0.0, HIGH) for side in (*sides, *inner)),
-        things=(),
+        objects=(),
         materials=(),
         room_graph=(),
         area_m2=width * depth,
@@ -79,10 +79,10 @@ def at(asset, x, y):
     return asset, Pose(x, y, 0.0, UPRIGHT)
 
 
-CORRIDOR = Stage.of(room(6.0, 1.5))
+CORRIDOR = HouseModel.of(room(6.0, 1.5))
 """Three nodes wide: a block of 0.8 m in its middle leaves no way by."""
-HALL = Stage.of(room(6.0, 4.0))
-GAPS = Stage.of(room(5.0, 9.0, (2.44, 1.4, 2.56, 7.6)))
+HALL = HouseModel.of(room(6.0, 4.0))
+GAPS = HouseModel.of(room(5.0, 9.0, (2.44, 1.4, 2.56, 7.6)))
 """Two halls and a wall between them: one way past its lower end, one past its upper end."""
 
 
@@ -119,7 +119,7 @@ def episodes():
     out = []
     for scene in (0, 1, 2, 5):
         house = build_house(0, scene, HouseConfig(), catalogue())
-        stage = Stage.of(house)
+        stage = HouseModel.of(house)
         made = build_episodes(house, 8, catalogue().spawnable)
         out += [(stage, episode) for episode in made]
     return out
@@ -162,7 +162,7 @@ def test_a_thousand_experts_replay():
     solved = []
     for scene in range(100):
         house = build_house(1, scene, HouseConfig(), catalogue())
-        stage = Stage.of(house)
+        stage = HouseModel.of(house)
         made = build_episodes(house, 10, catalogue().spawnable)
         solved += [check(stage, episode) for episode in made]
     assert sum(solved) >= 700
@@ -191,7 +191,7 @@ def test_two_parcels_need_an_empty_hand():
         assert Action.DROP in expert.actions
     wide = [at(PARCEL, 2.5, 0.75), at(PARCEL, 2.5, 8.25)]
     house = room(5.0, 9.0, (2.44, 1.4, 2.56, 7.6))
-    assert expert_of(Stage.of(house), wide, (4, 3, 0), (16, 3)) is not None
+    assert expert_of(HouseModel.of(house), wide, (4, 3, 0), (16, 3)) is not None
 
 
 def test_a_short_way_round_is_gone():
@@ -272,7 +272,7 @@ def test_replay_refuses_what_fails():
 def test_fields_count_what_the_lattice_counts(episodes):
     for stage, episode in episodes[::5]:
         world = World.of_episode(stage, episode, catalogue().assets)
-        ground = Ground.of(world)
+        ground = PlanningProblem.of(world)
         masks = ground.masks(world)
         reach, _ = ground.reach(masks, ground.pose(world))
         nearest = reach.reshape(-1, 4).min(axis=1).reshape(ground.shape)
@@ -292,7 +292,7 @@ def test_fields_count_what_the_lattice_counts(episodes):
 def experts():
     """Digest of some experts; a pure function."""
     house = build_house(0, 2, HouseConfig(), catalogue())
-    stage = Stage.of(house)
+    stage = HouseModel.of(house)
     made = build_episodes(house, 4, catalogue().spawnable)
     found = [expert_of_episode(stage, episode, catalogue().assets) for episode in made]
     return hashlib.sha256(repr(found).encode()).hexdigest()

@@ -13,7 +13,7 @@ import pytest
 from internav_data.navigation import Lattice
 from internav_data.planner.search import expert_of
 from internav_data.records import Asset, House, Part, Pose, Room, Wall
-from internav_data.world import Action, Stage, World
+from internav_data.world import Action, HouseModel, World
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 HALF = 0.06
@@ -49,17 +49,17 @@ def house(width, depth, *inner):
     return House(
         scene_id="scene-000000", scene=0, seed=0, split="train", preset="paper", outline=corners,
         rooms=(Room(0, "living_room", corners, width * depth, HIGH, "oak", "white"),), doors=(),
-        windows=(), walls=tuple(Wall(*side, 0.0, HIGH) for side in (*sides, *inner)), things=(),
+        windows=(), walls=tuple(Wall(*side, 0.0, HIGH) for side in (*sides, *inner)), objects=(),
         materials=(), room_graph=(), area_m2=width * depth, assets={},
     )  # fmt: skip
 
 
-CORRIDOR = Stage.of(house(6.0, 1.5))
+CORRIDOR = HouseModel.of(house(6.0, 1.5))
 """Three nodes wide."""
-WIDE = Stage.of(house(5.0, 2.25))
-DOOR = Stage.of(house(5.0, 3.0, (2.44, HALF, 2.56, 1.0), (2.44, 2.0, 2.56, 3.0 - HALF)))
+WIDE = HouseModel.of(house(5.0, 2.25))
+DOOR = HouseModel.of(house(5.0, 3.0, (2.44, HALF, 2.56, 1.0), (2.44, 2.0, 2.56, 3.0 - HALF)))
 """Two rooms and a gap of 1 m between them."""
-BEND = Stage.of(house(3.5, 3.5, (1.5, HALF, 3.5 - HALF, 2.0)))
+BEND = HouseModel.of(house(3.5, 3.5, (1.5, HALF, 3.5 - HALF, 2.0)))
 """A corridor round a corner."""
 
 CASES = {

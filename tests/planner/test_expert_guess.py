@@ -6,16 +6,16 @@ import pytest
 from internav_data.catalog import catalogue
 from internav_data.houses import HouseConfig, build_house
 from internav_data.planner.cost_to_go import FAR, field
-from internav_data.planner.problem import EVERYTHING, Ground
+from internav_data.planner.problem import EVERYTHING, PlanningProblem
 from internav_data.planner.push_heuristic import clearing, marks_on, slide_m
-from internav_data.world import Stage, World
+from internav_data.world import HouseModel, World
 
 SIXES = range(0, 12, 3)
 
 
 @pytest.fixture(scope="module")
 def worlds():
-    stages = [Stage.of(build_house(0, scene, HouseConfig(), catalogue())) for scene in SIXES]
+    stages = [HouseModel.of(build_house(0, scene, HouseConfig(), catalogue())) for scene in SIXES]
     return [World(stage, [], (0, 0, 0), (4, 4)) for stage in stages]
 
 
@@ -43,7 +43,7 @@ def test_most_guesses_are_right(worlds):
     right = wrong = 0
     for world in worlds:
         nx, ny = world.stage.lattice.shape
-        ground = Ground.of(world)
+        ground = PlanningProblem.of(world)
         for thing in pushables(world):
             i, j = np.rint(world.items[thing].footprint.vertices.mean(axis=0) / 0.25).astype(int)
             way = marks_on([4 * ((i + k) * ny + j) for k in range(-1, 2)], nx * ny)
@@ -61,7 +61,7 @@ def test_most_guesses_are_right(worlds):
 
 def test_a_field_that_stops_early_knows_the_way_down(worlds):
     world = worlds[1]
-    ground = Ground.of(world)
+    ground = PlanningProblem.of(world)
     masks, prices = ground.masks(world), ground.prices(world)
     goals = ground.goals
     whole = field(ground.fixed, masks, 0, prices, ground.ny, goals, -1)

@@ -13,7 +13,7 @@ from internav_data.geometry import yaw_quaternion
 from internav_data.navigation import Lattice
 from internav_data.records import Pose
 from internav_data.records.errors import UsageError
-from internav_data.render.camera import Camera, Props, Scenery, View
+from internav_data.render.camera import Camera, CameraView, Props, StaticScene
 
 SIZE = 48
 
@@ -25,7 +25,7 @@ def house(request):
 
 
 def some_views(house, props=None, count=6):
-    scenery = Scenery.of(house)
+    scenery = StaticScene.of(house)
     props = scenery.props() if props is None else props
     rng = np.random.default_rng(house.scene)
     free = np.argwhere(Lattice.of(house).free)
@@ -33,7 +33,9 @@ def some_views(house, props=None, count=6):
     for k in range(count):
         i, j = free[rng.integers(len(free))]
         horizon = (30.0, 0.0, 60.0, -30.0)[k % 4]
-        out.append(View(scenery, props, 0.25 * i, 0.25 * j, 90.0 * int(rng.integers(4)), horizon))
+        out.append(
+            CameraView(scenery, props, 0.25 * i, 0.25 * j, 90.0 * int(rng.integers(4)), horizon)
+        )
     return out
 
 
@@ -53,7 +55,7 @@ def litter(house, count):
 
 
 def things(house):
-    return [(house.assets[t.asset_id], t.pose) for t in house.things]
+    return [(house.assets[t.asset_id], t.pose) for t in house.objects]
 
 
 def same(a, b):
@@ -103,26 +105,28 @@ def seen(frames, number):
 
 
 def test_what_is_held_is_gone_and_what_moves_moves(house):
-    scenery = Scenery.of(house)
+    scenery = StaticScene.of(house)
     asset = catalogue().of_type("Box")[0]
     i, j = np.argwhere(Lattice.of(house).free)[0]
     props = scenery.props([(asset, Pose(0.25 * i, 0.25 * j, 1.2, yaw_quaternion(0.0)))])
-    number = len(house.things) + 1
-    view = View(scenery, props, 0.25 * i, 0.25 * j, 0.0, 60.0)
+    number = len(house.objects) + 1
+    view = CameraView(scenery, props, 0.25 * i, 0.25 * j, 0.0, 60.0)
     ahead = Pose(0.25 * i + 0.6, 0.25 * j, 0.9, yaw_quaternion(30.0))
-    props.move(len(house.things), ahead)
+    props.move(len(house.objects), ahead)
     camera = Camera(SIZE)
     with_box = camera.render([view])
     assert seen(with_box, number) > 20
-    props.hide(len(house.things))
+    props.hide(len(house.objects))
     without = camera.render([view])
     assert seen(without, number) == 0
-    assert same(without, camera.render([View(scenery, scenery.props(), view.x, view.y, 0.0, 60.0)]))
-    props.show(len(house.things))
+    assert same(
+        without, camera.render([CameraView(scenery, scenery.props(), view.x, view.y, 0.0, 60.0)])
+    )
+    props.show(len(house.objects))
     assert same(with_box, camera.render([view]))
     other = props.copy()
-    other.move(len(house.things), Pose(ahead.x, ahead.y, -5.0, ahead.quaternion))
-    assert seen(camera.render([View(scenery, other, view.x, view.y, 0.0, 60.0)]), number) == 0
+    other.move(len(house.objects), Pose(ahead.x, ahead.y, -5.0, ahead.quaternion))
+    assert seen(camera.render([CameraView(scenery, other, view.x, view.y, 0.0, 60.0)]), number) == 0
     assert same(with_box, camera.render([view]))
 
 

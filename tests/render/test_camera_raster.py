@@ -13,7 +13,7 @@ from internav_data.geometry import yaw_quaternion
 from internav_data.navigation import Lattice
 from internav_data.records import Part, Pose
 from internav_data.render.asset_mesh import flat_faces, model_of
-from internav_data.render.camera import Camera, Scenery, View, camera_axes
+from internav_data.render.camera import Camera, CameraView, StaticScene, camera_axes
 from internav_data.render.rasterise import fill, scan
 from internav_data.render.shading import light_of
 from internav_data.render.wall_quads import house_tiles
@@ -159,7 +159,7 @@ def test_no_two_walls_of_a_corner_are_equally_bright():
 
 def test_what_stands_on_the_floor_darkens_it_and_nothing_else():
     house = generate_house(seed=7, scene=4)
-    scenery = Scenery.of(house)
+    scenery = StaticScene.of(house)
     free = np.argwhere(Lattice.of(house).free)
     i, j = next((i, j) for i, j in free.tolist() if [i + 4, j] in free.tolist())
     asset = catalogue().of_type("Box")[0]
@@ -167,11 +167,11 @@ def test_what_stands_on_the_floor_darkens_it_and_nothing_else():
     hangs = Pose(stands.x, stands.y, 0.06, stands.quaternion)
     frames = Camera(96).render(
         [
-            View(scenery, scenery.props([(asset, pose)]), 0.25 * i, 0.25 * j, 0.0, 60.0)
+            CameraView(scenery, scenery.props([(asset, pose)]), 0.25 * i, 0.25 * j, 0.0, 60.0)
             for pose in (stands, hangs)
         ]
     )
-    box = len(house.things) + 1
+    box = len(house.objects) + 1
     shared = (frames.ids[0] != box) & (frames.ids[1] != box)
     assert np.array_equal(frames.depth[0][shared], frames.depth[1][shared])
     change = frames.rgb[1].astype(int) - frames.rgb[0].astype(int)

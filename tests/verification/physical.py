@@ -11,7 +11,7 @@ from internav_data.episodes.outcomes import outcomes_of
 from internav_data.physics import engine_of_this_process, settle
 from internav_data.planner.search import expert_of_episode
 from internav_data.records import Pose
-from internav_data.world import Stage, World
+from internav_data.world import HouseModel, World
 
 
 def settled(one):
@@ -46,10 +46,12 @@ def played(house, episode, model="force"):
             penetration_m=max(o.settle_penetration_m for o in resting),
         ),
     )
-    stage = Stage.of(replace(house, assets=ASSETS))
+    stage = HouseModel.of(replace(house, assets=ASSETS))
     world = World.of_episode(stage, episode, ASSETS, model)
     # A tenth of a millimetre of settling may show in the way.
-    episode = replace(episode, steps=world.steps(), way_m=world.way_m())
+    episode = replace(
+        episode, obstructed_path_steps=world.steps(), obstructed_path_m=world.obstructed_path_m()
+    )
     outcomes = outcomes_of(world)
     return replace(
         episode,
@@ -66,10 +68,14 @@ def crowded():
     house = Grid(2, 1).house(2, things)
     pot = obstacle("Pot_1", 3.4, 2.1)
     safe = obstacle("Safe_1", 3.4, 1.4)
-    shut = scenery.episode(house, 0, (4, 8), (28, 8), [safe, pot], clear_m=6.0, way_m=None)
+    shut = scenery.episode(
+        house, 0, (4, 8), (28, 8), [safe, pot], shortest_path_m=6.0, obstructed_path_m=None
+    )
     box = obstacle("Box_1", 2.5, 2.0)
-    way_m = small_scenes()[0][1][1].way_m
-    longer = scenery.episode(house, 1, (4, 8), (28, 8), [box], clear_m=6.0, way_m=way_m)
+    obstructed_path_m = small_scenes()[0][1][1].obstructed_path_m
+    longer = scenery.episode(
+        house, 1, (4, 8), (28, 8), [box], shortest_path_m=6.0, obstructed_path_m=obstructed_path_m
+    )
     return house, [shut, longer]
 
 

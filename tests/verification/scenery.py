@@ -21,8 +21,8 @@ from internav_data.records import (
     Physics,
     Pose,
     Room,
+    SceneObject,
     Start,
-    Thing,
     Wall,
 )
 
@@ -118,7 +118,7 @@ class Grid:
             doors=tuple(doors),
             windows=(),
             walls=tuple(walls),
-            things=tuple(things),
+            objects=tuple(things),
             materials=(
                 Material("oak", (120, 90, 60), "planks"),
                 Material("white", (250,) * 3, "plain"),
@@ -170,7 +170,7 @@ class Grid:
 def thing(number, asset_id, room, x, y, *, yaw_deg=0.0, group=-1):
     half = math.radians(yaw_deg) / 2
     turn = (0.0, 0.0, round(math.sin(half), 6), round(math.cos(half), 6))
-    return Thing(number, asset_id, asset_id.split("_")[0], room, x, y, 0.0, turn, group, -1)
+    return SceneObject(number, asset_id, asset_id.split("_")[0], room, x, y, 0.0, turn, group, -1)
 
 
 def obstacle(asset_id, x, y, *, yaw_deg=0.0):
@@ -244,7 +244,7 @@ def rings_of(house, obstacles=()):
         for w in house.walls
         if w.z_min < 1.8
     ]
-    for placed in (*house.things, *obstacles):
+    for placed in (*house.objects, *obstacles):
         a = ASSETS[placed.asset_id]
         if a.asset_id.startswith("Drum"):
             rings.append(
@@ -305,7 +305,7 @@ def brute_paths(house, first, second):
     return tuple(sorted(further([first]), key=lambda p: (len(p), p)))
 
 
-def episode(house, index, start, goal, obstacles, *, clear_m, way_m, yaw=90):
+def episode(house, index, start, goal, obstacles, *, shortest_path_m, obstructed_path_m, yaw=90):
     """An episode whose steps and paths come from brute force; lengths are given."""
     rooms = [
         next(
@@ -332,19 +332,19 @@ def episode(house, index, start, goal, obstacles, *, clear_m, way_m, yaw=90):
         seed=0,
         room_count=len(house.rooms),
         mode="blocked" if (house.scene + index) % 2 == 0 else "lengthened",
-        sealed=way_m is None,
-        rooms_on_way=len(paths[0]),
+        sealed=obstructed_path_m is None,
+        rooms_on_path=len(paths[0]),
         obstacle_count=len(obstacles),
-        clear_m=clear_m,
-        clear_steps=brute_steps(house, start, goal),
-        way_m=way_m,
-        steps=brute_steps(house, start, goal, obstacles),
+        shortest_path_m=shortest_path_m,
+        shortest_path_steps=brute_steps(house, start, goal),
+        obstructed_path_m=obstructed_path_m,
+        obstructed_path_steps=brute_steps(house, start, goal, obstacles),
         start=Start(*start, *ends[0], yaw, rooms[0]),
         goal=Goal(*goal, *ends[1], rooms[1]),
         room_paths=paths,
-        room_paths_cut=False,
+        room_paths_truncated=False,
         node_paths=tuple(node_paths),
-        node_paths_cut=False,
+        node_paths_truncated=False,
         obstacles=tuple(obstacles),
         expert=None,
         physics=Physics("bullet", "3.2.7", 0.1, 0.0001),
@@ -387,14 +387,14 @@ def _scene(number):
     for index in range(2):
         if (number + index) % 2 == 0 and number == 0:
             obstacles = [obstacle("Bar_1", 3.5, 2.0, yaw_deg=90.0)]
-            way_m = None
+            obstructed_path_m = None
         elif (number + index) % 2 == 0:
             # A gap of 0.42 m beside the box: open for the disc, between two rows of the lattice.
             obstacles = [obstacle("Box_2", 3.94, 1.82)]
-            way_m = taut(here, [((3.79, 2.02), -1), ((4.09, 2.02), -1)], there)
+            obstructed_path_m = taut(here, [((3.79, 2.02), -1), ((4.09, 2.02), -1)], there)
         else:
             obstacles = [obstacle("Box_1", 2.5, 2.0)]
-            way_m = taut(here, [((2.2, 1.7), 1), ((2.8, 1.7), 1)], there)
+            obstructed_path_m = taut(here, [((2.2, 1.7), 1), ((2.8, 1.7), 1)], there)
         made.append(
             episode(
                 house,
@@ -402,8 +402,10 @@ def _scene(number):
                 start,
                 goal,
                 obstacles,
-                clear_m=6.0,
-                way_m=None if way_m is None else round(way_m, 4),
+                shortest_path_m=6.0,
+                obstructed_path_m=None
+                if obstructed_path_m is None
+                else round(obstructed_path_m, 4),
             )
         )
     return house, made

@@ -16,9 +16,9 @@ from shapely import box
 import internav_data.verification
 from internav_data import geometry, navigation
 from internav_data.records import Part, Pose
-from internav_data.verification.checked_lattice import KEEP_M, Ground
-from internav_data.verification.checked_layout import Site
-from internav_data.verification.findings import KEPT, Collector, join
+from internav_data.verification.checked_lattice import KEEP_M, CheckedLattice
+from internav_data.verification.checked_layout import CheckedLayout
+from internav_data.verification.findings import KEPT, FindingCollector, join
 from internav_data.verification.overlaps import hulls_overlap, plans_overlap
 from internav_data.verification.portals import Portals
 from internav_data.verification.shapes import Shapes, slice_of, solid_of
@@ -122,7 +122,7 @@ def test_steps_are_those_of_a_brute_force():
     house = furnished(
         thing(0, "Table_1", 0, 1.5, 2.5, yaw_deg=30.0), thing(1, "Drum_1", 1, 6.0, 2.0)
     )
-    site = Site(house, Shapes(ASSETS))
+    site = CheckedLayout(house, Shapes(ASSETS))
     for x, y, yaw in ((2.5, 2.0, 90.0), (3.3, 2.2, 75.0), (5.0, 1.5, 15.0)):
         bar = obstacle("Bar_1", x, y, yaw_deg=yaw)
         free = site.ground.with_obstacles(site.shapes.footprint("Bar_1", bar.pose))
@@ -136,9 +136,9 @@ def test_exact_ties_are_free():
     # Walls 0.2 m from the node row y = 1: the row is free, 1 µm more and it is not.
     outline = box(0.0, 0.0, 5.0, 2.0)
     walls = [box(0.0, 0.0, 5.0, 0.8), box(0.0, 1.2, 5.0, 2.0)]
-    assert Ground(walls, outline).clear.nodes.sum() == 21
+    assert CheckedLattice(walls, outline).clear.nodes.sum() == 21
     tight = [box(0.0, 0.0, 5.0, 0.800002), walls[1]]
-    assert Ground(tight, outline).clear.nodes.sum() == 0
+    assert CheckedLattice(tight, outline).clear.nodes.sum() == 0
 
 
 @settings(deadline=None, max_examples=25)
@@ -152,7 +152,7 @@ def test_lattice_is_that_of_the_generator(spots):
             for k, (x, y, turn) in enumerate(spots)
         )
     )
-    mine = Site(house, Shapes(ASSETS)).ground
+    mine = CheckedLayout(house, Shapes(ASSETS)).ground
     theirs = navigation.Lattice.of(house)
     assert mine.shape == theirs.shape
     assert (mine.clear.nodes.reshape(mine.shape) == theirs.free).all()
@@ -202,7 +202,7 @@ def test_gap_as_wide_as_the_disc_is_open():
 )
 def test_ways_are_those_of_the_generator(spots):
     house = furnished(thing(0, "Table_1", 0, 1.5, 2.5, yaw_deg=30.0))
-    site = Site(house, Shapes(ASSETS))
+    site = CheckedLayout(house, Shapes(ASSETS))
     placed = [
         obstacle("Bar_1", round(x, 4), round(y, 4), yaw_deg=15.0 * turn) for x, y, turn in spots
     ]
@@ -224,7 +224,7 @@ def test_ways_are_those_of_the_generator(spots):
 @given(st.tuples(st.integers(1, 31), st.integers(1, 31), st.integers(1, 31), st.integers(1, 31)))
 def test_portals_bound_from_below(nodes):
     house = Grid(2, 2).house(3, (thing(0, "Table_1", 0, 1.5, 2.5), thing(1, "Bar_1", 3, 6.0, 6.0)))
-    site = Site(house, Shapes(ASSETS))
+    site = CheckedLayout(house, Shapes(ASSETS))
     a, b = (0.25 * nodes[0], 0.25 * nodes[1]), (0.25 * nodes[2], 0.25 * nodes[3])
     if not (site.free.covers(shapely.Point(a)) and site.free.covers(shapely.Point(b))):
         return
@@ -273,7 +273,7 @@ def test_plans_that_touch_do_not_overlap():
 def test_findings_are_counted_beyond_what_is_kept():
     reports = []
     for number in range(3):
-        report = Collector("file", f"scene-{number}")
+        report = FindingCollector("file", f"scene-{number}")
         for k in range(KEPT):
             report.expect(False, "some.predicate", 0, k)
         reports.append(report)

@@ -7,7 +7,7 @@ import pytest
 from scenery import write_dataset
 
 from internav_data.verification import validate
-from internav_data.verification.findings import Collector
+from internav_data.verification.findings import FindingCollector
 from internav_data.verification.interactions import check_interactions
 
 
@@ -17,7 +17,7 @@ def scenes():
 
 
 def judged(episode, *, solvable=False):
-    report = Collector()
+    report = FindingCollector()
     check_interactions(episode, report, solvable=solvable)
     return {name.removeprefix("schema.episodes.") for name in report.by_predicate}
 
@@ -60,12 +60,15 @@ OUTCOMES = {
     "pushing takes none": ((0, 0, 2, 0, {"seconds": 0.0}), "outcomes.seconds"),
     "not opened": ((0, 0, 2, 0, {"opened": False}), "outcomes.opened"),
     "opened what was open": ((0, 1, 0, 0, {"opened": True}), "outcomes.opened"),
-    "changed though it failed": ((2, 0, 0, 0, {"way_m": 6.5}), "outcomes.unchanged"),
-    "steps though it failed": ((0, 1, 4, 0, {"steps": 27}), "outcomes.unchanged"),
-    "longer than the lattice": ((0, 0, 2, 0, {"way_m": 8.1}), "outcomes.way_m"),
-    "shorter than straight": ((0, 0, 2, 0, {"way_m": 5.9}), "outcomes.way_m"),
-    "no way off the lattice": ((0, 0, 2, 0, {"way_m": None}), "outcomes.way_m"),
-    "fewer steps than on clear ground": ((2, 0, 4, 1, {"steps": 22}), "outcomes.steps"),
+    "changed though it failed": ((2, 0, 0, 0, {"path_m_after": 6.5}), "outcomes.unchanged"),
+    "steps though it failed": ((0, 1, 4, 0, {"path_steps_after": 27}), "outcomes.unchanged"),
+    "longer than the lattice": ((0, 0, 2, 0, {"path_m_after": 8.1}), "outcomes.path_m_after"),
+    "shorter than straight": ((0, 0, 2, 0, {"path_m_after": 5.9}), "outcomes.path_m_after"),
+    "no way off the lattice": ((0, 0, 2, 0, {"path_m_after": None}), "outcomes.path_m_after"),
+    "fewer steps than on clear ground": (
+        (2, 0, 4, 1, {"path_steps_after": 22}),
+        "outcomes.path_steps_after",
+    ),
 }
 
 
@@ -79,11 +82,16 @@ def test_outcome_cannot_be(scenes, case):
 def test_a_longer_way_once_something_is_gone(scenes):
     box = scenes[0][1][1].obstacles[0]
     gone = replace(
-        box.outcomes[4], success=True, reason="", steps=30, way_m=6.4, displacement_m=0.0
+        box.outcomes[4],
+        success=True,
+        reason="",
+        path_steps_after=30,
+        path_m_after=6.4,
+        displacement_m=0.0,
     )
     light = replace(box, pickable=True, outcomes=(*box.outcomes[:4], gone))
     episode = replace(scenes[0][1][1], obstacles=(light,))
-    assert judged(episode) == {"outcomes.way_m", "outcomes.steps"}
+    assert judged(episode) == {"outcomes.path_m_after", "outcomes.path_steps_after"}
 
 
 def test_outcomes_of_some_obstacles_only(scenes):
@@ -136,7 +144,10 @@ RANGES = {
     "reason": (lambda e: with_outcome(e, 0, reason="no luck"), "outcomes.element.reason"),
     "action": (lambda e: with_outcome(e, 0, action="kick_east"), "outcomes.element.action"),
     "seconds": (lambda e: with_outcome(e, 0, seconds=5.6), "outcomes.element.seconds"),
-    "unrounded": (lambda e: with_outcome(e, 0, way_m=6.12345678), "outcomes.element.way_m"),
+    "unrounded": (
+        lambda e: with_outcome(e, 0, path_m_after=6.12345678),
+        "outcomes.element.path_m_after",
+    ),
 }
 
 

@@ -192,21 +192,21 @@ def judged(tmp_path, scenes, assets=None):
 
 
 EPISODE_CHANGES = {
-    "steps": ({"steps": 29}, "episode.steps"),
-    "clear steps": ({"clear_steps": 25}, "episode.clear-steps"),
-    "cut off": ({"steps": None}, "episode.steps"),
+    "steps": ({"obstructed_path_steps": 29}, "episode.steps"),
+    "clear steps": ({"shortest_path_steps": 25}, "episode.clear-steps"),
+    "cut off": ({"obstructed_path_steps": None}, "episode.steps"),
     "sealed": ({"sealed": True}, "episode.sealed-way"),
-    "sealed and no way": ({"sealed": True, "way_m": None}, "episode.sealed"),
-    "clear length": ({"clear_m": 6.2}, "episode.clear-m"),
-    "clear length too short": ({"clear_m": 5.9}, "episode.clear-m-bounds"),
-    "way length": ({"way_m": 6.3}, "episode.way-m"),
-    "way length too short": ({"way_m": 6.01}, "episode.way-m"),
+    "sealed and no way": ({"sealed": True, "obstructed_path_m": None}, "episode.sealed"),
+    "clear length": ({"shortest_path_m": 6.2}, "episode.clear-m"),
+    "clear length too short": ({"shortest_path_m": 5.9}, "episode.clear-m-bounds"),
+    "way length": ({"obstructed_path_m": 6.3}, "episode.way-m"),
+    "way length too short": ({"obstructed_path_m": 6.01}, "episode.way-m"),
     "mode": ({"mode": "blocked"}, "episode.mode"),
-    "rooms on the way": ({"rooms_on_way": 1}, "episode.rooms-on-way"),
+    "rooms on the way": ({"rooms_on_path": 1}, "episode.rooms-on-way"),
     "room paths": ({"room_paths": ()}, "episode.room-paths"),
-    "room paths cut": ({"room_paths_cut": True}, "episode.room-paths-cut"),
+    "room paths cut": ({"room_paths_truncated": True}, "episode.room-paths-cut"),
     "node paths": ({"node_paths": ()}, "episode.node-paths"),
-    "node paths cut": ({"node_paths_cut": True}, "episode.node-paths-cut"),
+    "node paths cut": ({"node_paths_truncated": True}, "episode.node-paths-cut"),
     "room count": ({"room_count": 3}, "schema.episodes.room_count"),
     "obstacle count": ({"obstacle_count": 2}, "schema.episodes.obstacle_count"),
     "split": ({"split": "train"}, "schema.episodes.split"),
@@ -214,7 +214,7 @@ EPISODE_CHANGES = {
     "index": ({"index": 5}, "schema.episodes.episode_id"),
     "episode id": ({"episode_id": "scene-000000/0007"}, "schema.episodes.episode_id"),
     "scene id": ({"scene_id": "scene-000044"}, "schema.episodes.scene_id"),
-    "unrounded": ({"way_m": 6.13181234}, "schema.episodes.way_m"),
+    "unrounded": ({"obstructed_path_m": 6.13181234}, "schema.episodes.obstructed_path_m"),
     "no obstacles": ({"obstacles": (), "obstacle_count": 0}, "episode.obstacle-count"),
 }
 
@@ -244,7 +244,7 @@ END_CHANGES = {
 def test_start_moved(tmp_path, scenes, case):
     changes, predicate = END_CHANGES[case]
     start = replace(scenes[0][1][1].start, **changes)
-    extra = {"clear_m": 0.25} if case == "near the goal" else {}
+    extra = {"shortest_path_m": 0.25} if case == "near the goal" else {}
     findings = judged(tmp_path, change_episode(scenes, 0, 1, start=start, **extra))
     assert predicate in predicates(findings), findings.summary()
 
@@ -341,7 +341,7 @@ def moved(thing, **changes):
 
 
 def house_cases(house):
-    doors, rooms, things = house.doors, house.rooms, house.things
+    doors, rooms, things = house.doors, house.rooms, house.objects
     door, first, last = doors[0], rooms[0], rooms[-1]
     shifted = tuple((x + 0.5, y) for x, y in first.polygon)
     return {
@@ -379,41 +379,41 @@ def house_cases(house):
             {"outline": ((0.0, 0.0), (8.0, 0.0), (8.0, 4.0), (0.0, 4.0))},
             "house.rooms-tile",
         ),
-        "thing in a wall": ({"things": (moved(things[0], y=0.3), *things[1:])}, "thing.overlap"),
+        "thing in a wall": ({"objects": (moved(things[0], y=0.3), *things[1:])}, "thing.overlap"),
         "thing in a thing": (
-            {"things": (*things[:2], moved(things[2], x=6.0, y=3.3))},
+            {"objects": (*things[:2], moved(things[2], x=6.0, y=3.3))},
             "thing.overlap",
         ),
         "thing in another room": (
-            {"things": (moved(things[0], room=1), *things[1:])},
+            {"objects": (moved(things[0], room=1), *things[1:])},
             "thing.room",
         ),
         "thing before the door": (
-            {"things": (*things[:2], moved(things[2], x=4.4, y=2.0))},
+            {"objects": (*things[:2], moved(things[2], x=4.4, y=2.0))},
             "house.door-clear",
         ),
         "thing in the air": (
-            {"things": (*things[:2], moved(things[2], support=0))},
+            {"objects": (*things[:2], moved(things[2], support=0))},
             "thing.support",
         ),
         "thing hanging free": (
-            {"things": (*things[:2], moved(things[2], x=6.0, y=1.5, z=1.2))},
+            {"objects": (*things[:2], moved(things[2], x=6.0, y=1.5, z=1.2))},
             "thing.support",
         ),
         "thing below the floor": (
-            {"things": (*things[:2], moved(things[2], z=-0.1))},
+            {"objects": (*things[:2], moved(things[2], z=-0.1))},
             "thing.support",
         ),
         "thing of another type": (
-            {"things": (*things[:2], moved(things[2], type="Table"))},
+            {"objects": (*things[:2], moved(things[2], type="Table"))},
             "thing.type",
         ),
         "unknown thing": (
-            {"things": (*things[:2], moved(things[2], asset_id="Ghost_1"))},
+            {"objects": (*things[:2], moved(things[2], asset_id="Ghost_1"))},
             "schema.scenes.thing-asset",
         ),
         "thing twice": (
-            {"things": (*things[:2], moved(things[2], thing_id=1))},
+            {"objects": (*things[:2], moved(things[2], object_id=1))},
             "schema.scenes.thing-ids",
         ),
         "scene split": ({"split": "train"}, "schema.scenes.split"),
@@ -438,22 +438,22 @@ def test_room_cut_off_by_furniture(tmp_path, scenes):
         scenery.thing(3 + k, "Bar_1", 1, 4.9, 0.61 + 1.21 * k, yaw_deg=90.0) for k in range(3)
     ]
     barrier.append(scenery.thing(6, "Box_2", 1, 4.9, 3.83))
-    findings = judged(tmp_path, change_house(scenes, 0, things=(*house.things[:1], *barrier)))
+    findings = judged(tmp_path, change_house(scenes, 0, objects=(*house.objects[:1], *barrier)))
     assert "house.reachable" in predicates(findings), findings.summary()
 
 
 def test_things_of_a_group_may_interlock(tmp_path, scenes):
     house = scenes[0][0]
     beside = scenery.thing(3, "Box_2", 0, 1.0, 0.5, group=1)
-    together = (replace(house.things[0], group=1), *house.things[1:], beside)
-    assert judged(tmp_path, change_house(scenes, 0, things=together)).ok
+    together = (replace(house.objects[0], group=1), *house.objects[1:], beside)
+    assert judged(tmp_path, change_house(scenes, 0, objects=together)).ok
 
 
 def test_things_may_hang_on_walls(tmp_path, scenes):
     house = scenes[0][0]
     picture = scenery.thing(3, "Box_2", 0, 0.16, 2.5)
-    hung = (*house.things, replace(picture, z=1.9))
-    assert judged(tmp_path, change_house(scenes, 0, things=hung)).ok
+    hung = (*house.objects, replace(picture, z=1.9))
+    assert judged(tmp_path, change_house(scenes, 0, objects=hung)).ok
 
 
 def test_pose_of_a_record_is_what_is_judged():

@@ -17,15 +17,15 @@ from internav_data.physics.result_cache import ResultCache
 from internav_data.records import Pose
 from internav_data.records.errors import CorruptDataError
 from internav_data.verification import validate
-from internav_data.verification.checked_layout import Site
+from internav_data.verification.checked_layout import CheckedLayout
 from internav_data.verification.interactions import check_interactions
 from internav_data.verification.lengths import Between
-from internav_data.verification.replay import Theatre
+from internav_data.verification.replay import CheckedScene
 from internav_data.verification.replay.outcomes import _Judge
 from internav_data.verification.scenes import check_scene
 from internav_data.verification.settings import Settings
 from internav_data.verification.shapes import Shapes
-from internav_data.world import Item, World
+from internav_data.world import MovableObject, World
 
 FORCE = Settings()
 
@@ -124,10 +124,10 @@ def test_scenes_hold_what_the_tests_need(scenes):
     assert scenes[2][1][0].obstacles[1].outcomes[4].opened
     assert scenes[2][1][0].expert.picks == 1
     assert scenes[0][1][0].expert.pushes > 0
-    stage = physical.Stage.of(replace(scenes[2][0], assets=ASSETS))
+    stage = physical.HouseModel.of(replace(scenes[2][0], assets=ASSETS))
     world = World.of_episode(stage, scenes[2][1][0], ASSETS)
     assert [k for k, _ in world.pushed(2, 1, agent=False).moved] == [0]
-    assert stage.thing_ids[0] == 1
+    assert stage.object_ids[0] == 1
 
 
 def test_what_is_true_is_valid(tmp_path, scenes):
@@ -184,7 +184,7 @@ OUTCOMES = {
         "physics.outcome-reason",
     ),
     "no success": (
-        (0, 0, "push_north", 0, {**FAILED, "way_m": None, "reason": "too heavy"}),
+        (0, 0, "push_north", 0, {**FAILED, "path_m_after": None, "reason": "too heavy"}),
         "physics.outcome-success",
     ),
     "no pick": (
@@ -193,7 +193,12 @@ OUTCOMES = {
             0,
             "pick",
             1,
-            {**FAILED, "steps": None, "way_m": None, "reason": "something rests on it"},
+            {
+                **FAILED,
+                "path_steps_after": None,
+                "path_m_after": None,
+                "reason": "something rests on it",
+            },
         ),
         "physics.outcome-success",
     ),
@@ -203,23 +208,32 @@ OUTCOMES = {
     ),
     "farther": ((0, 0, "push_west", 0, {"displacement_m": 0.7}), "physics.outcome-displacement"),
     "longer": ((0, 0, "push_west", 0, {"seconds": 1.0}), "physics.outcome-seconds"),
-    "more steps": ((0, 1, "push_north", 0, {"steps": 28}), "physics.outcome-steps"),
+    "more steps": ((0, 1, "push_north", 0, {"path_steps_after": 28}), "physics.outcome-steps"),
     "still shut": (
-        (0, 0, "push_west", 0, {"steps": None, "opened": False}),
+        (0, 0, "push_west", 0, {"path_steps_after": None, "opened": False}),
         "physics.outcome-steps",
     ),
     "more steps round moved furniture": (
-        (2, 0, "push_north", 1, {"steps": 28, "opened": True}),
+        (2, 0, "push_north", 1, {"path_steps_after": 28, "opened": True}),
         "physics.outcome-steps",
     ),
-    "a longer way": ((0, 1, "push_north", 0, {"way_m": 6.03}), "physics.outcome-way-m"),
+    "a longer way": ((0, 1, "push_north", 0, {"path_m_after": 6.03}), "physics.outcome-way-m"),
     "a longer way round moved furniture": (
-        (2, 0, "push_north", 1, {"way_m": 6.03}),
+        (2, 0, "push_north", 1, {"path_m_after": 6.03}),
         "physics.outcome-way-m",
     ),
-    "a way where none is": ((0, 0, "push_south", 0, {"way_m": 6.5}), "physics.outcome-way-m"),
-    "no way where one is": ((0, 0, "push_north", 0, {"way_m": None}), "physics.outcome-way-m"),
-    "more steps once picked": ((2, 0, "pick", 1, {"steps": 26}), "physics.outcome-steps"),
+    "a way where none is": (
+        (0, 0, "push_south", 0, {"path_m_after": 6.5}),
+        "physics.outcome-way-m",
+    ),
+    "no way where one is": (
+        (0, 0, "push_north", 0, {"path_m_after": None}),
+        "physics.outcome-way-m",
+    ),
+    "more steps once picked": (
+        (2, 0, "pick", 1, {"path_steps_after": 26}),
+        "physics.outcome-steps",
+    ),
 }
 
 
@@ -306,7 +320,7 @@ def test_what_leans_through_a_window_is_not_in_the_wall(scenes):
     )
     assets = {**ASSETS, "Board": board}
     for through, sills in ((house, 0), (replace(house, walls=(*walls, sill, lintel)), 1)):
-        theatre = Theatre(Site(through, Shapes(assets)), FORCE)
+        theatre = CheckedScene(CheckedLayout(through, Shapes(assets)), FORCE)
         for z, inside in ((0.5, True), (0.925, False), (1.5, False), (2.2, True)):
             pose = Pose(x, y, z, (0.0, 0.0, 0.0, 1.0))
             assert theatre.in_walls("Board", pose, 0.01) == (inside or not sills)
@@ -318,10 +332,10 @@ def test_what_carries_something_is_not_picked_up(scenes):
     assets = {**ASSETS, "Bar_1": scenery.asset("Bar_1", (0.3, 0.4, 0.6), (tall,))}
 
     def at(asset_id, x):
-        return Item.at(assets[asset_id], Pose(x, 2.0, 0.0, (0.0, 0.0, 0.0, 1.0)))
+        return MovableObject.at(assets[asset_id], Pose(x, 2.0, 0.0, (0.0, 0.0, 0.0, 1.0)))
 
     outcome = episodes[0].obstacles[0].outcomes[4]
-    theatre = Theatre(Site(house, Shapes(assets)), FORCE)
+    theatre = CheckedScene(CheckedLayout(house, Shapes(assets)), FORCE)
     judge = _Judge(theatre, episodes[0], outcome, "", lambda *_: True)
     under, over = at("Pot_1", 3.0), at("Bar_1", 3.1)
     assert judge._carries([under, over], 0)
@@ -332,20 +346,20 @@ def test_what_carries_something_is_not_picked_up(scenes):
 def test_furniture_that_was_moved_is_no_longer_where_it_stood():
     bar = thing(0, "Bar_1", 0, 3.5, 1.94, yaw_deg=90.0)
     house = Grid(2, 1).house(2, (bar, thing(1, "Table_1", 0, 1.0, 0.6)))
-    theatre = Theatre(Site(house, Shapes(ASSETS)), FORCE)
+    theatre = CheckedScene(CheckedLayout(house, Shapes(ASSETS)), FORCE)
     items = theatre.stage.items
     assert [item.asset.asset_id for item in items] == ["Bar_1"]
     there = scenery.obstacle("Bar_1", 2.0, 2.0, yaw_deg=90.0)
     for changes, things, obstacles in (
-        ({}, house.things, []),
-        ({0: there.pose}, house.things[1:], [there]),
-        ({0: None}, house.things[1:], []),
+        ({}, house.objects, []),
+        ({0: there.pose}, house.objects[1:], [there]),
+        ({0: None}, house.objects[1:], []),
     ):
         found = theatre.scenery(items, changes)
         ground = found.site.ground
         free = ground.with_obstacles(found.taken)
         steps = ground.distances(ground.node(28, 8), free)[ground.node(4, 8)]
-        wanted = brute_steps(replace(house, things=things), (4, 8), (28, 8), obstacles)
+        wanted = brute_steps(replace(house, objects=things), (4, 8), (28, 8), obstacles)
         assert steps == (math.inf if wanted is None else wanted)
         way = Between(found.site, (1.0, 2.0), (7.0, 2.0), found.taken)
         assert way.connected(stated=True) == (changes != {})
@@ -380,7 +394,7 @@ def test_another_build_is_noted(tmp_path, scenes):
 
 
 def test_untrue_geometry_is_not_played(tmp_path, scenes):
-    findings = judged(tmp_path, changed(scenes, 0, 1, clear_steps=26))
+    findings = judged(tmp_path, changed(scenes, 0, 1, shortest_path_steps=26))
     assert "episode.clear-steps" in findings.by_predicate
     assert findings.notes == {"geometry not as stated: physics not checked": 1}
     assert findings.checked["replayed"] == 5

@@ -7,7 +7,7 @@ from internav_data.catalog import OBSTACLES, catalogue
 from internav_data.records import Asset, Part
 from internav_data.records.errors import UsageError
 from internav_data.views.asset_sheet import draw_asset_sheet, draw_assets, write_asset_sheet
-from internav_data.views.orthographic import View, asset_surface, draw_surface
+from internav_data.views.orthographic import OrthographicView, asset_surface, draw_surface
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
@@ -31,7 +31,7 @@ def view(**changes):
         "background": (0, 0, 0),
         "floor": False,
     }
-    return View(**(settings | changes))
+    return OrthographicView(**(settings | changes))
 
 
 def test_a_box_covers_its_own_pixels():

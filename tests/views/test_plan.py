@@ -60,9 +60,9 @@ def test_an_open_door_is_a_gap_and_the_entrance_is_closed(picture):
 
 
 def test_what_hangs_overhead_hides_nothing(hand_house, picture):
-    table = hand_house.things[1]
-    lifted = replace(table, thing_id=9, x=3.5, y=3.0, z=2.1)
-    higher = replace(hand_house, things=(*hand_house.things, lifted))
+    table = hand_house.objects[1]
+    lifted = replace(table, object_id=9, x=3.5, y=3.0, z=2.1)
+    higher = replace(hand_house, objects=(*hand_house.objects, lifted))
     drawn = draw_house(higher, pixels=PIXELS)
     assert near(at(drawn, 3.3, 2.8), at(picture, 3.3, 2.8), 3)
 
@@ -116,9 +116,15 @@ def test_captions_say_what_the_episode_says(hand_episode):
     assert "clear 22 steps, 5.10 m" in first
     assert second == "1 Chair 10.0 kg (push)   2 Apple 0.2 kg (pick)"
     assert first.endswith("with obstacles cut off")
-    off_grid = replace(hand_episode, sealed=False, way_m=6.5)
+    off_grid = replace(hand_episode, sealed=False, obstructed_path_m=6.5)
     assert "cut off on the grid, 6.50 m off it" in episode_lines(off_grid)[0]
-    open_one = replace(hand_episode, mode="lengthened", steps=40, way_m=8.25, sealed=False)
+    open_one = replace(
+        hand_episode,
+        mode="lengthened",
+        obstructed_path_steps=40,
+        obstructed_path_m=8.25,
+        sealed=False,
+    )
     assert (
         "lengthened   clear 22 steps, 5.10 m   with obstacles 40 steps, 8.25 m"
         in (episode_lines(open_one)[0])

@@ -10,10 +10,10 @@ import pytest
 
 from internav_data.planner.search import expert_of_episode
 from internav_data.records.errors import InternavError, UsageError
-from internav_data.render.camera import Camera, Scenery, View
+from internav_data.render.camera import Camera, CameraView, StaticScene
 from internav_data.views import Replay, read_actions, replay_frames, write_video
 from internav_data.views.replay_story import sentence, shots
-from internav_data.world import Action, Stage
+from internav_data.world import Action, HouseModel
 
 AHEAD, LEFT, RIGHT, DOWN, PUSH, PICK, DROP, DONE = 0, 1, 2, 3, 5, 9, 10, 11
 # From (3, 1) looking north: to the door's height, up to the chair in the door, away with it.
@@ -24,7 +24,7 @@ SIZE = 200
 
 @pytest.fixture(scope="module")
 def stage(hand_house):
-    return Stage.of(hand_house)
+    return HouseModel.of(hand_house)
 
 
 @pytest.fixture(scope="module")
@@ -73,19 +73,21 @@ def test_the_same_episode_gives_the_same_frames(tried, frames, hand_house, hand_
 
 def test_the_camera_shows_what_the_world_is_like(tried, frames, stage, hand_episode):
     """Against pictures of a camera set up by hand, after every action."""
-    scenery, camera, count = Scenery.of(stage.house), Camera(SIZE), 18
+    scenery, camera, count = StaticScene.of(stage.house), Camera(SIZE), 18
     assets = stage.house.assets
     props = scenery.props((assets[o.asset_id], o.pose) for o in hand_episode.obstacles)
     for moment in tried.story.moments[1:10]:
         count += 3
         x, y = moment.world.position
-        view = View(scenery, props, x, y, 90.0 * moment.world.quarter, moment.world.horizon_deg)
+        view = CameraView(
+            scenery, props, x, y, 90.0 * moment.world.quarter, moment.world.horizon_deg
+        )
         assert np.array_equal(eye(frames[count - 1]), camera.render([view]).rgb[0])
     pushed = tried.story.moments[11].pose(1 + 1)
-    props.move(len(stage.house.things), pushed)
+    props.move(len(stage.house.objects), pushed)
     after = tried.story.moments[13]
     x, y = after.world.position
-    view = View(scenery, props, x, y, 90.0, after.world.horizon_deg)
+    view = CameraView(scenery, props, x, y, 90.0, after.world.horizon_deg)
     assert np.array_equal(
         eye(frames[-1])[20:-20, 20:-20], camera.render([view]).rgb[0][20:-20, 20:-20]
     )
@@ -134,7 +136,7 @@ def test_what_is_held_is_told_and_leaves_an_outline(stage, hand_episode):
     # The camera no longer has it; what is shown in a corner instead is not the camera's.
     assets, film = stage.house.assets, list(played.frames(size=SIZE, fps=4.0))
     chair = episode.obstacles[0]
-    view = View(*_alone(stage, [(assets[chair.asset_id], chair.pose)]), 3.0, 1.25, 90.0, 30.0)
+    view = CameraView(*_alone(stage, [(assets[chair.asset_id], chair.pose)]), 3.0, 1.25, 90.0, 30.0)
     seen, wanted = eye(film[-9]), Camera(SIZE).render([view]).rgb[0]
     assert np.array_equal(seen[: SIZE // 2], wanted[: SIZE // 2])
     assert np.array_equal(seen[:, : SIZE // 2], wanted[:, : SIZE // 2])
@@ -142,7 +144,7 @@ def test_what_is_held_is_told_and_leaves_an_outline(stage, hand_episode):
 
 
 def _alone(stage, obstacles):
-    scenery = Scenery.of(stage.house)
+    scenery = StaticScene.of(stage.house)
     return scenery, scenery.props(obstacles)
 
 

@@ -14,7 +14,7 @@ from internav_data.views.curves import Curve, curves_svg
 from internav_data.views.page import Page
 from internav_data.views.replay import Replay
 from internav_data.views.trajectories import FAILED, LATE, WORKED, draw_trajectory
-from internav_data.world import Stage
+from internav_data.world import HouseModel
 
 AHEAD, RIGHT, PUSH, PICK, DONE = 0, 2, 5, 9, 11
 TO_THE_DOOR = [*[AHEAD] * 4, RIGHT, *[AHEAD] * 4]
@@ -22,7 +22,7 @@ TO_THE_DOOR = [*[AHEAD] * 4, RIGHT, *[AHEAD] * 4]
 
 @pytest.fixture(scope="module")
 def stage(hand_house):
-    return Stage.of(hand_house)
+    return HouseModel.of(hand_house)
 
 
 def count(picture, colour, tolerance=30):

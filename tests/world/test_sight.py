@@ -10,7 +10,7 @@ from internav_data.geometry import part_corners, transform, yaw_quaternion
 from internav_data.geometry.headings import HEADINGS
 from internav_data.records import Asset, Part, Pose
 from internav_data.world.occlusion import POINTS_AT_MOST, placed_shell, shell_of
-from internav_data.world.visibility import CAMERA_M, REACH_M, Screen, _hidden, view_from
+from internav_data.world.visibility import CAMERA_M, REACH_M, Occluders, _hidden, view_from
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 SHAPES = ("box", "cylinder", "sphere")
@@ -78,7 +78,7 @@ def test_points_are_few_and_belong_to_their_parts():
 
 
 def sees(things, place=0, *, heading=0, horizon=30, eye=(0.0, 0.0)):
-    screen = Screen([placed_shell(thing, pose) for thing, pose in things])
+    screen = Occluders([placed_shell(thing, pose) for thing, pose in things])
     return screen.seen(view_from(*eye, HEADINGS[heading], horizon), place)
 
 

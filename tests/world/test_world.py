@@ -17,7 +17,7 @@ from internav_data.houses import HouseConfig, build_house
 from internav_data.navigation import CLEARANCE_M, Lattice
 from internav_data.records import Pose
 from internav_data.records.errors import UsageError
-from internav_data.world import Action, Stage, World
+from internav_data.world import Action, HouseModel, World
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 SCENES = (0, 1, 6)
@@ -27,7 +27,7 @@ def played(scene, index, seed, count, state=None):
     """Digests and results of a random walk that meets things often; a pure function."""
     house = build_house(0, scene, HouseConfig(), catalogue())
     (episode,) = build_episodes(house, 1, catalogue().spawnable, first=index)
-    world = World.of_episode(Stage.of(house), episode, catalogue().assets)
+    world = World.of_episode(HouseModel.of(house), episode, catalogue().assets)
     return walk(world, seed, count)
 
 
@@ -57,7 +57,7 @@ def worlds():
     houses = [build_house(0, scene, HouseConfig(), catalogue()) for scene in SCENES]
     return [
         (episode, World.of_episode(stage, episode, catalogue().assets))
-        for stage in map(Stage.of, houses)
+        for stage in map(HouseModel.of, houses)
         for episode in build_episodes(stage.house, 2, catalogue().spawnable)
     ]
 
@@ -66,7 +66,7 @@ def worlds():
 def small(hand_house):
     """The agent at (3, 1) looking along +x, a chair 0.75 m ahead, nothing else near."""
     chair = hand_house.assets["Chair_0"]
-    stage = Stage.of(hand_house)
+    stage = HouseModel.of(hand_house)
     return World(stage, [(chair, Pose(3.75, 1.0, 0.0, UPRIGHT))], (12, 4, 0), (28, 4))
 
 
@@ -81,9 +81,9 @@ def test_actions_have_the_released_order():
 
 def test_an_episode_begins_with_its_own_distances(worlds):
     for episode, world in worlds:
-        assert world.steps() == episode.steps
-        assert world.way_m() == episode.way_m
-        assert world.clear_m() == episode.clear_m
+        assert world.steps() == episode.obstructed_path_steps
+        assert world.obstructed_path_m() == episode.obstructed_path_m
+        assert world.shortest_path_m() == episode.shortest_path_m
         assert world.horizon_deg == 30
         assert len(world.obstacles) == len(episode.obstacles)
 
@@ -165,7 +165,7 @@ def test_the_closest_is_taken_and_ties_go_by_index(hand_house):
     poses = [Pose(3.8, 1.5, 0.0, UPRIGHT), Pose(3.8, 0.5, 0.0, yaw_quaternion(180))]
     # Footprints of both, mirrored at the agent's row, are equally far away.
     near = Pose(3.6, 1.0, 0.0, UPRIGHT)
-    stage = Stage.of(hand_house)
+    stage = HouseModel.of(hand_house)
     first = len(stage.items)
     tie = World(stage, [(chair, p) for p in poses], (12, 4, 0), (28, 4))
     assert tie.target(pick=False) == first
@@ -175,7 +175,7 @@ def test_the_closest_is_taken_and_ties_go_by_index(hand_house):
 
 def test_pick_and_drop(hand_house):
     apple = hand_house.assets["Apple_0"]
-    stage = Stage.of(hand_house)
+    stage = HouseModel.of(hand_house)
     poses = [Pose(3.5, 1.0, 0.0, UPRIGHT), Pose(3.5, 1.3, 0.0, UPRIGHT)]
     world = World(stage, [(apple, p) for p in poses], (12, 4, 0), (28, 4))
     assert world.step(Action.DROP).reason == "hands are empty"
@@ -198,7 +198,7 @@ def test_pick_and_drop(hand_house):
 
 def test_what_carries_something_is_not_picked(hand_house):
     apple = hand_house.assets["Apple_0"]
-    stage = Stage.of(hand_house)
+    stage = HouseModel.of(hand_house)
     stack = [Pose(3.5, 1.0, 0.0, UPRIGHT), Pose(3.5, 1.0, 0.1, UPRIGHT)]
     world = World(stage, [(apple, p) for p in stack], (12, 4, 0), (28, 4))
     result = world.step(Action.PICKUP)
@@ -216,7 +216,7 @@ def test_putting_a_thing_back_restores_every_distance(worlds):
         there.put([(0, None)])
         there.put([(0, world.items[0].pose)])
         assert (there.lattice.distances(*there.goal) == before).all()
-        assert there.way_m() == episode.way_m
+        assert there.obstructed_path_m() == episode.obstructed_path_m
         assert there == world
 
 
@@ -253,7 +253,7 @@ def test_a_push_opens_the_way_exactly_when_the_lattice_says_so(worlds):
             )
             start = (episode.start.i, episode.start.j)
             assert there.steps() == fresh.distance(start, world.goal)
-            opened += episode.steps is None and there.steps() is not None
+            opened += episode.obstructed_path_steps is None and there.steps() is not None
     assert opened
 
 
@@ -313,9 +313,9 @@ def stands_in_nothing(world):
     axis = shapely.Point(world.position)
     for polygon in wall_footprints(world.stage.house.walls):
         assert shapely.Polygon(polygon).distance(axis) >= CLEARANCE_M - 1e-9
-    for thing in world.stage.house.things:
+    for thing in world.stage.house.objects:
         asset = world.stage.house.assets[thing.asset_id]
-        if thing.thing_id not in world.stage.thing_ids:
+        if thing.object_id not in world.stage.object_ids:
             for polygon in footprint(asset, thing.pose):
                 assert shapely.Polygon(polygon).distance(axis) >= CLEARANCE_M - 1e-9
     for item in world.items:

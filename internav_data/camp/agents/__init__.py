@@ -16,7 +16,7 @@ from internav_data.camp.agents.auxiliary import Auxiliary
 from internav_data.camp.agents.flat import PPOAgent, PPOIntentAgent, RandomAgent
 from internav_data.camp.agents.hierarchy import Hierarchy
 from internav_data.camp.agents.nie import NIEAgent
-from internav_data.camp.agents.protocol import Agent, Batch, Evaluated, State, Step
+from internav_data.camp.agents.protocol import Agent, AgentStep, Batch, Evaluated, State
 from internav_data.records import Purpose, generator
 from internav_data.records.errors import UsageError
 
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
 __all__ = [
     "AGENTS",
     "Agent",
+    "AgentStep",
     "Auxiliary",
     "Batch",
     "Evaluated",
     "Hierarchy",
     "State",
-    "Step",
     "agent_names",
     "make_agent",
     "without_intent",

@@ -7,8 +7,15 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor
 
-from internav_data.camp.agents.options import ACTIONS_OF, NAVIGATE, advanced, option_inputs
-from internav_data.camp.agents.protocol import Agent, Batch, Evaluated, Step, begun, one_step
+from internav_data.camp.agents.options import ACTIONS_OF, NAVIGATE, option_inputs, option_step
+from internav_data.camp.agents.protocol import (
+    Agent,
+    AgentStep,
+    Batch,
+    Evaluated,
+    one_step,
+    reset_where_done,
+)
 from internav_data.camp.networks import drawn, entropy_of
 from internav_data.world.actions import ACTION_COUNT
 
@@ -19,7 +26,7 @@ if TYPE_CHECKING:
 
     from internav_data.camp.agents.hierarchy import Hierarchy
     from internav_data.camp.agents.protocol import State
-    from internav_data.camp.networks import Course
+    from internav_data.camp.networks import EpisodeSegments
 
 
 class Auxiliary(Agent):
@@ -53,19 +60,19 @@ class Auxiliary(Agent):
 
     def act(
         self, seen: dict[str, Tensor], state: State, starts: Tensor, uniforms: Tensor | None
-    ) -> Step:
+    ) -> AgentStep:
         """See `Agent`."""
-        state = begun(state, starts)
+        state = reset_where_done(state, starts)
         option = self._tasks.to(starts.device)
         known = {"option": option, "open": state["open"], "used": state["used"]}
         log_probs, value, hidden = self.run(*one_step(seen), state, _row(known))
         choice = drawn(log_probs[0], None if uniforms is None else uniforms[:, 1])
         chosen = log_probs[0].gather(-1, choice.unsqueeze(-1)).squeeze(-1)
-        opened, used, _, _ = advanced(option, choice, state["used"])
+        opened, used, _, _ = option_step(option, choice, state["used"])
         if not self.hierarchy.keeps:  # `hrl` is told nothing in its whole model either
             opened, used = opened * 0, used * 0
         after = {"hidden": hidden, "open": opened, "used": used}
-        return Step(choice, chosen, value[0], {**known, "choice": choice}, after)
+        return AgentStep(choice, chosen, value[0], {**known, "choice": choice}, after)
 
     def value(self, seen: dict[str, Tensor], state: State) -> Tensor:
         """See `Agent`; of all environments, in their order."""
@@ -83,7 +90,11 @@ class Auxiliary(Agent):
         return Evaluated(chosen, value, entropy_of(log_probs), after)
 
     def run(
-        self, seen: dict[str, Tensor], course: Course, state: State, record: dict[str, Tensor]
+        self,
+        seen: dict[str, Tensor],
+        course: EpisodeSegments,
+        state: State,
+        record: dict[str, Tensor],
     ) -> tuple[Tensor, Tensor, Tensor]:
         """Return log-probabilities (T, n, 12), values (T, n) and hidden states (n, hidden).
 

@@ -9,10 +9,17 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor
 
-from internav_data.camp.agents.intent import Deciding, IntentPolicy, plane
+from internav_data.camp.agents.intent import IntentConditionedPolicy, IntentPolicy, uniform_intent
 from internav_data.camp.agents.options import DONE
-from internav_data.camp.agents.protocol import Agent, Batch, Evaluated, Step, begun, one_step
-from internav_data.camp.networks import Encoder, Policy, drawn, entropy_of
+from internav_data.camp.agents.protocol import (
+    Agent,
+    AgentStep,
+    Batch,
+    Evaluated,
+    one_step,
+    reset_where_done,
+)
+from internav_data.camp.networks import Encoder, RecurrentActorCritic, drawn, entropy_of
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import ACTION_COUNT
 
@@ -23,7 +30,7 @@ if TYPE_CHECKING:
 
     from internav_data.camp.agents.protocol import State
     from internav_data.camp.config import CampConfig
-    from internav_data.camp.networks import Course
+    from internav_data.camp.networks import EpisodeSegments
 
 
 def start_chances(end_chance: float) -> list[float]:
@@ -51,8 +58,8 @@ class PPOAgent(Agent):
             self.encoder.size + extra, start_chances(config.agent.end_chance)
         )
 
-    def _policy(self, inputs: int, chances: list[float]) -> Policy:
-        return Policy(inputs, self.hidden, chances)
+    def _policy(self, inputs: int, chances: list[float]) -> RecurrentActorCritic:
+        return RecurrentActorCritic(inputs, self.hidden, chances)
 
     def initial_state(self, count: int) -> State:
         """See `Agent`."""
@@ -61,16 +68,16 @@ class PPOAgent(Agent):
 
     def act(
         self, seen: dict[str, Tensor], state: State, starts: Tensor, uniforms: Tensor | None
-    ) -> Step:
+    ) -> AgentStep:
         """See `Agent`."""
-        state = begun(state, starts)
+        state = reset_where_done(state, starts)
         out, state, record = self.run(*one_step(seen), state, {})
         log_probs = torch.log_softmax(self.policy.actor(out[0]), -1)
         choice = drawn(log_probs, None if uniforms is None else uniforms[:, 1])
         probs = log_probs.exp()
         record = {name: noted[0] for name, noted in record.items()}
         record |= {"choice": choice, "action_probs": probs, "end_chance": probs[:, DONE]}
-        return Step(
+        return AgentStep(
             choice,
             log_probs.gather(-1, choice.unsqueeze(-1)).squeeze(-1),
             self.policy.value(out[0]),
@@ -96,7 +103,11 @@ class PPOAgent(Agent):
         return list(self.policy.critic.parameters())
 
     def run(
-        self, seen: dict[str, Tensor], course: Course, state: State, record: dict[str, Tensor]
+        self,
+        seen: dict[str, Tensor],
+        course: EpisodeSegments,
+        state: State,
+        record: dict[str, Tensor],
     ) -> tuple[Tensor, State, dict[str, Tensor]]:
         """Return the GRU's outputs (T, n, hidden), the state after them, and what to record.
 
@@ -114,7 +125,7 @@ class PPOAgent(Agent):
 class PPOIntentAgent(PPOAgent):
     """The same, told what its own copy of some rollouts ago is about to do."""
 
-    policy: Deciding
+    policy: IntentConditionedPolicy
 
     def __init__(self, config: CampConfig) -> None:
         super().__init__(config)
@@ -127,8 +138,8 @@ class PPOIntentAgent(PPOAgent):
         self.told = variant != "none"
         self.intent = IntentPolicy(self.policy, recursive=variant == "recursive")
 
-    def _policy(self, inputs: int, chances: list[float]) -> Policy:
-        return Deciding(inputs, self.hidden, chances, ACTION_COUNT)
+    def _policy(self, inputs: int, chances: list[float]) -> RecurrentActorCritic:
+        return IntentConditionedPolicy(inputs, self.hidden, chances, ACTION_COUNT)
 
     def initial_state(self, count: int) -> State:
         """See `Agent`."""
@@ -136,13 +147,17 @@ class PPOIntentAgent(PPOAgent):
         return {**state, "meaning": torch.zeros_like(state["hidden"])}
 
     def run(
-        self, seen: dict[str, Tensor], course: Course, state: State, record: dict[str, Tensor]
+        self,
+        seen: dict[str, Tensor],
+        course: EpisodeSegments,
+        state: State,
+        record: dict[str, Tensor],
     ) -> tuple[Tensor, State, dict[str, Tensor]]:
         """See `PPOAgent`."""
         features, intent = self.features(seen, record), record.get("intent")
         after, noted = {}, {}
         if not self.told:
-            intent = plane(features, ACTION_COUNT)
+            intent = uniform_intent(features, ACTION_COUNT)
             after["meaning"] = state["meaning"]
         elif intent is None:
             _, intent, after["meaning"] = self.intent(
@@ -180,12 +195,14 @@ class RandomAgent(Agent):
         state: State,
         starts: Tensor,  # noqa: ARG002 - it remembers nothing
         uniforms: Tensor | None,
-    ) -> Step:
+    ) -> AgentStep:
         """See `Agent`; even the most probable action has to be drawn: it is the first."""
         flat = torch.full((len(seen["goal"]), ACTION_COUNT), -math.log(ACTION_COUNT))
         flat = flat.to(seen["goal"].device)
         choice = drawn(flat, None if uniforms is None else uniforms[:, 1])
-        return Step(choice, flat[:, 0], torch.zeros_like(flat[:, 0]), {"choice": choice}, state)
+        return AgentStep(
+            choice, flat[:, 0], torch.zeros_like(flat[:, 0]), {"choice": choice}, state
+        )
 
     def value(self, seen: dict[str, Tensor], state: State) -> Tensor:  # noqa: ARG002
         """See `Agent`."""

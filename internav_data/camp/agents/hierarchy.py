@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import torch
 from torch import Tensor, nn
 
-from internav_data.camp.agents.intent import Deciding, IntentPolicy, plane
+from internav_data.camp.agents.intent import IntentConditionedPolicy, IntentPolicy, uniform_intent
 from internav_data.camp.agents.options import (
     ACTIONS_OF,
     DONE,
@@ -20,13 +20,20 @@ from internav_data.camp.agents.options import (
     STOP,
     WAIT,
     action_table,
-    advanced,
     follow,
     option_inputs,
+    option_step,
     start_chances,
 )
-from internav_data.camp.agents.protocol import Agent, Batch, Evaluated, Step, begun, one_step
-from internav_data.camp.networks import Encoder, Policy, drawn, entropy_of
+from internav_data.camp.agents.protocol import (
+    Agent,
+    AgentStep,
+    Batch,
+    Evaluated,
+    one_step,
+    reset_where_done,
+)
+from internav_data.camp.networks import Encoder, RecurrentActorCritic, drawn, entropy_of
 from internav_data.world.actions import ACTION_COUNT
 
 if TYPE_CHECKING:
@@ -37,13 +44,13 @@ if TYPE_CHECKING:
 
     from internav_data.camp.agents.protocol import State
     from internav_data.camp.config import CampConfig
-    from internav_data.camp.networks import Course
+    from internav_data.camp.networks import EpisodeSegments
 
 GLOBAL, INTENT, GRUS = 3, 4, 5
 """Hidden states: those of the three action policies, numbered as options are, then these."""
 
 
-class Ran(NamedTuple):
+class ForwardOutput(NamedTuple):
     """What the networks say of some steps."""
 
     plan: Tensor
@@ -88,12 +95,12 @@ class Hierarchy(Agent):
         size = Encoder.size_of(network)
         moves, options = start_chances(told.end_chance, told.interact_chance)
         even = [1.0 / len(ACTIONS_OF[PUSH])] * len(ACTIONS_OF[PUSH])  # hand-backs end nothing
-        self.navigate = Policy(size, self.hidden, moves)
-        self.push = Policy(size + OPTION_INPUTS, self.hidden, even)
-        self.pick = Policy(size + OPTION_INPUTS, self.hidden, even)
+        self.navigate = RecurrentActorCritic(size, self.hidden, moves)
+        self.push = RecurrentActorCritic(size + OPTION_INPUTS, self.hidden, even)
+        self.pick = RecurrentActorCritic(size + OPTION_INPUTS, self.hidden, even)
         self.by_policy = variant == "policy"
         intents = OPTIONS if self.by_policy else ACTION_COUNT
-        self.plan = Deciding(size + OPTION_INPUTS, self.hidden, options, intents)
+        self.plan = IntentConditionedPolicy(size + OPTION_INPUTS, self.hidden, options, intents)
         if self.told:
             self.intent = IntentPolicy(self.plan, recursive=variant == "recursive")
         mask = torch.zeros(OPTIONS)
@@ -103,7 +110,7 @@ class Hierarchy(Agent):
         self.register_buffer("tail", torch.tensor([-torch.inf, 0.0]), persistent=False)
 
     @property
-    def policies(self) -> tuple[Policy, Policy, Policy]:
+    def policies(self) -> tuple[RecurrentActorCritic, RecurrentActorCritic, RecurrentActorCritic]:
         """The action policies, numbered as options are."""
         return self.navigate, self.push, self.pick
 
@@ -116,9 +123,9 @@ class Hierarchy(Agent):
 
     def act(
         self, seen: dict[str, Tensor], state: State, starts: Tensor, uniforms: Tensor | None
-    ) -> Step:
+    ) -> AgentStep:
         """See `Agent`."""
-        state = begun(state, starts)
+        state = reset_where_done(state, starts)
         first, second = (None, None) if uniforms is None else uniforms.unbind(1)
         ran = self.run(*one_step(seen), state, {key: state[key][None] for key in ("open", "used")})
         plan, acts = ran.plan[0], ran.acts[0]
@@ -128,7 +135,7 @@ class Hierarchy(Agent):
         record = {"choice": choice, "option": option, "decide": decide}
         record |= {"open": state["open"], "used": state["used"], "intent": ran.intent[0]}
         log_prob = _log_prob(plan, acts, record)
-        opened, used, handed, forced = advanced(option, choice, state["used"])
+        opened, used, handed, forced = option_step(option, choice, state["used"])
         if not self.keeps:
             opened, used, forced = opened * 0, used * 0, forced & False
         # For logs alone: what is planned, what was meant, and the chance that this ends it all.
@@ -137,7 +144,7 @@ class Hierarchy(Agent):
         if ran.meant is not None:
             record["meant"] = ran.meant[0]
         after = {"hidden": ran.hidden, "open": opened, "used": used}
-        return Step(choice.masked_fill(handed, WAIT), log_prob, ran.value[0], record, after)
+        return AgentStep(choice.masked_fill(handed, WAIT), log_prob, ran.value[0], record, after)
 
     def value(self, seen: dict[str, Tensor], state: State) -> Tensor:
         """See `Agent`."""
@@ -155,8 +162,12 @@ class Hierarchy(Agent):
         return Evaluated(log_prob, ran.value, entropy, after, ran.intent)
 
     def run(
-        self, seen: dict[str, Tensor], course: Course, state: State, record: dict[str, Tensor]
-    ) -> Ran:
+        self,
+        seen: dict[str, Tensor],
+        course: EpisodeSegments,
+        state: State,
+        record: dict[str, Tensor],
+    ) -> ForwardOutput:
         """Run all networks over some steps.
 
         Parameters
@@ -179,7 +190,7 @@ class Hierarchy(Agent):
         features, meant = torch.cat([views[0], told], -1), None
         intent = record.get("intent")
         if not self.told:
-            intent = plane(features, self.plan.embed.in_features)
+            intent = uniform_intent(features, self.plan.embed.in_features)
         elif intent is None:
             meant, intent, hidden[INTENT] = self.intent(
                 features, hidden[INTENT], course, lambda p: self.mixed(p, acts), self.mask
@@ -189,7 +200,7 @@ class Hierarchy(Agent):
         )
         plan = torch.log_softmax(self.plan.actor(out) + self.mask, -1)
         value = self.plan.value(out)
-        return Ran(plan, acts, value, meant, intent, torch.stack(hidden, 1))
+        return ForwardOutput(plan, acts, value, meant, intent, torch.stack(hidden, 1))
 
     def mixed(self, meant: Tensor, acts: Tensor) -> Tensor:
         """Return P(i) of P(omega') and the policies' log-probabilities: equation 7.
@@ -198,7 +209,7 @@ class Hierarchy(Agent):
         """
         return meant if self.by_policy else (meant.unsqueeze(-1) * acts.exp()).sum(-2)
 
-    def _log_probs(self, policy: Policy, out: Tensor, *, hands_back: bool) -> Tensor:
+    def _log_probs(self, policy: RecurrentActorCritic, out: Tensor, *, hands_back: bool) -> Tensor:
         logits: Tensor = policy.actor(out)
         if not hands_back:
             logits = torch.cat([logits[..., :-1], self.tail[:1].expand(*out.shape[:2], 1)], -1)

@@ -8,25 +8,25 @@ from typing import TYPE_CHECKING, Final
 import torch
 from torch import Tensor, nn
 
-from internav_data.camp.networks import Policy
+from internav_data.camp.networks import RecurrentActorCritic
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from internav_data.camp.networks import Course
+    from internav_data.camp.networks import EpisodeSegments
 
 
 EMBEDDED: Final = 12
 """Length of an embedded intent (section 5.2)."""
 
 
-class Deciding(Policy):
+class IntentConditionedPolicy(RecurrentActorCritic):
     """A policy that is told an intent, through the linear layer E (equation 5).
 
     Parameters
     ----------
     inputs, hidden, chances
-        As `Policy` has them; inputs without the intent.
+        As `RecurrentActorCritic` has them; inputs without the intent.
     intents
         Length of an intent: of what it distributes over.
     """
@@ -54,7 +54,7 @@ class IntentPolicy(nn.Module):
         hidden state goes on from the first run.
     """
 
-    def __init__(self, deciding: Deciding, *, recursive: bool) -> None:
+    def __init__(self, deciding: IntentConditionedPolicy, *, recursive: bool) -> None:
         super().__init__()
         self.embed = copy.deepcopy(deciding.embed)
         self.gru = copy.deepcopy(deciding.gru)
@@ -63,7 +63,7 @@ class IntentPolicy(nn.Module):
         self.requires_grad_(requires_grad=False)
 
     @torch.no_grad()
-    def synchronise(self, deciding: Deciding) -> None:
+    def synchronise(self, deciding: IntentConditionedPolicy) -> None:
         """Copy the parameters, not the hidden states."""
         self.embed.load_state_dict(deciding.embed.state_dict())
         self.gru.load_state_dict(deciding.gru.state_dict())
@@ -74,7 +74,7 @@ class IntentPolicy(nn.Module):
         self,
         features: Tensor,
         hidden: Tensor,
-        course: Course,
+        course: EpisodeSegments,
         mix: Callable[[Tensor], Tensor],
         mask: Tensor,
     ) -> tuple[Tensor, Tensor, Tensor]:
@@ -102,7 +102,9 @@ class IntentPolicy(nn.Module):
         hidden : (n, hidden)
             After the last step.
         """
-        inputs = torch.cat([features, self.embed(plane(features, self.embed.in_features))], -1)
+        inputs = torch.cat(
+            [features, self.embed(uniform_intent(features, self.embed.in_features))], -1
+        )
         out, after = course.run(self.gru, inputs, hidden)
         meant = torch.softmax(self.actor(out) + mask, -1)
         intent = mix(meant)
@@ -114,6 +116,6 @@ class IntentPolicy(nn.Module):
         return meant, intent, after
 
 
-def plane(features: Tensor, count: int) -> Tensor:
+def uniform_intent(features: Tensor, count: int) -> Tensor:
     """Return the intent without any inclination, (T, n, count)."""
     return features.new_full((*features.shape[:2], count), 1.0 / count)

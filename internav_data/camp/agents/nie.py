@@ -24,7 +24,7 @@ from internav_data.world.actions import ACTION_COUNT, HORIZONS_DEG
 if TYPE_CHECKING:
     from internav_data.camp.agents.protocol import Batch, Evaluated, State
     from internav_data.camp.config import CampConfig
-    from internav_data.camp.networks import Course
+    from internav_data.camp.networks import EpisodeSegments
 
 SUMMARY: Final = 64
 _CORNERS: Final = 8
@@ -47,7 +47,11 @@ class NIEAgent(PPOAgent):
         self.content = nn.Linear(SUMMARY + 3 * _CORNERS * ACTION_COUNT, SUMMARY)
 
     def run(
-        self, seen: dict[str, Tensor], course: Course, state: State, record: dict[str, Tensor]
+        self,
+        seen: dict[str, Tensor],
+        course: EpisodeSegments,
+        state: State,
+        record: dict[str, Tensor],
     ) -> tuple[Tensor, State, dict[str, Tensor]]:
         """See `PPOAgent`."""
         record = record if "objects" in record else {**record, **self.sighted(seen)}

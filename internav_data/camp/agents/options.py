@@ -70,7 +70,9 @@ def option_inputs(opened: Tensor, used: Tensor) -> Tensor:
     return torch.stack([part.to(torch.float32) for part in parts], -1)
 
 
-def advanced(option: Tensor, choice: Tensor, used: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+def option_step(
+    option: Tensor, choice: Tensor, used: Tensor
+) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """Return what is open after an action, how many it has used, who handed back, who was cut.
 
     A Done of Push or Pick hands control back, be it the first action; after its 11th action an

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, ClassVar
 import torch
 from torch import Tensor, nn
 
-from internav_data.camp.networks import Course
+from internav_data.camp.networks import EpisodeSegments
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,7 +26,7 @@ State = dict[str, Tensor]
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class AgentStep:
     """What an agent does in each environment, and why."""
 
     action: Tensor
@@ -55,9 +55,9 @@ class Batch:
     """(T, n, …): those of the steps."""
 
     @cached_property
-    def course(self) -> Course:
+    def course(self) -> EpisodeSegments:
         """How GRUs go over these steps."""
-        return Course(self.starts)
+        return EpisodeSegments(self.starts)
 
     def of(self, columns: Tensor) -> Batch:
         """Return some of the environments; columns are their numbers, (m,)."""
@@ -109,7 +109,7 @@ class Agent(nn.Module, ABC):
         state: State,
         starts: Tensor,
         uniforms: Tensor | None,
-    ) -> Step:
+    ) -> AgentStep:
         """Choose actions; gradients are not needed.
 
         Parameters
@@ -154,7 +154,7 @@ class Agent(nn.Module, ABC):
         """Copy the deciding network into the intent network, where there is one."""
 
 
-def begun(state: State, starts: Tensor) -> State:
+def reset_where_done(state: State, starts: Tensor) -> State:
     """Return a state that has forgotten the episodes that are over; starts (n,) bool."""
     return {
         name: kept.masked_fill(starts.reshape(-1, *[1] * (kept.ndim - 1)), 0)
@@ -162,7 +162,7 @@ def begun(state: State, starts: Tensor) -> State:
     }
 
 
-def one_step(seen: dict[str, Tensor]) -> tuple[dict[str, Tensor], Course]:
+def one_step(seen: dict[str, Tensor]) -> tuple[dict[str, Tensor], EpisodeSegments]:
     """Return observations (n, …) as (1, n, …), and the course of a step at which nobody begins."""
     starts = torch.zeros(1, len(seen["goal"]), dtype=torch.bool, device=seen["goal"].device)
-    return {name: what.unsqueeze(0) for name, what in seen.items()}, Course(starts)
+    return {name: what.unsqueeze(0) for name, what in seen.items()}, EpisodeSegments(starts)

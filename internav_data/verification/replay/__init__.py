@@ -7,7 +7,7 @@ the agent may be) is judged by this package's own geometry. No other module of `
 import the world, and none `internav_data.episodes`.
 """
 
-from internav_data.verification.replay.checked_scene import Theatre
+from internav_data.verification.replay.checked_scene import CheckedScene
 from internav_data.verification.replay.episodes import replay_episode
 
-__all__ = ["Theatre", "replay_episode"]
+__all__ = ["CheckedScene", "replay_episode"]

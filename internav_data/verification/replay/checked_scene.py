@@ -11,7 +11,7 @@ from shapely import Point
 
 from internav_data.verification.overlaps import overlapping_slabs
 from internav_data.verification.things import wall_slabs
-from internav_data.world import Stage, World
+from internav_data.world import HouseModel, World
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from shapely import Geometry
 
     from internav_data.records import Asset, Episode, Pose
-    from internav_data.verification.checked_layout import Site
+    from internav_data.verification.checked_layout import CheckedLayout
     from internav_data.verification.settings import Settings
-    from internav_data.world import Item
+    from internav_data.world import MovableObject
 
 SITES_KEPT = 8
 """Houses without some of their furniture, kept a scene: graphs are large."""
@@ -31,20 +31,20 @@ SITES_KEPT = 8
 class Scenery:
     """Things as they lie: a house with the furniture in its place, footprints of all the rest."""
 
-    site: Site
+    site: CheckedLayout
     taken: tuple[Geometry, ...]
 
 
-class Theatre:
+class CheckedScene:
     """A house on the shared stage, and the validator's own view of it."""
 
-    def __init__(self, site: Site, settings: Settings) -> None:
+    def __init__(self, site: CheckedLayout, settings: Settings) -> None:
         self.site = site
         self.settings = settings
         self.assets: dict[str, Asset] = dict(site.shapes.assets)
-        self.stage = Stage.of(replace(site.house, assets=self.assets))
+        self.stage = HouseModel.of(replace(site.house, assets=self.assets))
         self._walls = wall_slabs(site.house)
-        self._sites: dict[frozenset[int], Site] = {}
+        self._sites: dict[frozenset[int], CheckedLayout] = {}
         self._prints: dict[tuple[str, Pose], tuple[Geometry, ...]] = {}
         self._spans: dict[tuple[str, Pose], tuple[float, float]] = {}
 
@@ -52,7 +52,7 @@ class Theatre:
         """Set up an episode at its start."""
         return World.of_episode(self.stage, episode, self.assets, self.settings.push_model)
 
-    def scenery(self, items: Sequence[Item], changes: dict[int, Pose | None]) -> Scenery:
+    def scenery(self, items: Sequence[MovableObject], changes: dict[int, Pose | None]) -> Scenery:
         """Return what stands in the agent's way when some of a world's items lie elsewhere.
 
         Parameters
@@ -105,13 +105,13 @@ class Theatre:
         plans = np.array([slab.plan for slab in slabs], dtype=object)
         return float(shapely.distance(plans, Point(point)).min())
 
-    def _without(self, moved: frozenset[int]) -> Site:
+    def _without(self, moved: frozenset[int]) -> CheckedLayout:
         """Return the house without some of its movable furniture (indices of items)."""
         if not moved:
             return self.site
         if moved not in self._sites:
             if len(self._sites) >= SITES_KEPT:
                 del self._sites[next(iter(self._sites))]
-            gone = frozenset(self.stage.thing_ids[k] for k in moved)
+            gone = frozenset(self.stage.object_ids[k] for k in moved)
             self._sites[moved] = self.site.without(gone)
         return self._sites[moved]

@@ -11,11 +11,11 @@ from internav_data.verification.replay.settling import check_settling
 
 if TYPE_CHECKING:
     from internav_data.records import Episode
-    from internav_data.verification.findings import Collector
-    from internav_data.verification.replay.checked_scene import Theatre
+    from internav_data.verification.findings import FindingCollector
+    from internav_data.verification.replay.checked_scene import CheckedScene
 
 
-def replay_episode(theatre: Theatre, episode: Episode, report: Collector) -> None:
+def replay_episode(theatre: CheckedScene, episode: Episode, report: FindingCollector) -> None:
     """Judge the physics of an episode whose geometry is true: every scene solved anew.
 
     What cannot be judged is counted among the report's notes.
@@ -24,7 +24,7 @@ def replay_episode(theatre: Theatre, episode: Episode, report: Collector) -> Non
         _replay(theatre, episode, report)
 
 
-def _replay(theatre: Theatre, episode: Episode, report: Collector) -> None:
+def _replay(theatre: CheckedScene, episode: Episode, report: FindingCollector) -> None:
     name = episode.episode_id
 
     def expect(holds: object, predicate: str, expected: object, got: object) -> bool:

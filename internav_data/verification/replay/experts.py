@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
     from internav_data.records import Episode
     from internav_data.verification.obstacles import Expect
-    from internav_data.verification.replay.checked_scene import Theatre
-    from internav_data.world import Item, World
+    from internav_data.verification.replay.checked_scene import CheckedScene
+    from internav_data.world import MovableObject, World
 
 GOAL_M = 0.2
 """Done succeeds within this of the goal."""
@@ -37,7 +37,7 @@ TURNS = {ROTATE_LEFT: 1, ROTATE_RIGHT: 3}
 AHEAD = ((1, 0), (0, 1), (-1, 0), (0, -1))
 
 
-def check_expert(theatre: Theatre, episode: Episode, expect: Expect) -> None:
+def check_expert(theatre: CheckedScene, episode: Episode, expect: Expect) -> None:
     """Judge the expert of an episode, where it has one."""
     if episode.expert is None:
         return
@@ -51,7 +51,7 @@ def check_expert(theatre: Theatre, episode: Episode, expect: Expect) -> None:
 class _Player:
     """An expert on its way: the shared world, and where the agent must be by the validator."""
 
-    def __init__(self, theatre: Theatre, episode: Episode, expect: Expect) -> None:
+    def __init__(self, theatre: CheckedScene, episode: Episode, expect: Expect) -> None:
         self._theatre = theatre
         self._expect = expect
         self._goal = (episode.goal.x, episode.goal.y)
@@ -101,7 +101,7 @@ class _Player:
             f"{left:.3f} m from it after {actions[-1:]}",
         )
 
-    def _walked(self, items: Sequence[Item], what: str) -> None:
+    def _walked(self, items: Sequence[MovableObject], what: str) -> None:
         """Judge that the disc kept off all things as they lay since they last moved."""
         scenery = self._theatre.scenery(items, {})
         points = [(SPACING_M * i, SPACING_M * j) for i, j in self._trail]
@@ -113,7 +113,7 @@ class _Player:
         )
         self._trail = [self._node]
 
-    def _reached(self, item: Item, what: str) -> None:
+    def _reached(self, item: MovableObject, what: str) -> None:
         """Judge that what was acted on lay within reach."""
         gap = math.inf
         if item.pose is not None:

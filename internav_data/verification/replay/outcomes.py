@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
     from internav_data.records import Episode, Outcome, Pose
     from internav_data.verification.obstacles import Expect
-    from internav_data.verification.replay.checked_scene import Scenery, Theatre
-    from internav_data.world import Item, World
+    from internav_data.verification.replay.checked_scene import CheckedScene, Scenery
+    from internav_data.world import MovableObject, World
 
 REST_M = 0.01
 """What begins this much above another thing's lowest point, and not above its top, rests on it."""
@@ -32,7 +32,7 @@ SUNK_M = 0.01
 """What comes to rest deeper in the floor or a wall is not where a push could lead."""
 
 
-def check_outcomes(theatre: Theatre, episode: Episode, expect: Expect) -> None:
+def check_outcomes(theatre: CheckedScene, episode: Episode, expect: Expect) -> None:
     """Judge the outcomes of all obstacles that have any."""
     world = theatre.world(episode)
     first = len(theatre.stage.items)
@@ -50,7 +50,7 @@ class _Judge:
     """One outcome before its predicates."""
 
     def __init__(
-        self, theatre: Theatre, episode: Episode, outcome: Outcome, what: str, expect: Expect
+        self, theatre: CheckedScene, episode: Episode, outcome: Outcome, what: str, expect: Expect
     ) -> None:
         self.theatre = theatre
         self.episode = episode
@@ -95,7 +95,7 @@ class _Judge:
         self.expect("seconds", seconds, outcome.seconds)
         return self.expect("success", not reason, outcome.success)
 
-    def _carries(self, items: Sequence[Item], index: int) -> bool:
+    def _carries(self, items: Sequence[MovableObject], index: int) -> bool:
         """Whether another movable thing rests on a thing."""
         placed = {
             k: (item.asset.asset_id, item.pose)
@@ -136,11 +136,11 @@ class _Judge:
         goal = ground.node(episode.goal.i, episode.goal.j)
         free = ground.with_obstacles(scenery.taken)
         found = ground.distances(goal, free)[start]
-        self.expect("steps", int(found) if math.isfinite(found) else None, outcome.steps)
+        self.expect("steps", int(found) if math.isfinite(found) else None, outcome.path_steps_after)
         self._way(scenery)
 
     def _way(self, scenery: Scenery) -> None:
-        episode, stated = self.episode, self.outcome.way_m
+        episode, stated = self.episode, self.outcome.path_m_after
         here, there = (episode.start.x, episode.start.y), (episode.goal.x, episode.goal.y)
         way = Between(scenery.site, here, there, scenery.taken)
         if stated is None:

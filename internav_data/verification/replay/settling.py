@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from internav_data.physics import SettleResult
     from internav_data.records import Episode, Obstacle
     from internav_data.verification.obstacles import Expect
-    from internav_data.verification.replay.checked_scene import Theatre
+    from internav_data.verification.replay.checked_scene import CheckedScene
 
 YAW_STEP_DEG = 15
 NEAR_M = 0.5
@@ -36,7 +36,7 @@ TRIES = 3
 """A spot is known better with each fall: what falls among others may be turned aside."""
 
 
-def check_settling(theatre: Theatre, episode: Episode, expect: Expect) -> None:
+def check_settling(theatre: CheckedScene, episode: Episode, expect: Expect) -> None:
     """Let every obstacle of an episode fall again, in order."""
     for number, obstacle in enumerate(episode.obstacles):
         what = f"obstacle {number} ({obstacle.asset_id})"
@@ -59,7 +59,7 @@ def check_settling(theatre: Theatre, episode: Episode, expect: Expect) -> None:
             expect(found == stored, f"physics.settle-{name}", f"{what}: {found}", stored)
 
 
-def _fall(theatre: Theatre, episode: Episode, number: int) -> SettleResult:
+def _fall(theatre: CheckedScene, episode: Episode, number: int) -> SettleResult:
     """Let an obstacle fall from the spot from which it would come to lie where it is stored."""
     obstacle = episode.obstacles[number]
     asset = theatre.assets[obstacle.asset_id]
@@ -95,7 +95,7 @@ def _apart(first: Pose, second: Pose) -> tuple[float, float]:
     return off, float(min(np.abs(p - q).max(), np.abs(p + q).max()))
 
 
-def _near(theatre: Theatre, episode: Episode, number: int, spot: Pose) -> list[Body]:
+def _near(theatre: CheckedScene, episode: Episode, number: int, spot: Pose) -> list[Body]:
     """Gather what could be touched: things, earlier obstacles, walls, in this order."""
     asset_id = episode.obstacles[number].asset_id
     here = shapely.union_all(list(theatre.footprint(asset_id, spot)))
@@ -103,7 +103,7 @@ def _near(theatre: Theatre, episode: Episode, number: int, spot: Pose) -> list[B
     def near(plans: list[Geometry] | tuple[Geometry, ...]) -> bool:
         return bool(shapely.dwithin(here, np.array(plans, dtype=object), NEAR_M).any())
 
-    placed = [(thing.asset_id, thing.pose) for thing in theatre.site.house.things]
+    placed = [(thing.asset_id, thing.pose) for thing in theatre.site.house.objects]
     placed += [(o.asset_id, o.pose) for o in episode.obstacles[:number]]
     bodies = [
         Body(theatre.assets[other], pose, moves=False)
