@@ -12,10 +12,7 @@ from internav_data.records.errors import UsageError
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
-    Ints = NDArray[np.int64]
+    from internav_data.core.typing import Floats, Ints
 
 MOST_CORNERS = 32
 """Corners of a piece: footprints and Bullet slow down beyond."""

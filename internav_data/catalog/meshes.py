@@ -10,12 +10,8 @@ import numpy as np
 from internav_data.geometry import part_corners
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Floats, Ints
     from internav_data.records import Asset, Part, Shape
-
-    Floats = NDArray[np.float64]
-    Ints = NDArray[np.int64]
 
 
 def hull_faces(corners: Floats) -> Ints:

@@ -24,9 +24,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from internav_data.core.typing import Floats
     from internav_data.records import RGB, Vec3
-
-    Floats = NDArray[np.float64]
 
 MOST_BYTES = 64_000_000
 MOST_FACES = 400_000

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from internav_data.records import Episode
 
     Observations = dict[str, NDArray[Any]]
-    Bools = NDArray[np.bool_]
+    from internav_data.core.typing import Bools
+
     Stepped = tuple[Observations, NDArray[np.float64], Bools, Bools, dict[str, Any]]
 
 OPTIONS = ("episode_id", "actions", "start", "reset_mask")

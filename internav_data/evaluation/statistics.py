@@ -20,12 +20,9 @@ from internav_data.records.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Floats
     from internav_data.evaluation.archive import Evaluation
     from internav_data.evaluation.metrics import EpisodeResult
-
-    Floats = NDArray[np.float64]
 
 CONFIDENCE: Final = 0.95
 POWER: Final = 0.8

@@ -20,12 +20,8 @@ from internav_data.geometry.solids import asset_corners
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Floats, Ints
     from internav_data.records import Asset, House, Pose, Vec2, Wall
-
-    Floats = NDArray[np.float64]
-    Ints = NDArray[np.int64]
 
 LOWEST_M = 0.02
 """What is flatter than this is stepped over."""

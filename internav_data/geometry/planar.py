@@ -12,10 +12,7 @@ from typing import TYPE_CHECKING
 from numba import njit
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+    from internav_data.core.typing import Floats
 
 
 @njit(cache=True, inline="always")

@@ -13,11 +13,8 @@ from internav_data.houses.standards import HALF_WALL_CM
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Floats
     from internav_data.houses.openings import Opening
-
-    Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

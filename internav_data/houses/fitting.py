@@ -13,11 +13,7 @@ import numpy as np
 from numba import njit
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
-    Bools = NDArray[np.bool_]
-    Ints = NDArray[np.int64]
+    from internav_data.core.typing import Bools, Floats, Ints
 
 SPACING_M = 0.25
 RADIUS_M = 0.2

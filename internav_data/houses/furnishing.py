@@ -28,11 +28,10 @@ if TYPE_CHECKING:
     from numpy.random import Generator
     from numpy.typing import NDArray
 
+    from internav_data.core.typing import Floats
     from internav_data.houses.openings import Opening
     from internav_data.houses.pieces import Group
     from internav_data.houses.plan import FloorGrid
-
-    Floats = NDArray[np.float64]
 
 CAPACITY = 160
 """Most boxes in one room."""

@@ -21,9 +21,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.catalog import Catalogue
+    from internav_data.core.typing import Floats
     from internav_data.records import Asset
-
-    Floats = NDArray[np.float64]
 
 BACK_GAP_M = 0.01
 """Furniture stands this far from the wall."""

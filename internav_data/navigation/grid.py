@@ -23,9 +23,10 @@ from internav_data.geometry.planar import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Floats = NDArray[np.float64]
+    from internav_data.core.typing import Floats
+
     Counts = NDArray[np.int32]
-    Ints = NDArray[np.int64]
+    from internav_data.core.typing import Ints
 
 NODE, EAST, NORTH = 0, 1, 2
 

@@ -14,10 +14,7 @@ import numpy as np
 from numba import njit
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
-    Ints = NDArray[np.int64]
+    from internav_data.core.typing import Floats, Ints
 
 Dop8 = tuple[float, float, float, float, float, float, float, float]
 """Supports along x, x + y, y, y - x and their opposites, metres."""

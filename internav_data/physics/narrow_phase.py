@@ -24,12 +24,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from internav_data.core.typing import Bools, Floats, Ints
     from internav_data.physics.frames import Frame
     from internav_data.records import Asset, Pose
-
-    Floats = NDArray[np.float64]
-    Ints = NDArray[np.int64]
-    Flags = NDArray[np.bool_]
 
 SIDES: Final = 32
 """Sides of the prism round the agent's column: it stands out by 0.5 % of the radius at most."""
@@ -175,7 +172,7 @@ def _met(
     others: Floats,
     owners: Ints,
     margin: float,
-) -> Flags:
+) -> Bools:
     met = np.zeros(owners[-1] + 1, dtype=np.bool_)
     placed, boxes = np.empty_like(corners), np.empty((len(starts), 6))
     for k in range(len(path)):

@@ -16,10 +16,10 @@ from internav_data.physics.kdop import widen
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from internav_data.core.typing import Floats
     from internav_data.physics.kdop import Dop8
     from internav_data.records import Asset, Pose, Quaternion, Vec3
 
-    Floats = NDArray[np.float64]
     Poses = NDArray[np.float32]
 
 KEPT_M: Final = 0.004

@@ -19,12 +19,7 @@ from internav_data.navigation.grid import EAST, NODE, NORTH
 from internav_data.world.visibility import CAMERA_M, REACH_M
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
-    Costs = NDArray[np.int32]
-    Ints = NDArray[np.int64]
-    Flags = NDArray[np.uint8]
+    from internav_data.core.typing import Costs, Floats, Ints, Masks
 
 FAR: Final = 1_000_000
 """Cost of a pose that is cut off."""
@@ -50,7 +45,7 @@ def _step_cost(
     node: int,
     quarter: int,
     ny: int,
-    fixed: Flags,
+    fixed: Masks,
     masks: Ints,
     banned: int,
     prices: Ints,
@@ -76,7 +71,7 @@ def _step_cost(
 
 @njit(cache=True)
 def field(
-    fixed: Flags, masks: Ints, banned: int, prices: Ints, ny: int, seeds: Ints, until: int
+    fixed: Masks, masks: Ints, banned: int, prices: Ints, ny: int, seeds: Ints, until: int
 ) -> Costs:
     """Cost from every pose to the nearest of some poses, FAR where cut off.
 
@@ -131,7 +126,7 @@ def field(
 
 @njit(cache=True)
 def descend(
-    fixed: Flags, masks: Ints, banned: int, prices: Ints, ny: int, costs: Costs, pose: int
+    fixed: Masks, masks: Ints, banned: int, prices: Ints, ny: int, costs: Costs, pose: int
 ) -> tuple[Ints, Ints]:
     """Follow a field down: the poses passed (n,), and the things entered on each step (n,)."""
     most = costs[pose] + 1

@@ -13,13 +13,8 @@ from internav_data.planner.cost_to_go import descend, field
 from internav_data.records.agent import CLEARANCE_M
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Costs, Ints, Masks
     from internav_data.world import HouseModel, MovableObject, World
-
-    Costs = NDArray[np.int32]
-    Ints = NDArray[np.int64]
-    Flags = NDArray[np.uint8]
 
 THINGS_AT_MOST: Final = 62
 """Bits of a mask; things beyond, the farthest from the start and the goal, count as fixed."""
@@ -33,7 +28,7 @@ EVERYTHING: Final = (1 << THINGS_AT_MOST) - 1
 
 
 @lru_cache(maxsize=8)
-def _closed(stage: HouseModel) -> Flags:
+def _closed(stage: HouseModel) -> Masks:
     """(3, nodes) uint8: what is closed with every movable thing away; cached, read-only."""
     nx, ny = stage.lattice.shape
     blockers = np.zeros((3, nx, ny), dtype=np.int32)
@@ -41,7 +36,7 @@ def _closed(stage: HouseModel) -> Flags:
     grid.close_outside(blockers, corners, SPACING_M)
     plans = stage.footprints
     grid.mark(blockers, plans.vertices, plans.offsets, SPACING_M, CLEARANCE_M, 1)
-    flags: Flags = (blockers.reshape(3, -1) > 0).astype(np.uint8)
+    flags: Masks = (blockers.reshape(3, -1) > 0).astype(np.uint8)
     return flags
 
 
@@ -60,7 +55,7 @@ class PlanningProblem:
 
     ny: int
     shape: tuple[int, int]
-    fixed: Flags
+    fixed: Masks
     """(3, nodes)."""
     things: tuple[int, ...]
     """Index of the thing of each bit."""

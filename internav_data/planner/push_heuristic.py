@@ -17,11 +17,8 @@ from internav_data.records.agent import CLEARANCE_M
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Ints
     from internav_data.world import World
-
-    Ints = NDArray[np.int64]
 
 STEP_M: Final = 0.15
 """How finely a slide is tried for what stands in its way."""

@@ -33,16 +33,9 @@ from internav_data.world.actions import HORIZONS_DEG, PUSH_TURNS
 from internav_data.world.occlusion import placed_shell
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
-    Costs = NDArray[np.int32]
-    Ints = NDArray[np.int64]
-    from collections.abc import Iterable, Mapping
-
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Costs, Ints
     from internav_data.physics import PushModel
     from internav_data.records import Asset, Episode, Pose
     from internav_data.world import HouseModel

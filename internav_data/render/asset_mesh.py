@@ -18,10 +18,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from internav_data.core.typing import Floats, Ints
     from internav_data.records import Asset, Shape
 
-    Floats = NDArray[np.float64]
-    Ints = NDArray[np.int64]
     Ring = tuple[int, ...]
 
 _FLAT = 1e-6

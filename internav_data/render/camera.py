@@ -38,9 +38,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from internav_data.core.typing import Floats
     from internav_data.records import Asset, House, Pose
-
-    Floats = NDArray[np.float64]
 
 EYE_HEIGHT_M: Final = 1.575
 FIELD_OF_VIEW_DEG: Final = 90.0

@@ -13,15 +13,8 @@ from internav_data.render.shading import FAR_M, shade
 from internav_data.render.shadows import MARGIN_M, cast_shadow, casts_shadow
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Floats, Image, Ints, Ints32, Singles
     from internav_data.render.materials import Mesh, Rooms
-
-    Floats = NDArray[np.float64]
-    Singles = NDArray[np.float32]
-    Ints = NDArray[np.int64]
-    Ints32 = NDArray[np.int32]
-    Image = NDArray[np.uint8]
 
 
 class Scratch(NamedTuple):

@@ -10,10 +10,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from internav_data.core.typing import Floats, Ints
     from internav_data.records import RGB, Material
-
-    Floats = NDArray[np.float64]
-    Ints = NDArray[np.int64]
 
 PLAIN: Final = 0
 SPECKLE: Final = 1

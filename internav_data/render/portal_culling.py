@@ -13,10 +13,7 @@ import numpy as np
 from numba import njit
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
-    Ints = NDArray[np.int64]
+    from internav_data.core.typing import Floats, Ints
 
 NEAR_M = 0.05
 """Nothing nearer is drawn. The agent's disc keeps things 0.2 m away: 0.115 m at a corner."""

@@ -17,14 +17,8 @@ from numba import njit
 from internav_data.render.portal_culling import NEAR_M
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Floats, Ints32, Singles
     from internav_data.render.materials import Mesh
-
-    Floats = NDArray[np.float64]
-    Singles = NDArray[np.float32]
-    Ints = NDArray[np.int64]
-    Ints32 = NDArray[np.int32]
 
 _NEARER = np.float32(1.000004)
 """What a face must be nearer by to hide another: of two in one plane the first drawn stays whole

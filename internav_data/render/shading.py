@@ -11,15 +11,8 @@ from internav_data.render.materials import BRICKS, PANE, PLAIN, SCREEN
 from internav_data.render.textures import F, paint, tone_at
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Floats, Image, Ints, Ints32, Singles
     from internav_data.render.materials import Mesh
-
-    Floats = NDArray[np.float64]
-    Singles = NDArray[np.float32]
-    Ints = NDArray[np.int64]
-    Ints32 = NDArray[np.int32]
-    Image = NDArray[np.uint8]
 
 FAR_M = 100.0
 """Depth where there is nothing."""

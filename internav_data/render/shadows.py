@@ -15,11 +15,7 @@ from internav_data.render.portal_culling import NEAR_M
 from internav_data.render.rasterise import scan
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
-    Singles = NDArray[np.float32]
-    Ints32 = NDArray[np.int32]
+    from internav_data.core.typing import Floats, Ints32, Singles
 
 MARGIN_M = 0.12
 """No further than a wall is thick: shadows stay in their room."""

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from shapely import Geometry, Polygon
 
-    Bools = NDArray[np.bool_]
-    Ints = NDArray[np.int64]
+    from internav_data.core.typing import Bools, Ints
 
 SPACING_M = 0.25
 RADIUS_M = 0.2

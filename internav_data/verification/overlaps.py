@@ -12,12 +12,10 @@ from scipy.spatial import ConvexHull, QhullError
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
     from shapely import Geometry
 
+    from internav_data.core.typing import Floats
     from internav_data.verification.shapes import Slab
-
-    Floats = NDArray[np.float64]
 
 DEPTH_M = 0.001
 """What overlaps by less is contact: poses are rounded to 0.1 mm."""

@@ -17,12 +17,8 @@ from shapely import Polygon
 from internav_data.verification.houses import opening
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Bools, Floats
     from internav_data.records import House
-
-    Floats = NDArray[np.float64]
-    Bools = NDArray[np.bool_]
 
 ON_BORDER_M = 1e-6
 """Points in a door belong to both rooms."""

@@ -17,13 +17,10 @@ from scipy.spatial import ConvexHull, QhullError
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
     from shapely import Geometry
 
+    from internav_data.core.typing import Floats, Ints
     from internav_data.records import Asset, Part, Pose, Quaternion
-
-    Floats = NDArray[np.float64]
-    Ints = NDArray[np.int64]
 
 STEP_OVER_M = 0.02
 """An agent steps over what is flatter."""

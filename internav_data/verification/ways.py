@@ -21,14 +21,10 @@ from internav_data.verification.checked_lattice import KEEP_M
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
     from shapely import Geometry, Point
 
+    from internav_data.core.typing import Bools, Floats, Ints
     from internav_data.verification.portals import Portals
-
-    Bools = NDArray[np.bool_]
-    Floats = NDArray[np.float64]
-    Ints = NDArray[np.int64]
 
 COARSE = 6
 """Chords a quarter circle at first."""

@@ -15,12 +15,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
     from internav_data.catalog import Catalogue
+    from internav_data.core.typing import Image
     from internav_data.records import Asset
-
-    Image = NDArray[np.uint8]
 
 _TURN_DEG = -24.0
 """Things are turned a little, so that front, side and top are seen."""

@@ -11,13 +11,9 @@ from internav_data.views.canvas import Canvas
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Image
     from internav_data.records import RGB
     from internav_data.views.replay_story import Moment
-
-    Image = NDArray[np.uint8]
 
 _PAPER: Final[RGB] = (250, 249, 246)
 _INK: Final[RGB] = (40, 42, 50)

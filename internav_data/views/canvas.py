@@ -14,10 +14,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from internav_data.core.typing import Floats, Image
     from internav_data.records import RGB, Vec2
 
-    Floats = NDArray[np.float64]
-    Image = NDArray[np.uint8]
     Points = Sequence[Vec2] | Floats
 
 OVERSAMPLING = 2

@@ -11,11 +11,9 @@ from internav_data.views.canvas import Canvas
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Image
     from internav_data.records import RGB
 
-    Image = NDArray[np.uint8]
     Swatch = tuple[RGB, str]
 
 _PAPER: RGB = (250, 249, 246)

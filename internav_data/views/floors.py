@@ -11,10 +11,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from internav_data.core.typing import Floats
     from internav_data.records import RGB, House, Room
     from internav_data.views.canvas import Canvas
 
-    Floats = NDArray[np.float64]
     Pattern = Callable[[Floats, Floats], Floats]
 
 _PAPER = np.array([255.0, 253.0, 249.0])

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    Image = NDArray[np.uint8]
-    Floats = NDArray[np.float64]
+    from internav_data.core.typing import Floats, Image
 
 _UNCHANGED: Final = 255
 """Palette entry of what stays as it is: transparent."""

@@ -18,10 +18,8 @@ from internav_data.catalog import part_triangles
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from internav_data.core.typing import Floats, Image
     from internav_data.records import RGB, Asset, Vec3
-
-    Floats = NDArray[np.float64]
-    Image = NDArray[np.uint8]
 
 _CREASE = math.cos(math.radians(50.0))
 """Faces of one part that meet at less than 50 degrees are shaded as one curved surface."""

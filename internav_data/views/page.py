@@ -15,10 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Image = NDArray[np.uint8]
+    from internav_data.core.typing import Image
 
 _STYLE: Final = """
 :root{color-scheme:light}

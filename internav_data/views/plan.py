@@ -19,10 +19,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from internav_data.core.typing import Floats, Image
     from internav_data.records import RGB, Door, House, Room, Vec2, Wall, Window
-
-    Floats = NDArray[np.float64]
-    Image = NDArray[np.uint8]
 
 PAPER: RGB = (250, 249, 246)
 INK: RGB = (52, 54, 62)

@@ -18,12 +18,9 @@ from internav_data.world import HouseModel
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Image
     from internav_data.physics import PushModel
     from internav_data.records import RGB, Asset, Episode, House
-
-    Image = NDArray[np.uint8]
 
     Panel = Callable[["Moment"], Image]
 

@@ -39,14 +39,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from internav_data.records import RGB, House, Pose, Vec2
+    from internav_data.core.typing import Floats, Image
+    from internav_data.records import RGB, Asset, House, Pose, Vec2
     from internav_data.views.replay_story import Shot, Story
-
-    Image = NDArray[np.uint8]
-    Floats = NDArray[np.float64]
-    from numpy.typing import NDArray
-
-    from internav_data.records import Asset
     from internav_data.world import StepResult
 
 AGENT: Final[RGB] = (196, 36, 112)

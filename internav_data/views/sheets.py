@@ -16,11 +16,8 @@ from internav_data.views.canvas import Canvas
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Image
     from internav_data.records import RGB
-
-    Image = NDArray[np.uint8]
 
 _PAPER: RGB = (250, 249, 246)
 _INK: RGB = (52, 54, 62)

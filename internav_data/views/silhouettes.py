@@ -18,10 +18,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from internav_data.core.typing import Floats
     from internav_data.records import RGB, Asset, Part, Pose
     from internav_data.views.canvas import Canvas
-
-    Floats = NDArray[np.float64]
 
 _LIGHT = np.array([-0.42, 0.38, 0.82]) / math.sqrt(0.42**2 + 0.38**2 + 0.82**2)
 _AMBIENT = 0.5

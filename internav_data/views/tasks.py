@@ -15,13 +15,9 @@ from internav_data.views.silhouettes import Outline, outlines, paint, shaded
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Floats, Image
     from internav_data.records import RGB, Asset, Episode, House, Obstacle, Vec2
     from internav_data.views.canvas import Canvas
-
-    Floats = NDArray[np.float64]
-    Image = NDArray[np.uint8]
 
 Kind = Literal["push", "pick", "fixed"]
 PUSHABLE: RGB = (255, 211, 38)

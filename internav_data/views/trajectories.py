@@ -29,15 +29,11 @@ from internav_data.world import Action, HouseModel
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Floats, Image
     from internav_data.physics import PushModel
     from internav_data.records import RGB, Asset, Episode, House, Pose, Vec2
     from internav_data.views.canvas import Canvas
     from internav_data.views.replay_story import Story
-
-    Floats = NDArray[np.float64]
-    Image = NDArray[np.uint8]
 
 EARLY: Final[RGB] = (240, 150, 190)
 LATE: Final[RGB] = (160, 16, 92)

@@ -16,10 +16,7 @@ from internav_data.views.gif import write_gif
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Image = NDArray[np.uint8]
+    from internav_data.core.typing import Image
 
 FORMATS: Final = ("mp4", "gif")
 """Kinds of film, chosen by the suffix of the file's name."""

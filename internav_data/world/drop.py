@@ -27,15 +27,11 @@ from internav_data.world.visibility import axis_distance
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Floats, Ints
     from internav_data.physics.kdop import Dop8
     from internav_data.physics.scene import Body
     from internav_data.physics.settle import SettleResult
     from internav_data.records import Asset, Vec2
-
-    Floats = NDArray[np.float64]
-    Ints = NDArray[np.int64]
 
 GAPS_M: Final = tuple(round(0.05 * k, 2) for k in range(1, 11))
 """Distances from the agent's disc, nearest first."""

@@ -16,12 +16,9 @@ from internav_data.physics.sweep import extent_of
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Floats
     from internav_data.physics.kdop import Dop8
     from internav_data.records import Asset, House, Pose, Vec2
-
-    Floats = NDArray[np.float64]
 
 WAYS_KEPT: Final = 16
 """Any-angle graphs kept a house: one for each set of furniture that was moved."""

@@ -10,12 +10,8 @@ import numpy as np
 from internav_data.geometry import asset_corners, part_corners, rotation_matrix
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Floats, Ints
     from internav_data.records import Asset, Part, Pose
-
-    Floats = NDArray[np.float64]
-    Ints = NDArray[np.int64]
 
 POINTS_AT_MOST: Final = 32
 """Visibility points of an asset: all parts' centres first, then corners, evenly chosen."""

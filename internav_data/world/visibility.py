@@ -13,13 +13,9 @@ from internav_data.geometry.planar import point_polygon_distance
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Floats, Ints
     from internav_data.geometry import Polygons
     from internav_data.world.occlusion import OcclusionShape
-
-    Floats = NDArray[np.float64]
-    Ints = NDArray[np.int64]
 
 REACH_M: Final = 1.25
 """A visibility point farther from the agent's axis, in the plane, cannot be acted on."""

@@ -21,11 +21,7 @@ from numba import njit
 from internav_data.geometry.planar import cross, inside
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
-    Ints = NDArray[np.int64]
-    from numpy.typing import NDArray
+    from internav_data.core.typing import Floats, Ints
 
 
 NONE, SOME, ALL = 0, 1, 2

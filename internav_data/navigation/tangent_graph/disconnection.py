@@ -20,10 +20,7 @@ from internav_data.geometry.planar import cross, inside, segments_cross
 from internav_data.navigation.tangent_graph.arcs import near_ids, nearest
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
-    Ints = NDArray[np.int64]
+    from internav_data.core.typing import Floats, Ints
 
 
 @njit(cache=True)

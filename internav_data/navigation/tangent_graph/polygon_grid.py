@@ -11,12 +11,8 @@ from numba import njit
 from internav_data.geometry.planar import point_polygon_distance, segment_polygon_distance
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Floats, Ints
     from internav_data.geometry import Polygons
-
-    Floats = NDArray[np.float64]
-    Ints = NDArray[np.int64]
 
 CELL_M = 0.5
 SLACK_M = 1e-8

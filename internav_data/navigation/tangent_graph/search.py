@@ -40,10 +40,7 @@ from internav_data.navigation.tangent_graph.tangents import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Floats = NDArray[np.float64]
-    Ints = NDArray[np.int64]
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Floats, Ints
     from internav_data.navigation.tangent_graph.tangents import Tangents
 
 

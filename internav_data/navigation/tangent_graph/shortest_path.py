@@ -34,14 +34,8 @@ from internav_data.navigation.tangent_graph.tangents import (
 from internav_data.records.agent import CLEARANCE_M
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Floats, Ints
     from internav_data.records import House, Vec2
-
-    Floats = NDArray[np.float64]
-    from numpy.typing import NDArray
-
-    Ints = NDArray[np.int64]
 
 
 CHORD_RAD = math.radians(10.0)

@@ -21,12 +21,8 @@ from internav_data.navigation.tangent_graph.arcs import COS_HALF, HALF, MID_X, M
 from internav_data.navigation.tangent_graph.polygon_grid import SLACK_M, segment_clear
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from internav_data.core.typing import Floats, Ints
     from internav_data.navigation.tangent_graph.polygon_grid import Scene
-
-    Floats = NDArray[np.float64]
-    Ints = NDArray[np.int64]
 
 LEAVE, ARRIVE, LENGTH, FROM_X, FROM_Y, TO_X, TO_Y = range(7)
 ANGLE_SLACK = 1e-12
