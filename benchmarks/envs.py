@@ -41,14 +41,14 @@ def weights(name: str) -> np.ndarray[Any, np.dtype[np.float64]]:
 
 def warm(env: InterNavVectorEnv) -> float:
     """Prepare every model and house once, and compile; returns milliseconds a house."""
-    source = env.players[0].source
+    source = env.slots[0].source
     for asset in source.dataset.assets.values():
         LIBRARY.number(asset)
     begin = time.process_time()
     for number in source.bounds[:-1].tolist():
         episode = source.episode(number)
-        place = source.place(episode)
-        place.field_to((episode.goal.i, episode.goal.j)).at(episode.start.i, episode.start.j)
+        house = source.loaded_house(episode)
+        house.distance_field((episode.goal.i, episode.goal.j)).at(episode.start.i, episode.start.j)
     return 1e3 * (time.process_time() - begin) / (len(source.bounds) - 1)
 
 
@@ -77,7 +77,7 @@ def rate(
 
 def resets(dataset: Path, size: int, seconds: float) -> float:
     """Milliseconds of a reset among known houses."""
-    env = InterNavEnv(dataset, size, houses_kept=10_000)
+    env = InterNavEnv(dataset, size, house_cache_size=10_000)
     env.reset(seed=0)
     begin, count = time.process_time(), 0
     while time.process_time() - begin < seconds:
@@ -96,7 +96,7 @@ def main() -> None:
     args = parser.parse_args()
     os.environ[FOLDER_VARIABLE] = ""  # what earlier runs have kept on disk does not count
     env = InterNavVectorEnv(
-        args.num_envs, args.dataset, args.image_size, copy=False, houses_kept=10_000
+        args.num_envs, args.dataset, args.image_size, copy=False, house_cache_size=10_000
     )
     warm(env)  # compiles
     result: dict[str, Any] = {

@@ -12,7 +12,7 @@ from internav_data.camp.agents.options import NAVIGATE, PUSH
 from internav_data.camp.stages import TASKS
 from internav_data.camp.tasks import WithoutObstacles, env_state
 from internav_data.envs.auxiliary import AuxiliaryStart, auxiliary_starts, is_cleared
-from internav_data.envs.processes import merged
+from internav_data.envs.processes import concatenate_infos
 from internav_data.envs.spaces import layout
 from internav_data.envs.tasks import KINDS, STEP, SUCCESS
 from internav_data.envs.vector import InterNavVectorEnv
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from internav_data.camp.collect import Observations, Stepped
     from internav_data.dataset import Dataset
+    from internav_data.envs.types import Observations, Stepped
     from internav_data.records import Episode
 
 CHOSEN_ACTION: Final = 0.1
@@ -73,7 +73,7 @@ class AuxiliaryTasks:
             ))
             for low, high, data in ((0, walks, plain), (walks, len(tasks), dataset)) if high > low
         ]  # fmt: skip
-        self._source = self._parts[-1][2].players[0].source
+        self._source = self._parts[-1][2].slots[0].source
         self._starts = lru_cache(_STARTS_KEPT)(self._starts_of)
         blank: dict[str, Any] = {"cursor": 0, "before": None, "paid": [], "extra": 0.0}
         self._notes = [dict(blank, paid=[]) for _ in tasks]
@@ -112,7 +112,7 @@ class AuxiliaryTasks:
         """See `Task`."""
         found = [env.step(actions[low:high]) for low, high, env in self._parts]
         _, rewards, ended, cut, _ = (list(column) for column in zip(*found, strict=True))
-        infos = merged([part[4] for part in found], self._counts)
+        infos = concatenate_infos([part[4] for part in found], self._counts)
         reward, over = np.concatenate(rewards), np.concatenate(ended)
         told = infos.get("metrics", {})
         if told:
@@ -184,15 +184,15 @@ class AuxiliaryTasks:
     def _way(self, k: int) -> int | None:
         """Return the lattice distance from where environment k began, as things lie now."""
         low, _, env = self._parts[-1] if k >= self._first else self._parts[0]
-        play = env.players[k - low].play
-        here = play.start or (play.world.i, play.world.j)
-        steps: int | None = play.world.lattice.distance((here[0], here[1]), play.world.goal)
+        run = env.slots[k - low].run
+        here = run.start or (run.world.i, run.world.j)
+        steps: int | None = run.world.lattice.distance((here[0], here[1]), run.world.goal)
         return steps
 
     def _choose(self, k: int) -> tuple[str, tuple[int, int, int]]:
         """Return the next episode that has something for environment k, and where to begin."""
         kind = "push" if self._tasks[k] == PUSH else "pick"
-        order = self._source.order(self._seed + k, stay=1, shuffle=True)
+        order = self._source.order(self._seed + k, episodes_per_house=1, shuffle=True)
         note = self._notes[k]
         for _ in range(len(self._source.dataset)):
             number = order.number(note["cursor"])
@@ -213,5 +213,5 @@ class AuxiliaryTasks:
 
     def _starts_of(self, number: int, kind: Any) -> tuple[AuxiliaryStart, ...]:  # noqa: ANN401 - Kind
         episode = self._source.episode(number)
-        stage = self._source.place(episode).stage
+        stage = self._source.loaded_house(episode).model
         return auxiliary_starts(stage, episode, self._source.dataset.assets, kind)

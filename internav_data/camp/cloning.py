@@ -31,12 +31,13 @@ if TYPE_CHECKING:
     from torch.optim import Optimizer
 
     from internav_data.camp.agents import Agent, State
-    from internav_data.camp.collect import Environments, Observations
+    from internav_data.camp.collect import Environments
     from internav_data.camp.config import CloningConfig
     from internav_data.camp.ppo import Reduce
     from internav_data.camp.tasks import Task
     from internav_data.camp.train import Trainer
     from internav_data.dataset import Dataset
+    from internav_data.envs.types import Observations
     from internav_data.records import Episode
 
     Experts = Callable[[str], Sequence[int]]

@@ -14,16 +14,12 @@ from internav_data.records import Purpose, generator
 from internav_data.records.errors import NotFiniteError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
     from internav_data.camp.agents import Agent
-
-    Observations = Mapping[str, NDArray[Any]]
-    Stepped = tuple[
-        Observations, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
-    ]
+    from internav_data.envs.types import Observations, Stepped
 
 _ACTIONS, _ORDERS = 0, 1
 """Where the seeds table has attempts: what of training is drawn."""

@@ -110,5 +110,5 @@ def _arguments(config: CampConfig, *, ids: bool) -> dict[str, Any]:
     return {
         "image_size": config.network.image_size, "max_steps": config.run.max_steps, "ids": ids,
         "failed_done_reward": config.data.failed_done_reward,
-        "houses_kept": config.data.houses_kept,
+        "house_cache_size": config.data.houses_kept,
     }  # fmt: skip

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from internav_data.camp.collect import Observations, Stepped
+    from internav_data.envs.types import Observations, Stepped
 
 _ACTIONS_AT_MOST: Final = 100_000
 

@@ -36,7 +36,7 @@ class AuxiliaryStart(NamedTuple):
 
 
 def auxiliary_starts(
-    stage: HouseModel, episode: Episode, assets: Mapping[str, Asset], kind: Kind
+    model: HouseModel, episode: Episode, assets: Mapping[str, Asset], kind: Kind
 ) -> tuple[AuxiliaryStart, ...]:
     """Return all starts of an episode: obstacle after obstacle, the nearest to its node first.
 
@@ -47,7 +47,7 @@ def auxiliary_starts(
 
     Parameters
     ----------
-    stage
+    model
         The episode's house.
     episode
         The episode.
@@ -56,7 +56,7 @@ def auxiliary_starts(
     kind
         "push" or "pick".
     """
-    world = World.of_episode(stage, episode, assets)
+    world = World.of_episode(model, episode, assets)
     starts: list[AuxiliaryStart] = []
     for number, obstacle in enumerate(episode.obstacles):
         wanted = obstacle.pickable if kind == "pick" else obstacle.pushable
@@ -68,10 +68,10 @@ def auxiliary_starts(
 
 
 def world_at(
-    stage: HouseModel, episode: Episode, assets: Mapping[str, Asset], start: AuxiliaryStart
+    model: HouseModel, episode: Episode, assets: Mapping[str, Asset], start: AuxiliaryStart
 ) -> World:
     """Return the world of an episode with its agent at an auxiliary start."""
-    world = World.of_episode(stage, episode, assets)
+    world = World.of_episode(model, episode, assets)
     world.i, world.j, world.quarter = start.i, start.j, start.quarter
     return world
 

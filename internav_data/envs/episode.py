@@ -92,41 +92,43 @@ class EpisodeRun:
 
     __slots__ = (
         "_clear",
+        "_config",
         "_length_m",
-        "_rules",
         "actions",
         "episode",
         "last",
+        "loaded_house",
         "over",
-        "place",
         "props",
         "shortest_path_m",
         "stale",
         "start",
+        "statistics",
         "success",
-        "tally",
         "world",
     )  # fmt: skip
 
     def __init__(
         self,
         episode: Episode,
-        place: LoadedHouse,
+        loaded_house: LoadedHouse,
         assets: Mapping[str, Asset],
-        rules: TaskConfig,
+        config: TaskConfig,
         start: Sequence[int] | None = None,
     ) -> None:
-        self.episode, self.place, self._rules = episode, place, rules
-        self.world = World.of_episode(place.stage, episode, assets, rules.push_model)
+        self.episode, self.loaded_house, self._config = episode, loaded_house, config
+        self.world = World.of_episode(loaded_house.model, episode, assets, config.push_model)
         if start is not None:
             self._stand(start)
-        self.props = place.scenery.props((assets[o.asset_id], o.pose) for o in episode.obstacles)
-        self._clear = place.field_to((episode.goal.i, episode.goal.j))
+        self.props = loaded_house.static_scene.props(
+            (assets[o.asset_id], o.pose) for o in episode.obstacles
+        )
+        self._clear = loaded_house.distance_field((episode.goal.i, episode.goal.j))
         self.shortest_path_m = self._clear.at(self.world.i, self.world.j)
         self._length_m = episode.shortest_path_m if start is None else self.shortest_path_m
         self.start = None if start is None else (start[0], start[1], start[2] % 4)
         self.actions: list[int] = []
-        self.tally = EpisodeStatistics()
+        self.statistics = EpisodeStatistics()
         self.success = self.over = False
         self.stale = True
         self.last: StepResult | None = None
@@ -158,11 +160,11 @@ class EpisodeRun:
             reward += self._interacted(known, result, before)
         elif terminated:
             self.success = result.success
-            reward += SUCCESS if result.success else self._rules.failed_done_reward
+            reward += SUCCESS if result.success else self._config.failed_done_reward
         self.stale |= result.success and known in _SEEN
-        truncated = not terminated and len(self.actions) >= self._rules.max_steps
+        truncated = not terminated and len(self.actions) >= self._config.max_steps
         self.over = terminated or truncated
-        self.tally.reward += reward
+        self.statistics.reward += reward
         return TaskStep(reward, terminated, truncated)
 
     def _stand(self, start: Sequence[int]) -> None:
@@ -180,7 +182,7 @@ class EpisodeRun:
         self.world.i, self.world.j, self.world.quarter = start[0], start[1], start[2] % 4
 
     def _moved(self) -> float:
-        self.tally.moves += 1
+        self.statistics.moves += 1
         after = self._clear.at(self.world.i, self.world.j)
         if math.isinf(after):
             # Furniture was moved and let the agent into what is cut off else: the last distance
@@ -190,20 +192,20 @@ class EpisodeRun:
         return move_reward(before, after)
 
     def _interacted(self, action: Action, result: StepResult, lattice: Lattice) -> float:
-        kind, tally = KINDS[action], self.tally
-        tally.tried[kind] += 1
+        kind, statistics = KINDS[action], self.statistics
+        statistics.tried[kind] += 1
         if not result.success:
             return 0.0
-        tally.done[kind] += 1
+        statistics.done[kind] += 1
         self._show(result)
         here = (self.world.i, self.world.j)
         before = lattice.distance(here, self.world.goal)
         after = self.world.lattice.distance(here, self.world.goal)
         reward = interaction_reward(before, after)
         if before is not None and after is not None:
-            tally.interaction_m += reward
-        tally.openings += before is None and after is not None
-        tally.closings += before is not None and after is None
+            statistics.interaction_m += reward
+        statistics.openings += before is None and after is not None
+        statistics.closings += before is not None and after is None
         return reward
 
     def _show(self, result: StepResult) -> None:
@@ -215,15 +217,15 @@ class EpisodeRun:
             self.props.show(self._instance(item))
 
     def _instance(self, item: int) -> int:
-        home = self.place.instances
+        home = self.loaded_house.instances
         if item < len(home):
             return home[item]
-        return len(self.place.stage.house.objects) + item - len(home)
+        return len(self.loaded_house.model.house.objects) + item - len(home)
 
     def metrics(self) -> dict[str, float | int | bool]:
         """Metrics as of now; meant for the end."""
         return metrics(
-            self.tally,
+            self.statistics,
             success=self.success,
             shortest_path_m=self._length_m,
             steps=len(self.actions),
@@ -235,10 +237,15 @@ class EpisodeRun:
         world = self.world
         x, y = world.position
         return CameraView(
-            self.place.scenery, self.props, x, y, 90.0 * world.quarter, world.horizon_deg
+            self.loaded_house.static_scene,
+            self.props,
+            x,
+            y,
+            90.0 * world.quarter,
+            world.horizon_deg,
         )
 
-    def polar(self) -> tuple[float, float]:
+    def point_goal(self) -> tuple[float, float]:
         """Goal from the agent: distance in metres and bearing in (-pi, pi], left positive."""
         world = self.world
         east, north = world.goal[0] - world.i, world.goal[1] - world.j

@@ -27,7 +27,7 @@ def scene_bounds(dataset: Dataset[Episode]) -> NDArray[np.int64]:
 
 
 class EpisodeOrder:
-    """Every episode once an epoch, `stay` of the same house in a row, epoch after epoch.
+    """Order of episodes: each once an epoch, several of the same house in a row.
 
     A house costs more to prepare than an episode: staying a while saves that.
 
@@ -37,42 +37,47 @@ class EpisodeOrder:
         See `scene_bounds`.
     seed
         What the order depends on.
-    stay
+    episodes_per_house
         Episodes of one house in a row, at least 1.
     shuffle
         False for the order on disk.
     """
 
     def __init__(
-        self, bounds: NDArray[np.int64], seed: int, *, stay: int = 4, shuffle: bool = True
+        self,
+        bounds: NDArray[np.int64],
+        seed: int,
+        *,
+        episodes_per_house: int = 4,
+        shuffle: bool = True,
     ) -> None:
         self._bounds, self._seed = bounds, seed
-        self._stay, self._shuffle = stay, shuffle
+        self._episodes_per_house, self._shuffle = episodes_per_house, shuffle
         self._count = int(bounds[-1])
         counts = np.diff(bounds)
-        runs = -(-counts // stay)
+        runs = -(-counts // episodes_per_house)
         self._scenes = np.repeat(np.arange(len(counts), dtype=np.int32), runs)
         first = np.repeat(np.cumsum(runs) - runs, runs)
-        self._starts = (np.arange(len(self._scenes)) - first).astype(np.int32) * stay
-        self._lengths = np.minimum(stay, counts[self._scenes] - self._starts)
+        self._starts = (np.arange(len(self._scenes)) - first).astype(np.int32) * episodes_per_house
+        self._lengths = np.minimum(episodes_per_house, counts[self._scenes] - self._starts)
         self._epoch = -1
         self._runs = self._ends = np.empty(0, np.int64)
 
     def number(self, position: int) -> int:
         """Return the number in the dataset of the episode at a position, 0 and up."""
-        epoch, place = divmod(position, self._count)
+        epoch, offset = divmod(position, self._count)
         if not self._shuffle:
-            return place
+            return offset
         if epoch != self._epoch:
             rng = generator(self._seed, Purpose.LOADER, attempt=_RUNS, draw=epoch)
             self._runs = rng.permutation(len(self._scenes))
             self._ends = np.cumsum(self._lengths[self._runs])
             self._epoch = epoch
-        at = int(np.searchsorted(self._ends, place, side="right"))
+        at = int(np.searchsorted(self._ends, offset, side="right"))
         run = int(self._runs[at])
-        offset = place - int(self._ends[at]) + int(self._lengths[run])
+        nth = offset - int(self._ends[at]) + int(self._lengths[run])
         scene = int(self._scenes[run])
         low, high = int(self._bounds[scene]), int(self._bounds[scene + 1])
         rng = generator(self._seed, Purpose.LOADER, scene, _WITHIN, 0, epoch)
         within = rng.permutation(high - low)
-        return low + int(within[int(self._starts[run]) + offset])
+        return low + int(within[int(self._starts[run]) + nth])

@@ -12,7 +12,13 @@ from gymnasium.vector import VectorEnv
 
 from internav_data.envs.slot import EpisodeSnapshot, check_options
 from internav_data.envs.spaces import layout
-from internav_data.envs.vector import OPTIONS, InterNavVectorEnv, choices, seeds_of, set_spaces
+from internav_data.envs.vector import (
+    OPTIONS,
+    InterNavVectorEnv,
+    declare_spaces,
+    reset_choices,
+    split_seeds,
+)
 from internav_data.records.errors import InternavError, UsageError
 
 if TYPE_CHECKING:
@@ -23,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.dataset import Dataset
-    from internav_data.envs.vector import Observations, Stepped
+    from internav_data.envs.types import Observations, Stepped
     from internav_data.records import Episode
 
 
@@ -65,7 +71,7 @@ def _serve(
         pipe.send((False, error))
 
 
-def merged(parts: Sequence[dict[str, Any]], counts: Sequence[int]) -> dict[str, Any]:
+def concatenate_infos(parts: Sequence[dict[str, Any]], counts: Sequence[int]) -> dict[str, Any]:
     """Lay infos of parts of a batch side by side."""
     whole: dict[str, Any] = {}
     ends = np.cumsum(counts)
@@ -73,7 +79,7 @@ def merged(parts: Sequence[dict[str, Any]], counts: Sequence[int]) -> dict[str, 
         given = [part.get(key) for part in parts]
         first = next(value for value in given if value is not None)
         if isinstance(first, dict):
-            whole[key] = merged([value or {} for value in given], counts)
+            whole[key] = concatenate_infos([value or {} for value in given], counts)
             continue
         fill = None if first.dtype == object else 0
         column = np.full(int(ends[-1]), fill, dtype=first.dtype)
@@ -115,7 +121,7 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
     ) -> None:
         if not 1 <= workers <= num_envs:
             raise UsageError(f"workers: expected 1 … {num_envs} (num_envs), got {workers}")
-        set_spaces(self, num_envs, image_size, autoreset=autoreset, ids=ids)
+        declare_spaces(self, num_envs, image_size, autoreset=autoreset, ids=ids)
         self._copy = copy
         start = multiprocessing.get_context(context)
         memory = {
@@ -148,8 +154,8 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
     ) -> tuple[Observations, dict[str, Any]]:
         """As `InterNavVectorEnv.reset`."""
         chosen = check_options(options, OPTIONS)
-        seeds = seeds_of(seed, self.num_envs)
-        mask, ids, actions, starts = choices(chosen, self.num_envs)
+        seeds = split_seeds(seed, self.num_envs)
+        mask, ids, actions, starts = reset_choices(chosen, self.num_envs)
         asked = []
         for k, (low, high) in enumerate(self._rows):
             if mask[low:high].any():
@@ -162,7 +168,7 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
                 asked.append(k)
         answers = dict(zip(asked, self._answers(asked), strict=True))
         infos = [answers[k][0] if k in answers else {} for k in range(len(self._rows))]
-        return self._observations(), merged(infos, self._counts)
+        return self._observations(), concatenate_infos(infos, self._counts)
 
     def step(self, actions: NDArray[np.int64] | Sequence[int]) -> Stepped:
         """As `InterNavVectorEnv.step`."""
@@ -177,7 +183,7 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
             np.concatenate(rewards),
             np.concatenate(terminated),
             np.concatenate(truncated),
-            merged(infos, self._counts),
+            concatenate_infos(infos, self._counts),
         )
 
     def state(self) -> tuple[EpisodeSnapshot, ...]:
@@ -193,7 +199,7 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
         for k, (low, high) in enumerate(self._rows):
             self._ask(k, "restore", list(states[low:high]))
         infos = [answer[0] for answer in self._answers()]
-        return self._observations(), merged(infos, self._counts)
+        return self._observations(), concatenate_infos(infos, self._counts)
 
     def close_extras(self, **_: Any) -> None:  # noqa: ANN401 - Gymnasium's signature
         """End the processes."""

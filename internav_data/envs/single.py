@@ -68,8 +68,8 @@ class InterNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
         self.render_mode = render_mode
         self.observation_space = observation_space(image_size, ids=ids)
         self.action_space = gymnasium.spaces.Discrete(ACTION_COUNT)
-        (self._player,) = EnvSlot.several(1, dataset, arguments)
-        self._board = ObservationBuffer.of(Camera(image_size), 1, ids=ids)
+        (self._slot,) = EnvSlot.make(1, dataset, arguments)
+        self._buffer = ObservationBuffer.of(Camera(image_size), 1, ids=ids)
         self._large: Camera | None = None
 
     def reset(
@@ -82,18 +82,18 @@ class InterNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
         """
         chosen = check_options(options, ("episode_id", "actions", "start"))
         super().reset(seed=seed)
-        if seed is not None or not self._player.ordered:
-            self._player.seed(self.np_random_seed)
-        self._player.begin(chosen.get("episode_id"), chosen.get("actions", ()), chosen.get("start"))
+        if seed is not None or not self._slot.ordered:
+            self._slot.seed(self.np_random_seed)
+        self._slot.begin(chosen.get("episode_id"), chosen.get("actions", ()), chosen.get("start"))
         return self._look(), self._whose()
 
     def step(
         self, action: int | np.int64
     ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Act: 0 … 11, or -1 to wait."""
-        play = self._player.play
-        step = play.step(int(action))
-        return self._look(), step.reward, step.terminated, step.truncated, step_info(play, step)
+        run = self._slot.run
+        step = run.step(int(action))
+        return self._look(), step.reward, step.terminated, step.truncated, step_info(run, step)
 
     def wait(self) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Pass a step: for options that hand control back."""
@@ -101,11 +101,11 @@ class InterNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
 
     def state(self) -> EpisodeSnapshot:
         """Return all that this environment is, in a few words."""
-        return self._player.state()
+        return self._slot.state()
 
     def restore(self, state: EpisodeSnapshot) -> tuple[dict[str, Any], dict[str, Any]]:
         """Become what `state` returned, here or elsewhere."""
-        self._player.restore(state)
+        self._slot.restore(state)
         return self._look(), self._whose()
 
     def render(self) -> NDArray[np.uint8] | None:
@@ -114,12 +114,12 @@ class InterNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
             return None
         if self._large is None:
             self._large = Camera(RENDER_SIZE)
-        picture: NDArray[np.uint8] = self._large.render([self._player.play.view()]).rgb[0]
+        picture: NDArray[np.uint8] = self._large.render([self._slot.run.view()]).rgb[0]
         return picture
 
     def _look(self) -> dict[str, Any]:
-        self._board.write(0, self._player.play)
-        return self._board.one()
+        self._buffer.write(0, self._slot.run)
+        return self._buffer.one()
 
     def _whose(self) -> dict[str, Any]:
-        return {"episode_id": self._player.play.episode.episode_id}
+        return {"episode_id": self._slot.run.episode.episode_id}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, Any, Final, TypedDict
 
 from internav_data.envs.episode import EpisodeRun, TaskConfig
-from internav_data.envs.source import HOUSES_KEPT, PLACES, Source, open_source
+from internav_data.envs.source import HOUSE_CACHE_SIZE, LOADED_HOUSES, Source, open_source
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
@@ -31,7 +31,11 @@ class Arguments(TypedDict, total=False):
     push_model: PushModel
     episodes_per_house: int
     shuffle: bool
-    houses_kept: int
+    house_cache_size: int
+
+
+_RENAMED: Final = {"houses_kept": "house_cache_size"}
+"""Arguments of earlier versions, and their names today."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,20 +56,31 @@ class EpisodeSnapshot:
 class EnvSlot:
     """One environment without its pictures."""
 
-    __slots__ = ("_order", "_position", "_rules", "_seed", "_shuffle", "_stay", "current", "source")
+    __slots__ = (
+        "_config",
+        "_episodes_per_house",
+        "_order",
+        "_position",
+        "_seed",
+        "_shuffle",
+        "current",
+        "source",
+    )
 
-    def __init__(self, source: Source, rules: TaskConfig, *, stay: int, shuffle: bool) -> None:
-        self.source, self._rules = source, rules
-        self._stay, self._shuffle = stay, shuffle
+    def __init__(
+        self, source: Source, config: TaskConfig, *, episodes_per_house: int, shuffle: bool
+    ) -> None:
+        self.source, self._config = source, config
+        self._episodes_per_house, self._shuffle = episodes_per_house, shuffle
         self._order: EpisodeOrder | None = None
         self._seed = self._position = 0
         self.current: EpisodeRun | None = None
 
     @staticmethod
-    def several(
+    def make(
         count: int, dataset: str | Path | Dataset[Episode], arguments: Arguments
     ) -> list[EnvSlot]:
-        """Make players that share one source.
+        """Make slots that share one source.
 
         Raises
         ------
@@ -73,28 +88,33 @@ class EnvSlot:
             An argument that cannot be meant, or is unknown.
         """
         unknown = sorted(set(arguments) - set(Arguments.__annotations__))
+        if unknown and unknown[0] in _RENAMED:
+            raise UsageError(f"InterNav: {unknown[0]} is now called {_RENAMED[unknown[0]]}")
         if unknown:
             raise UsageError(
                 f"InterNav: no argument {unknown[0]!r}; there are "
                 f"{sorted(Arguments.__annotations__)}"
             )
-        stay = arguments.get("episodes_per_house", 4)
-        kept = arguments.get("houses_kept", HOUSES_KEPT)
-        if min(count, stay, kept) < 1:
+        episodes_per_house = arguments.get("episodes_per_house", 4)
+        kept = arguments.get("house_cache_size", HOUSE_CACHE_SIZE)
+        if min(count, episodes_per_house, kept) < 1:
             raise UsageError(
-                f"num_envs, episodes_per_house and houses_kept: expected at least 1 each, "
-                f"got {count}, {stay} and {kept}"
+                f"num_envs, episodes_per_house and house_cache_size: expected at least 1 each, "
+                f"got {count}, {episodes_per_house} and {kept}"
             )
-        PLACES.capacity = max(PLACES.capacity, kept)
+        LOADED_HOUSES.capacity = max(LOADED_HOUSES.capacity, kept)
         source = open_source(dataset, arguments.get("split"), arguments.get("filters"))
-        rules = TaskConfig(
+        config = TaskConfig(
             arguments.get("max_steps", 500),
             arguments.get("failed_done_reward", 0.0),
             arguments.get("push_model", source.push_model),
         )
-        rules.check()
+        config.check()
         shuffle = arguments.get("shuffle", True)
-        return [EnvSlot(source, rules, stay=stay, shuffle=shuffle) for _ in range(count)]
+        return [
+            EnvSlot(source, config, episodes_per_house=episodes_per_house, shuffle=shuffle)
+            for _ in range(count)
+        ]
 
     @property
     def ordered(self) -> bool:
@@ -102,7 +122,7 @@ class EnvSlot:
         return self._order is not None
 
     @property
-    def play(self) -> EpisodeRun:
+    def run(self) -> EpisodeRun:
         """The episode being played."""
         if self.current is None:
             raise UsageError("InterNav: nothing is played yet; call reset() first")
@@ -111,7 +131,9 @@ class EnvSlot:
     def seed(self, seed: int) -> None:
         """Start an order of episodes from its beginning."""
         self._seed, self._position = int(seed), 0
-        self._order = self.source.order(self._seed, stay=self._stay, shuffle=self._shuffle)
+        self._order = self.source.order(
+            self._seed, episodes_per_house=self._episodes_per_house, shuffle=self._shuffle
+        )
 
     def begin(
         self,
@@ -128,17 +150,17 @@ class EnvSlot:
             number = self._order.number(self._position)
             self._position += 1
         episode = self.source.episode(number)
-        place, assets = self.source.place(episode), self.source.dataset.assets
-        self.current = EpisodeRun(episode, place, assets, self._rules, start)
+        loaded_house, assets = self.source.loaded_house(episode), self.source.dataset.assets
+        self.current = EpisodeRun(episode, loaded_house, assets, self._config, start)
         for action in actions:
             self.current.step(int(action))
         return self.current
 
     def state(self) -> EpisodeSnapshot:
         """Return all that this is."""
-        play = self.play
+        run = self.run
         return EpisodeSnapshot(
-            play.episode.episode_id, tuple(play.actions), self._seed, self._position, play.start
+            run.episode.episode_id, tuple(run.actions), self._seed, self._position, run.start
         )
 
     def restore(self, state: EpisodeSnapshot) -> EpisodeRun:
@@ -148,9 +170,9 @@ class EnvSlot:
         return self.begin(state.episode_id, state.actions, state.start)
 
 
-def step_info(play: EpisodeRun, step: TaskStep) -> dict[str, Any]:
+def step_info(run: EpisodeRun, step: TaskStep) -> dict[str, Any]:
     """Return what is said about a step."""
-    last = play.last
+    last = run.last
     if last is None:
         return {}
     info: dict[str, Any] = {
@@ -159,7 +181,7 @@ def step_info(play: EpisodeRun, step: TaskStep) -> dict[str, Any]:
         "target": last.target,
     }
     if step.terminated or step.truncated:
-        info["metrics"] = play.metrics()
+        info["metrics"] = run.metrics()
     return info
 
 

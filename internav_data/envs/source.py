@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 FIELDS_KEPT: Final = 64
 """Distance fields kept a house: one for each goal."""
-HOUSES_KEPT: Final = 64
+HOUSE_CACHE_SIZE: Final = 64
 """Houses kept a process, unless an environment asks for more."""
 
 
@@ -44,24 +44,24 @@ class ShortestPathField:
 
     Parameters
     ----------
-    stage
+    model
         The house.
     goal : (int, int)
         Node.
     """
 
-    __slots__ = ("_goal", "_metres", "_stage")
+    __slots__ = ("_goal", "_metres", "_model")
 
-    def __init__(self, stage: HouseModel, goal: tuple[int, int]) -> None:
-        self._stage = stage
+    def __init__(self, model: HouseModel, goal: tuple[int, int]) -> None:
+        self._model = model
         self._goal = (SPACING_M * goal[0], SPACING_M * goal[1])
-        self._metres = np.full(stage.lattice.shape, np.nan)
+        self._metres = np.full(model.lattice.shape, np.nan)
 
     def at(self, i: int, j: int) -> float:
         """Distance from a node, metres, as `World.shortest_path_m` has it; inf where cut off."""
         known = float(self._metres[i, j])
         if math.isnan(known):
-            way = self._stage.shortest_path_m((SPACING_M * i, SPACING_M * j), self._goal)
+            way = self._model.shortest_path_m((SPACING_M * i, SPACING_M * j), self._goal)
             known = math.inf if way is None else round_m(way)
             self._metres[i, j] = known
         return known
@@ -71,8 +71,8 @@ class ShortestPathField:
 class LoadedHouse:
     """A house ready to be walked in."""
 
-    stage: HouseModel
-    scenery: StaticScene
+    model: HouseModel
+    static_scene: StaticScene
     instances: tuple[int, ...]
     """Which instance of the camera's props each of the stage's items is."""
     _fields: OrderedDict[tuple[int, int], ShortestPathField] = field(default_factory=OrderedDict)
@@ -80,15 +80,15 @@ class LoadedHouse:
     @staticmethod
     def of(house: House) -> LoadedHouse:
         """Prepare a house."""
-        stage = HouseModel.of(house)
+        model = HouseModel.of(house)
         rows = {thing.object_id: row for row, thing in enumerate(house.objects)}
-        return LoadedHouse(stage, StaticScene.of(house), tuple(rows[t] for t in stage.object_ids))
+        return LoadedHouse(model, StaticScene.of(house), tuple(rows[t] for t in model.object_ids))
 
-    def field_to(self, goal: tuple[int, int]) -> ShortestPathField:
+    def distance_field(self, goal: tuple[int, int]) -> ShortestPathField:
         """Return the distance field of a goal."""
         found = self._fields.get(goal)
         if found is None:
-            found = self._fields[goal] = ShortestPathField(self.stage, goal)
+            found = self._fields[goal] = ShortestPathField(self.model, goal)
             if len(self._fields) > FIELDS_KEPT:
                 self._fields.popitem(last=False)
         self._fields.move_to_end(goal)
@@ -98,26 +98,26 @@ class LoadedHouse:
 class LoadedHouses:
     """The latest houses, by dataset and scene."""
 
-    def __init__(self, capacity: int = HOUSES_KEPT) -> None:
+    def __init__(self, capacity: int = HOUSE_CACHE_SIZE) -> None:
         self.capacity = capacity
-        self._places: OrderedDict[tuple[str, str], LoadedHouse] = OrderedDict()
+        self._houses: OrderedDict[tuple[str, str], LoadedHouse] = OrderedDict()
 
     def __len__(self) -> int:
-        return len(self._places)
+        return len(self._houses)
 
     def of(self, dataset_key: str, house: House) -> LoadedHouse:
         """Return a house's place, prepared unless it is known."""
         key = (dataset_key, house.scene_id)
-        found = self._places.get(key)
+        found = self._houses.get(key)
         if found is None:
-            found = self._places[key] = LoadedHouse.of(house)
-            while len(self._places) > self.capacity:
-                self._places.popitem(last=False)
-        self._places.move_to_end(key)
+            found = self._houses[key] = LoadedHouse.of(house)
+            while len(self._houses) > self.capacity:
+                self._houses.popitem(last=False)
+        self._houses.move_to_end(key)
         return found
 
 
-PLACES: Final = LoadedHouses()
+LOADED_HOUSES: Final = LoadedHouses()
 """Of this process: environments in it share their houses."""
 
 
@@ -152,9 +152,11 @@ class Source:
     def _ids(self) -> pa.ChunkedArray:
         return self.dataset.to_table(["episode_id"]).column("episode_id")
 
-    def order(self, seed: int, *, stay: int, shuffle: bool) -> EpisodeOrder:
+    def order(self, seed: int, *, episodes_per_house: int, shuffle: bool) -> EpisodeOrder:
         """Return the order of episodes of a seed."""
-        return EpisodeOrder(self.bounds, seed, stay=stay, shuffle=shuffle)
+        return EpisodeOrder(
+            self.bounds, seed, episodes_per_house=episodes_per_house, shuffle=shuffle
+        )
 
     def number_of(self, episode_id: str) -> int:
         """Return the number of an episode.
@@ -178,9 +180,9 @@ class Source:
         """Return an episode."""
         return self.dataset[number]
 
-    def place(self, episode: Episode) -> LoadedHouse:
-        """Return the place of an episode."""
-        return PLACES.of(self._digest, self.dataset.scene(episode.scene_id))
+    def loaded_house(self, episode: Episode) -> LoadedHouse:
+        """Return the house of an episode, ready for the environment."""
+        return LOADED_HOUSES.of(self._digest, self.dataset.scene(episode.scene_id))
 
 
 _SOURCES: OrderedDict[str, Source] = OrderedDict()

@@ -84,18 +84,18 @@ class ObservationBuffer:
             camera, {name: np.zeros(*described) for name, described in sizes.items()}
         )
 
-    def write(self, row: int, play: EpisodeRun) -> None:
+    def write(self, row: int, run: EpisodeRun) -> None:
         """Write what a world's agent sees; nothing is drawn where it sees what it saw before."""
-        world, buffers = play.world, self.buffers
-        if play.stale:
+        world, buffers = run.world, self.buffers
+        if run.stale:
             own = slice(row, row + 1)
             rgb, depth, ids = self._frames
             there = Frames(rgb[own], depth[own], ids[own])
-            self._camera.render([play.view()], there)
+            self._camera.render([run.view()], there)
             buffers["held"][row] = world.held >= 0
             buffers["horizon"][row] = HORIZONS_DEG.index(world.horizon_deg)
-            buffers["goal"][row] = play.polar()
-            play.stale = False
+            buffers["goal"][row] = run.point_goal()
+            run.stale = False
 
     def copied(self) -> dict[str, NDArray[Any]]:
         """Return observations that nobody will write into."""

@@ -36,7 +36,7 @@ class EpisodeStatistics:
 
 
 def metrics(
-    tally: EpisodeStatistics,
+    statistics: EpisodeStatistics,
     *,
     success: bool,
     shortest_path_m: float,
@@ -47,7 +47,7 @@ def metrics(
 
     Parameters
     ----------
-    tally
+    statistics
         What was counted.
     success
         Done at the goal.
@@ -58,7 +58,7 @@ def metrics(
     distance_m
         Any-angle distance without obstacles from where the agent ended.
     """
-    path_m = SPACING_M * tally.moves
+    path_m = SPACING_M * statistics.moves
     return {
         "success": success,
         "distance_to_goal_m": distance_m,
@@ -66,16 +66,16 @@ def metrics(
         "sts": shortest_path_m / SPACING_M / steps if success else 0.0,
         "steps": steps,
         "path_m": path_m,
-        "pushes_tried": tally.tried["push"],
-        "pushes_done": tally.done["push"],
-        "picks_tried": tally.tried["pick"],
-        "picks_done": tally.done["pick"],
-        "drops_tried": tally.tried["drop"],
-        "drops_done": tally.done["drop"],
-        "interaction_reward_m": tally.interaction_m,
-        "openings": tally.openings,
-        "closings": tally.closings,
-        "return": tally.reward,
+        "pushes_tried": statistics.tried["push"],
+        "pushes_done": statistics.done["push"],
+        "picks_tried": statistics.tried["pick"],
+        "picks_done": statistics.done["pick"],
+        "drops_tried": statistics.tried["drop"],
+        "drops_done": statistics.done["drop"],
+        "interaction_reward_m": statistics.interaction_m,
+        "openings": statistics.openings,
+        "closings": statistics.closings,
+        "return": statistics.reward,
     }
 
 

@@ -20,18 +20,15 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from internav_data.dataset import Dataset
-    from internav_data.records import Episode
-
-    Observations = dict[str, NDArray[Any]]
     from internav_data.core.typing import Bools
-
-    Stepped = tuple[Observations, NDArray[np.float64], Bools, Bools, dict[str, Any]]
+    from internav_data.dataset import Dataset
+    from internav_data.envs.types import Observations, Stepped
+    from internav_data.records import Episode
 
 OPTIONS = ("episode_id", "actions", "start", "reset_mask")
 
 
-def set_spaces(
+def declare_spaces(
     env: VectorEnv[Any, Any, Any], count: int, size: int, *, autoreset: bool, ids: bool = False
 ) -> None:
     """Give a vector environment its spaces and say how it resets."""
@@ -46,7 +43,7 @@ def set_spaces(
     env.metadata = {"autoreset_mode": mode, "render_modes": []}
 
 
-def seeds_of(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
+def split_seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
     """Return each environment's seed: seed, seed + 1, … for a number."""
     if seed is None:
         return [None] * count
@@ -89,13 +86,13 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         buffers: Observations | None = None,
         **arguments: Unpack[Arguments],
     ) -> None:
-        self.players = EnvSlot.several(num_envs, dataset, arguments)
-        set_spaces(self, num_envs, image_size, autoreset=autoreset, ids=ids)
+        self.slots = EnvSlot.make(num_envs, dataset, arguments)
+        declare_spaces(self, num_envs, image_size, autoreset=autoreset, ids=ids)
         camera = Camera(image_size)
         if buffers is None:
-            self._board = ObservationBuffer.of(camera, num_envs, ids=ids)
+            self._buffer = ObservationBuffer.of(camera, num_envs, ids=ids)
         else:
-            self._board = ObservationBuffer(camera, buffers)
+            self._buffer = ObservationBuffer(camera, dict(buffers))
         self._autoreset, self._copy = autoreset, copy
         self._over = np.zeros(num_envs, np.bool_)
 
@@ -112,16 +109,16 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         (i, j, quarter) to begin at (None: the episode's own).
         """
         chosen = check_options(options, OPTIONS)
-        seeds = seeds_of(seed, self.num_envs)
+        seeds = split_seeds(seed, self.num_envs)
         super().reset(seed=seeds[0])
-        mask, ids, actions, starts = choices(chosen, self.num_envs)
+        mask, ids, actions, starts = reset_choices(chosen, self.num_envs)
         infos: dict[str, Any] = {}
         for k in np.flatnonzero(mask).tolist():
-            player, own = self.players[k], seeds[k]
-            if own is None and not player.ordered:
+            slot, own = self.slots[k], seeds[k]
+            if own is None and not slot.ordered:
                 own = int(self.np_random.integers(2**32))
             if own is not None:
-                player.seed(own)
+                slot.seed(own)
             infos = self._add_info(infos, self._begin(k, ids[k], actions[k], starts[k]), k)
         return self._observations(), infos
 
@@ -138,28 +135,28 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
             if self._over[k]:
                 said.append((k, self._again(k)))
                 continue
-            play = self.players[k].play
-            step = play.step(int(action))
+            run = self.slots[k].run
+            step = run.step(int(action))
             rewards[k], terminated[k], truncated[k] = step
-            self._board.write(k, play)
-            said.append((k, step_info(play, step)))
+            self._buffer.write(k, run)
+            said.append((k, step_info(run, step)))
         self._over = terminated | truncated
         infos = self._joined(said)
         return self._observations(), rewards, terminated, truncated, infos
 
     def state(self) -> tuple[EpisodeSnapshot, ...]:
         """Return what each environment is."""
-        return tuple(player.state() for player in self.players)
+        return tuple(slot.state() for slot in self.slots)
 
     def restore(self, states: Sequence[EpisodeSnapshot]) -> tuple[Observations, dict[str, Any]]:
         """Become what `state` returned."""
         if len(states) != self.num_envs:
             raise UsageError(f"restore: expected {self.num_envs} states, got {len(states)}")
         infos: dict[str, Any] = {}
-        for k, (player, state) in enumerate(zip(self.players, states, strict=True)):
-            play = player.restore(state)
-            self._over[k] = play.over
-            self._board.write(k, play)
+        for k, (slot, state) in enumerate(zip(self.slots, states, strict=True)):
+            run = slot.restore(state)
+            self._over[k] = run.over
+            self._buffer.write(k, run)
             infos = self._add_info(infos, {"episode_id": state.episode_id}, k)
         return self._observations(), infos
 
@@ -177,10 +174,10 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         actions: Sequence[int] = (),
         start: Sequence[int] | None = None,
     ) -> dict[str, Any]:
-        play = self.players[k].begin(episode_id, actions, start)
-        self._over[k] = play.over
-        self._board.write(k, play)
-        return {"episode_id": play.episode.episode_id}
+        run = self.slots[k].begin(episode_id, actions, start)
+        self._over[k] = run.over
+        self._buffer.write(k, run)
+        return {"episode_id": run.episode.episode_id}
 
     def _joined(self, said: list[tuple[int, dict[str, Any]]]) -> dict[str, Any]:
         """Lay infos out as Gymnasium does; what every step says without its loops."""
@@ -203,10 +200,10 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         return infos
 
     def _observations(self) -> Observations:
-        return self._board.copied() if self._copy else self._board.buffers
+        return self._buffer.copied() if self._copy else self._buffer.buffers
 
 
-def choices(
+def reset_choices(
     chosen: dict[str, Any], count: int
 ) -> tuple[Bools, list[str | None], list[Sequence[int]], list[Sequence[int] | None]]:
     """Return who is to be reset, to which episode, what is played at once, and from where."""

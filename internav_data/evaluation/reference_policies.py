@@ -123,7 +123,7 @@ def planner_of(dataset: Dataset[Episode]) -> ActionPlanner:
     source = open_source(dataset)  # houses are those of environments in this process
 
     def plan(episode: Episode) -> Sequence[int]:
-        stage = source.place(episode).stage
+        stage = source.loaded_house(episode).model
         world = World.of_episode(stage, episode, dataset.assets)
         start, goal = (world.i, world.j), world.goal
         if world.lattice.distance(start, goal) is None:

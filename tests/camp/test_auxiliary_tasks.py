@@ -31,7 +31,7 @@ def tasks(scenes):
 
 
 def plays(task):
-    return [player.play for _, _, env in task._parts for player in env.players]
+    return [slot.run for _, _, env in task._parts for slot in env.slots]
 
 
 def test_each_begins_where_its_task_is(tasks):

@@ -108,16 +108,16 @@ def hand_episode(x, start_i, goal_i, *, pickable, shortest_path_m, goal_j=6):
 
 
 @pytest.fixture(scope="session")
-def hand_play():
-    """Make a play: a crate in a door (divided) or in the middle of a room."""
-    places = {d: LoadedHouse.of(hand_house(divided=d)) for d in (False, True)}
+def hand_run():
+    """Make a run: a crate in a door (divided) or in the middle of a room."""
+    houses = {d: LoadedHouse.of(hand_house(divided=d)) for d in (False, True)}
 
-    def make(*, divided, pickable=True, **rules):
+    def make(*, divided, pickable=True, **config):
         if divided:
             episode = hand_episode(3.0, 8, 20, pickable=pickable, shortest_path_m=3.0)
         else:
             episode = hand_episode(2.0, 4, 20, pickable=pickable, shortest_path_m=4.0)
-        return EpisodeRun(episode, places[divided], ASSETS, TaskConfig(**rules))
+        return EpisodeRun(episode, houses[divided], ASSETS, TaskConfig(**config))
 
     return make
 

@@ -113,18 +113,18 @@ def test_an_epoch_visits_everything_once(small):
     ]
 
 
-@pytest.mark.parametrize("stay", [1, 3, 50])
-def test_an_order_is_a_permutation_that_stays(stay):
+@pytest.mark.parametrize("episodes_per_house", [1, 3, 50])
+def test_an_order_is_a_permutation_that_stays(episodes_per_house):
     bounds = np.array([0, 5, 6, 20, 31])
-    order = EpisodeOrder(bounds, 7, stay=stay)
-    again = EpisodeOrder(bounds, 7, stay=stay)
+    order = EpisodeOrder(bounds, 7, episodes_per_house=episodes_per_house)
+    again = EpisodeOrder(bounds, 7, episodes_per_house=episodes_per_house)
     for epoch in range(3):
         numbers = [order.number(31 * epoch + k) for k in range(31)]
         assert sorted(numbers) == list(range(31))
         assert numbers == [again.number(31 * epoch + k) for k in range(31)]
         houses = np.searchsorted(bounds, numbers, side="right")
         runs = 1 + np.count_nonzero(np.diff(houses))
-        assert runs <= sum(-(-c // stay) for c in (5, 1, 14, 11))
+        assert runs <= sum(-(-c // episodes_per_house) for c in (5, 1, 14, 11))
     assert again.number(2) == order.number(2), "in any order of asking"
 
 
@@ -224,6 +224,7 @@ def test_options_that_cannot_be_meant(small, options, message):
         ({"max_steps": 0}, "max_steps"),
         ({"image_size": 0}, "image_size"),
         ({"colour": 1}, "no argument 'colour'"),
+        ({"houses_kept": 9}, "is now called house_cache_size"),
         ({"filters": [("room_count", ">", 99)]}, "no episodes"),
         ({"push_model": "shove"}, "push_model"),
         ({"episodes_per_house": 0}, "episodes_per_house"),
@@ -244,7 +245,7 @@ def test_experts_reach_the_goal_by_the_push_model_of_their_dataset(small, tmp_pa
     env = make(out)
     assert open_source(out).push_model == model
     env.reset(seed=0)
-    assert env.unwrapped._player.play.world.model == model
+    assert env.unwrapped._slot.run.world.model == model
     for episode in load_dataset(out):
         env.reset(options={"episode_id": episode.episode_id})
         for action in episode.expert.actions:
@@ -361,17 +362,17 @@ def test_registered_once():
 
 def test_so_many_houses_are_kept(small):
     source = open_source(small)
-    places = LoadedHouses(2)
+    houses = LoadedHouses(2)
     first = source.episode(0)
     house = source.dataset.scene(first.scene_id)
-    assert places.of("d", house) is places.of("d", house)
+    assert houses.of("d", house) is houses.of("d", house)
     for number in source.bounds[1:-1].tolist():
-        places.of("d", source.dataset.scene(source.episode(number).scene_id))
-        assert len(places) <= 2
-    place = places.of("d", house)
-    fields = {id(place.field_to((i, 5))) for i in range(200)}
+        houses.of("d", source.dataset.scene(source.episode(number).scene_id))
+        assert len(houses) <= 2
+    loaded_house = houses.of("d", house)
+    fields = {id(loaded_house.distance_field((i, 5))) for i in range(200)}
     assert fields
-    assert len(place._fields) == FIELDS_KEPT
+    assert len(loaded_house._fields) == FIELDS_KEPT
 
 
 @pytest.mark.slow
