@@ -6,7 +6,7 @@ numpy and pyarrow alone.
 Examples
 --------
 >>> from internav_data import load_dataset
->>> ds = load_dataset("data/demo", split="train")  # doctest: +SKIP
+>>> ds = load_dataset(split="train")  # doctest: +SKIP
 
 """
 

@@ -51,7 +51,8 @@ def test_links_lead_somewhere(page):
 
 
 @pytest.mark.parametrize("page", [p for p in PAGES if SNIPPET.search(p.read_text())], ids=str)
-def test_python_in_the_docs_runs(page, small_dataset, small_run):
+def test_python_in_the_docs_runs(page, small_dataset, small_run, monkeypatch):
+    monkeypatch.setenv("INTERNAV_DATASET", str(small_dataset))
     for snippet in SNIPPET.findall(page.read_text()):
         code = snippet.replace("data/mine", str(small_dataset))
         code = code.replace("runs/camp-0", str(small_run))
@@ -69,7 +70,7 @@ def test_commands_in_the_docs_exist_with_their_options(page):
         words = re.split(r" +#|[|]|> ", line)[0].split()
         command, path = {
             "internav-gen": (cli, words[1:2]),
-            "camp-eval": (camp_eval.cli, ["compare" if words[1] == "compare" else "evaluate"]),
+            "camp-eval": (camp_eval.cli, ["compare" if words[1:2] == ["compare"] else "evaluate"]),
             "camp-train": (camp_train.command, []),
         }[words[0]]
         shown = CliRunner().invoke(command, [*path, "--help"]).output

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from internav_cli.main import launch
-from internav_cli.options import DATASET, JSON, positive
+from internav_cli.options import DATASET, JSON, dataset_to_read, positive
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -39,8 +39,9 @@ class Commands(click.Group):
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="""\b
 Examples:
-  camp-eval runs/camp-0 data/mine                      a trained run on the test split
-  camp-eval expert,planner,random data/mine            what bounds every column
+  camp-eval runs/camp-0                                a trained run on the test split
+  camp-eval runs/camp-0 data/mine                      on another dataset
+  camp-eval expert,planner,random                      what bounds every column
   camp-eval compare runs/camp-* runs/ppo-*             methods against each other, over seeds
   camp-eval evaluate --help                            all options of the first two
 
@@ -50,21 +51,22 @@ Exit codes: 0 good, 1 error, 2 usage, 5 corrupt data, 130 interrupted.""",
 @click.option("--debug", is_flag=True, help="Show the traceback of an error.")
 @click.version_option(package_name="internav-data", prog_name="camp-eval")
 def cli(*, debug: bool) -> None:
-    """Measure agents like the paper: `camp-eval RUN DATASET`, `camp-eval compare RUN...`."""
+    """Measure agents like the paper: `camp-eval RUN [DATASET]`, `camp-eval compare RUN...`."""
 
 
 @cli.command(
     "evaluate",
     epilog="""\b
 Examples:
-  camp-eval runs/camp-0 data/mine
+  camp-eval runs/camp-0
   camp-eval runs/camp-0 data/mine --greedy --video --out results/greedy
   camp-eval runs/camp-0 data/mine --where "room_count<=3" --where "mode=blocked"
   camp-eval expert,planner,random data/mine --split val --limit 200
 
 \b
 RUN is a folder that camp-train wrote, or some of expert, planner, random with
-commas between them. Written: episodes.parquet and evaluation.json for each,
+commas between them. DATASET defaults to the folder that INTERNAV_DATASET names,
+else internav-dataset. Written: episodes.parquet and evaluation.json for each,
 tables.md, tables.json, report.html.""",
 )
 @click.argument("run")
@@ -200,7 +202,7 @@ def _dataset(given: dict[str, Any]) -> Dataset[Any]:
     if given["episodes_per_scene"] is not None:
         filters.append(("index", "<", given["episodes_per_scene"]))
     split = None if given["split"] == "all" else given["split"]
-    return load_dataset(given["dataset"], split, filters or None)
+    return load_dataset(dataset_to_read(given["dataset"]), split, filters or None)
 
 
 def _settings(given: dict[str, Any]) -> EvaluationConfig:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from internav_cli.main import launch
-from internav_cli.options import JSON
+from internav_cli.options import DATASET, JSON, dataset_to_read
 
 if TYPE_CHECKING:
     from internav_data.camp.config import CampConfig
@@ -32,22 +32,23 @@ _SETTINGS = {
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="""\b
 Examples:
-  camp-train data/mine                                    CaMP from scratch, into runs/camp-0
-  camp-train data/mine --init-from expert --steps 100000  clone the dataset's expert first
+  camp-train                                              CaMP from scratch, into runs/camp-0
+  camp-train --init-from expert --steps 100000            clone the dataset's expert first
   camp-train data/mine --method ppo --seed 1 --out runs/ppo-1
   camp-train data/mine --where "shortest_path_m<=6" --set run.max_steps=200
-  camp-train data/mine --dry-run                          how long it would take
-  camp-train data/mine --out runs/camp-0 --resume         go on after Ctrl-C
+  camp-train --dry-run                                    how long it would take
+  camp-train --out runs/camp-0 --resume                   go on after Ctrl-C
   camp-train --print-config > mine.toml                   all settings, to be changed
   torchrun --nproc-per-node 2 -m internav_cli.camp_train data/mine   several GPUs
 
 \b
 Ctrl-C finishes the update, saves and exits with 130; a second one leaves the
-last checkpoint as it is. Measure what was trained by camp-eval RUN DATASET.
+last checkpoint as it is. Measure what was trained by camp-eval RUN.
+DATASET defaults to the folder that INTERNAV_DATASET names, else internav-dataset.
 Exit codes: 0 good, 1 error, 2 usage, 5 corrupt data, 6 NaN or infinity, 130/143
 interrupted.""",
 )
-@click.argument("dataset", type=click.Path(path_type=Path), required=False)
+@DATASET
 @click.option(
     "--method",
     help="camp, ppo, ppo-intent, hrl, nie, or one of your own.  [default: camp]",
@@ -111,8 +112,6 @@ def command(**given: Any) -> int:  # noqa: ANN401 - the options above
 
         click.echo(config_toml(_config(given), "camp-train"), nl=False)
         return 0
-    if given["dataset"] is None:
-        raise click.UsageError("say what to train on: camp-train DATASET")
     if given["dry_run"] and given["resume"]:
         raise click.UsageError("--dry-run tells of a new run: leave --resume out")
     request = _request(given)
@@ -144,7 +143,7 @@ def _request(given: dict[str, Any]) -> Request:
     words = (given["stages"] or ",".join(PARTS)).replace(" ", "").split(",")
     parts = () if words == [CLONING] else tuple(words)
     return Request(
-        dataset=given["dataset"],
+        dataset=dataset_to_read(given["dataset"]),
         out=given["out"] or Path("runs") / f"{method}-{config.seed}",
         method=method,
         config=config,
@@ -192,7 +191,8 @@ def _train(request: Request, given: dict[str, Any]) -> int:
     if not trainer.ranks.first:
         return 0
     click.echo(teller.summary(request.out), err=True)
-    click.echo(f"measure it: camp-eval {request.out} {request.dataset}", err=True)
+    named = "" if given["dataset"] is None else f" {request.dataset}"
+    click.echo(f"measure it: camp-eval {request.out}{named}", err=True)
     if given["as_json"]:
         click.echo(json.dumps(teller.plain(request.out)))
     return 0

@@ -8,7 +8,14 @@ from typing import Any
 
 import click
 
-from internav_cli.options import JSON, config_from, config_options, positive, progress
+from internav_cli.options import (
+    JSON,
+    config_from,
+    config_options,
+    name_dataset,
+    positive,
+    progress,
+)
 
 NAMED = 10
 """Quarantined scenes that are named at the end."""
@@ -18,7 +25,7 @@ NAMED = 10
     "generate",
     epilog="""\b
 Examples:
-  internav-gen generate --out data/paper                      the paper's 12,000 scenes
+  internav-gen generate --scenes 12000                        as many as the paper's
   internav-gen generate --out data/demo --scenes 120 --episodes-per-scene 10
   internav-gen generate --out data/demo --scenes 240          extends it
   internav-gen generate --out data/flats --rooms kitchen,living,bedroom:2 --preset realistic
@@ -29,7 +36,11 @@ Examples:
 Run again on an unfinished folder it continues; a kill loses nothing but the scenes
 under way. Any number of workers gives the same bytes.""",
 )
-@click.option("--out", type=click.Path(path_type=Path), help="The dataset's folder.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    help="The dataset's folder.  [default: $INTERNAV_DATASET, else internav-dataset]",
+)
 @click.option("--scenes", type=int, default=12_000, show_default=True, callback=positive)
 @click.option("--episodes-per-scene", type=int, help="A tenth of it in test scenes.  [default: 50]")
 @click.option("--workers", type=int, callback=positive, help="Processes.  [default: one a core]")
@@ -100,16 +111,16 @@ def command(
         told = forecast(config, scenes, workers or 0, progress())
         click.echo(told.to_json() if as_json else told.summary())
         return 0
-    if out is None:
-        raise click.UsageError("say where to put the dataset: --out DIR")
+    name_dataset(out)
     return _generate(out, config, scenes, workers or 0, as_json=as_json)
 
 
-def _generate(out: Path, config: Any, scenes: int, workers: int, *, as_json: bool) -> int:  # noqa: ANN401
+def _generate(out: Path | None, config: Any, scenes: int, workers: int, *, as_json: bool) -> int:  # noqa: ANN401
+    from internav_data.dataset import dataset_folder
     from internav_data.generation import generate
     from internav_data.generation.report import summary
 
-    report = generate(out, config, scenes, workers, progress())
+    report = generate(dataset_folder(out), config, scenes, workers, progress())
     click.echo(summary(report), err=True)
     for scene_id, reason in report.quarantined[:NAMED]:
         click.echo(f"quarantined {scene_id}: {reason}", err=True)

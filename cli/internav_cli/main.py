@@ -49,9 +49,14 @@ class LazyGroup(click.Group):
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="""\b
 Examples:
-  internav-gen generate --out data/demo --scenes 120
-  internav-gen validate data/demo
-  internav-gen show data/demo --scene 17 --episode 3 --out picture.png
+  internav-gen generate --scenes 120
+  internav-gen validate
+  internav-gen stats
+  internav-gen show --scene 17 --episode 3
+
+\b
+DATASET and --out default to the folder that the environment variable INTERNAV_DATASET
+names, else to internav-dataset in the current directory.
 
 \b
 Shell completion (bash; zsh and fish likewise):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -15,7 +16,8 @@ if TYPE_CHECKING:
 
 F = TypeVar("F", bound="Callable[..., Any]")
 
-DATASET = click.argument("dataset", type=click.Path(path_type=Path))
+DATASET = click.argument("dataset", required=False, type=click.Path(path_type=Path))
+"""Folder to read; see `dataset_to_read`."""
 JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on stdout.")
 
 _CONFIG = (
@@ -85,6 +87,37 @@ def config_from(
     config = load_config(config_file, overrides, chosen)
     config.check()
     return config
+
+
+def dataset_to_read(given: Path | None) -> Path:
+    """Return the folder of the dataset that a command reads, and name it on stderr.
+
+    A folder without a dataset is left to the error that names it.
+
+    Raises
+    ------
+    CorruptDataError
+        There is no dataset in the default folder.
+
+    """
+    from internav_data.dataset import dataset_folder, has_manifest, read_manifest
+
+    folder = dataset_folder(given)
+    if has_manifest(folder):
+        name_dataset(given)
+    elif given is None:
+        read_manifest(folder)  # raises: nothing is there, or nothing finished
+    return folder
+
+
+def name_dataset(given: Path | None) -> None:
+    """Write on stderr which dataset a command takes, and why if none was named."""
+    from internav_data.dataset.location import dataset_folder, origin
+
+    if os.environ.get("RANK", "0") != "0":
+        return  # torchrun starts this program once a rank
+    reason = origin(given)
+    click.echo(f"dataset: {dataset_folder(given)}" + (f" ({reason})" if reason else ""), err=True)
 
 
 def progress() -> GenerationProgress:

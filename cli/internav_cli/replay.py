@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from internav_cli.options import DATASET, positive
+from internav_cli.options import DATASET, dataset_to_read, positive
 
 if TYPE_CHECKING:
     from internav_data.records import Episode
@@ -20,7 +20,7 @@ _EPISODE_ID = re.compile(r"(?:scene-)?(\d{1,9})/(\d{1,9})")
     "replay",
     epilog="""\b
 Examples:
-  internav-gen replay data/demo scene-000017/0003            scene-000017-0003.mp4
+  internav-gen replay 17/3                                   scene-000017-0003.mp4
   internav-gen replay data/demo 17/3 --out there.mp4 --out there.gif
   internav-gen replay data/demo --scene 17 --episode 3 --format gif
   internav-gen replay data/demo 17/3 --actions mine.json --out mine.gif
@@ -66,7 +66,7 @@ GIF plays anywhere.""",
 @click.option("--force", is_flag=True, help="Write over a file that is there.")
 def command(
     *,
-    dataset: Path,
+    dataset: Path | None,
     episode_id: str | None,
     scene: int | None,
     episode: int | None,
@@ -84,6 +84,7 @@ def command(
     from internav_data.views import Replay, film_format, read_actions, write_video
     from internav_data.views.replay import DEFAULTS
 
+    dataset, episode_id = _arguments(dataset, episode_id)
     given = None if actions_file is None else read_actions(actions_file)
     if given is not None and given.episode_id and (episode_id, scene, episode) == (None,) * 3:
         episode_id = given.episode_id
@@ -96,10 +97,11 @@ def command(
     for path in paths:
         if path.exists() and not force:
             raise UsageError(f"{path}: is there already; choose another name, or pass --force")
-    house, task, assets, model = _stored(dataset, *place)
+    folder = dataset_to_read(dataset)
+    house, task, assets, model = _stored(folder, *place)
     if given is None and task.expert is None:
         raise UsageError(
-            f"{dataset}: {name} has no expert (none was found, or the dataset is of a version "
+            f"{folder}: {name} has no expert (none was found, or the dataset is of a version "
             "without); choose another episode, or pass --actions FILE"
         )
     actions = None if given is None else given.actions
@@ -111,6 +113,13 @@ def command(
         told = f"{count / rate:.0f} s, {path.stat().st_size / 1e6:.1f} MB"
         click.echo(f"wrote {path}: {film.steps} actions, {end}; {told}", err=True)
     return 0
+
+
+def _arguments(dataset: Path | None, episode_id: str | None) -> tuple[Path | None, str | None]:
+    """Return DATASET and EPISODE_ID; a single argument that reads like an episode is one."""
+    if dataset is not None and episode_id is None and _EPISODE_ID.fullmatch(str(dataset)):
+        return None, str(dataset)
+    return dataset, episode_id
 
 
 def _place(episode_id: str | None, scene: int | None, episode: int | None) -> tuple[int, int]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from internav_cli.options import config_from, config_options, positive
+from internav_cli.options import DATASET, config_from, config_options, dataset_to_read, positive
 
 if TYPE_CHECKING:
     from internav_data.generation import GenerationConfig
@@ -17,14 +17,19 @@ if TYPE_CHECKING:
     "show",
     epilog="""\b
 Examples:
+  internav-gen show --scene 17                              scene-000017.png
+  internav-gen show --scene 17 --episode 3                  scene-000017-0003.png
   internav-gen show data/demo --scene 17 --out house.png
-  internav-gen show data/demo --scene 17 --episode 3 --out episode.png
-  internav-gen show --seed 7 --scene 3 --rooms 6 --out fresh.png       no dataset needed""",
+  internav-gen show --seed 7 --scene 3 --rooms 6            a fresh house: no dataset needed""",
 )
-@click.argument("dataset", type=click.Path(path_type=Path), required=False)
+@DATASET
 @click.option("--scene", type=int, default=0, show_default=True, help="Index of the scene.")
 @click.option("--episode", type=int, help="Draw this episode; the bare house without.")
-@click.option("--out", type=click.Path(path_type=Path), required=True, help="The PNG to write.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    help="The PNG to write.  [default: named after the scene or episode]",
+)
 @click.option("--pixels", type=int, default=900, show_default=True, callback=positive)
 @config_options
 def command(
@@ -32,25 +37,28 @@ def command(
     dataset: Path | None,
     scene: int,
     episode: int | None,
-    out: Path,
+    out: Path | None,
     pixels: int,
     **settings: Any,  # noqa: ANN401 - the options of config_from
 ) -> int:
-    """Draw a scene or an episode of DATASET, or of a fresh seed, from above."""
+    """Draw a scene or an episode of DATASET, or of a seed and config, from above."""
     from internav_data.views import draw_episode, draw_house, write_png
 
-    if dataset is not None and any(settings.values()):
+    fresh = any(value not in {None, ()} for value in settings.values())
+    if dataset is not None and fresh:
         raise click.UsageError("options of a config are for fresh houses: leave DATASET out")
     if scene < 0 or (episode is not None and episode < 0):
         raise click.UsageError("--scene and --episode count from 0")
-    if dataset is not None:
-        house, task, assets = _stored(dataset, scene, episode)
-    else:
+    if fresh:
         house, task, assets = _fresh(config_from(**settings), scene, episode)
+    else:
+        house, task, assets = _stored(dataset_to_read(dataset), scene, episode)
     if task is None:
         picture = draw_house(house, pixels=pixels)
     else:
         picture = draw_episode(house, task, assets, pixels=pixels)
+    name = f"scene-{scene:06d}" if episode is None else f"scene-{scene:06d}-{episode:04d}"
+    out = out or Path(f"{name}.png")
     write_png(out, picture)
     click.echo(f"wrote {out}", err=True)
     return 0

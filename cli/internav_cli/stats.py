@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from internav_cli.options import DATASET, JSON
+from internav_cli.options import DATASET, JSON, dataset_to_read
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -16,17 +16,17 @@ if TYPE_CHECKING:
     "stats",
     epilog="""\b
 Examples:
-  internav-gen stats data/demo
+  internav-gen stats
   internav-gen stats data/demo --split test --json""",
 )
 @DATASET
 @click.option("--split", type=click.Choice(["train", "val", "test"]), help="This split only.")
 @JSON
-def command(*, dataset: Path, split: str | None, as_json: bool) -> int:
+def command(*, dataset: Path | None, split: str | None, as_json: bool) -> int:
     """Tell what DATASET is like: the columns of the paper's Table 2 and more."""
     from internav_data.dataset import compute_stats
 
-    stats = compute_stats(dataset, split)
+    stats = compute_stats(dataset_to_read(dataset), split)
     if as_json:
         import json
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from internav_cli.options import DATASET, JSON, positive
+from internav_cli.options import DATASET, JSON, dataset_to_read, positive
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -19,7 +19,7 @@ LEVELS = ("files", "schema", "geometry", "physics")
     "validate",
     epilog="""\b
 Examples:
-  internav-gen validate data/demo
+  internav-gen validate
   internav-gen validate data/demo --level files         hashes and checksums only
   internav-gen validate data/demo --level physics       every push, pick and expert again
   internav-gen validate data/paper --level physics --sample 300 --workers 2
@@ -50,7 +50,7 @@ Exit code 3 when something in the dataset is not true, 5 when it cannot be read.
 @JSON
 def command(
     *,
-    dataset: Path,
+    dataset: Path | None,
     level: Any,  # noqa: ANN401 - one of LEVELS, by click
     sample: int | None,
     workers: int | None,
@@ -62,7 +62,8 @@ def command(
     from internav_data.verification import validate
 
     tell = _tell if sys.stderr.isatty() else None
-    findings = validate(dataset, level, sample, workers or cores(), tell)
+    folder = dataset_to_read(dataset)
+    findings = validate(folder, level, sample, workers or cores(), tell)
     if tell is not None:
         click.echo("\r\033[K", nl=False, err=True)
     click.echo(findings.to_json() if as_json else findings.summary())

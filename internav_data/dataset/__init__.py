@@ -11,6 +11,7 @@ from internav_data.dataset.jsonschemas import (
     write_schemas,
 )
 from internav_data.dataset.loader import Dataset, load_dataset
+from internav_data.dataset.location import dataset_folder
 from internav_data.dataset.manifest import (
     DataFile,
     Manifest,
@@ -56,6 +57,7 @@ __all__ = [
     "TableSpec",
     "assemble",
     "compute_stats",
+    "dataset_folder",
     "done_scenes",
     "finished_scenes",
     "from_table",

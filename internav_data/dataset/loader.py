@@ -5,12 +5,12 @@ from __future__ import annotations
 import functools
 import hashlib
 from collections import OrderedDict
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast, overload
 
 import numpy as np
 
 from internav_data.dataset.decode import from_table
+from internav_data.dataset.location import dataset_folder
 from internav_data.dataset.manifest import MANIFEST, Manifest, locate, open_file, read_manifest
 from internav_data.dataset.parquet import read_all
 from internav_data.dataset.row_group_cache import RowGroupCache
@@ -22,6 +22,7 @@ from internav_data.records.errors import CorruptDataError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
+    from pathlib import Path
 
     import pandas as pd  # type: ignore[import-untyped,unused-ignore]
     import pyarrow as pa
@@ -34,7 +35,7 @@ _RUN = 64
 
 
 def load_dataset(
-    path: str | Path,
+    path: str | Path | None = None,
     split: str | None = None,
     filters: Filters | None = None,
     columns: Sequence[str] | None = None,
@@ -43,8 +44,9 @@ def load_dataset(
 
     Parameters
     ----------
-    path : str or Path
-        The folder that `internav-gen generate` wrote.
+    path : str or Path, optional
+        Folder that `internav-gen generate` wrote; not given: the folder that the environment
+        variable INTERNAV_DATASET names, else `internav-dataset` in the current directory.
     split : str, optional
         train, val or test; all of them if not given.
     filters : list of (column, operator, value), optional
@@ -61,7 +63,7 @@ def load_dataset(
         An unknown split, column or operator.
 
     """
-    return Dataset(Path(path), split, filters, columns)
+    return Dataset(dataset_folder(path), split, filters, columns)
 
 
 class Dataset(Generic[E]):

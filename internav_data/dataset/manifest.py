@@ -15,6 +15,7 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from internav_data.core.files import write_atomically
+from internav_data.dataset.location import making_command
 from internav_data.dataset.parquet import footer_sha256, open_parquet
 from internav_data.dataset.tables import FORMAT_VERSION, TABLES
 from internav_data.records import Split  # noqa: TC001 - as above
@@ -156,7 +157,7 @@ def _absence(root: Path) -> str:
             f"{root}: the dataset is not finished (no {MANIFEST}, but .work/): "
             "run `internav-gen generate` on it again to resume"
         )
-    return f"{root}: no dataset here ({MANIFEST} is missing): give the folder that `generate` wrote"
+    return f"{root}: no dataset here ({MANIFEST} is missing): `{making_command(root)}` makes one"
 
 
 def _check_version(path: Path, raw: Any) -> None:  # noqa: ANN401 - JSON

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from internav_cli.camp_eval import main
+from stderr_lines import beside_the_dataset
 
 EVAL = Path(sys.executable).with_name("camp-eval")
 
@@ -91,7 +92,7 @@ def test_episodes_can_be_chosen(call, dataset, tmp_path):
         (("random", "DATA", "--max-steps", "-1"), 2, ["max_steps"]),
         (("random", "DATA", "--seed", "-1"), 2, ["seed"]),
         (("random", "DATA", "--unknown"), 2, ["--unknown"]),
-        (("random",), 2, ["DATASET"]),
+        (("random",), 5, ["internav-dataset", "internav-gen generate"]),
         (("compare",), 2, ["RUNS"]),
         (("compare", "nowhere"), 2, ["nowhere", "camp-eval RUN DATASET"]),
         (("DATA", "DATA"), None, ["data"]),
@@ -101,7 +102,7 @@ def test_what_cannot_be_meant_is_one_line(call, dataset, tmp_path, words, code, 
     got, out, err = call(*[dataset if word == "DATA" else word for word in words])
     assert got == code or (code is None and got in {2, 5})
     assert out == ""
-    (line,) = err.strip().splitlines()
+    (line,) = beside_the_dataset(err)
     assert line.startswith("camp-eval: ")
     for word in said:
         assert word in line
@@ -142,7 +143,7 @@ def test_a_dataset_without_experts_says_so(call, tmp_path_factory, dataset):
     assemble(out, identity, tuple(whole.assets.values()), 3)
     code, text, err = call("expert", out, "--split", "val")
     assert (code, text) == (2, "")
-    (line,) = err.strip().splitlines()
+    (line,) = beside_the_dataset(err)
     assert "no episode has an expert" in line
     assert call("planner", out, "--split", "val")[0] == 0
 

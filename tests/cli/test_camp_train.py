@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from stderr_lines import beside_the_dataset
 
 pytest.importorskip("torch")
 
@@ -67,7 +68,7 @@ def test_a_run_is_trained_and_measured(call, dataset, tmp_path):
     ("words", "code", "told"),
     [
         (("DATA", "--nonsense"), 2, ["--nonsense"]),
-        ((), 2, ["camp-train DATASET"]),
+        ((), 5, ["internav-dataset", "internav-gen generate"]),
         (("DATA", "--method", "sarsa"), 2, ["sarsa", "ppo-intent"]),
         (("DATA", "--method", "random"), 2, ["nothing to learn"]),
         (("DATA", "--set", "ppo.step=3"), 2, ["ppo.step", "ppo.steps"]),
@@ -86,7 +87,7 @@ def test_what_cannot_be_meant_is_told_in_a_line(call, dataset, tmp_path, words, 
     given = [dataset if word == "DATA" else word for word in words]
     found, out, err = call(*given)
     assert (found, out) == (code, ""), err
-    assert len(err.strip().splitlines()) == 1
+    assert len(beside_the_dataset(err)) == 1
     for word in told:
         assert word in err
     assert not list(tmp_path.iterdir()), "nothing is written"

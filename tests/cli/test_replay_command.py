@@ -6,6 +6,7 @@ from pathlib import Path
 
 import cv2
 import pytest
+from stderr_lines import beside_the_dataset
 
 GEN = Path(sys.executable).with_name("internav-gen")
 
@@ -27,7 +28,7 @@ def run(*words, cwd=None):
 def refused(process, code, *words):
     assert process.returncode == code, process.stderr
     assert process.stdout == ""
-    (line,) = process.stderr.strip().splitlines()
+    (line,) = beside_the_dataset(process.stderr)
     for word in words:
         assert word in line
 
@@ -103,7 +104,7 @@ def test_what_cannot_be_filmed_is_one_line(dataset, tmp_path, monkeypatch, capsy
     told = capsys.readouterr()
     assert ended.value.code == 2
     assert told.out == ""
-    (line,) = told.err.strip().splitlines()
+    (line,) = beside_the_dataset(told.err)
     for word in said:
         assert word in line
     assert not list(tmp_path.iterdir()), "nothing is written"
