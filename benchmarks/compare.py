@@ -129,10 +129,10 @@ def _ours_on(site: SpawnSite, episode: naive.NaiveEpisode) -> tuple[bool, bool]:
         lattice.add(shape)
     steps = lattice.distance(episode.start, episode.goal)
     ends = naive._metres(episode.start), naive._metres(episode.goal)
-    way = site.ways.distance(*ends, Polygons.joined(shapes))
+    way = site.tangent_graph.distance(*ends, Polygons.joined(shapes))
     clear = site.lattice.distance(episode.start, episode.goal)
     ways = _near(way, episode.obstructed_path_m) and _near(
-        site.ways.distance(*ends), episode.shortest_path_m
+        site.tangent_graph.distance(*ends), episode.shortest_path_m
     )
     return steps == episode.obstructed_path_steps and clear == episode.shortest_path_steps, ways
 

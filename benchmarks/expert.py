@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from internav_data.records import Episode, Expert
 
 Case = tuple[HouseModel, "Episode", "Expert | None", float]
-WORLDS_AT_MOST = 4000
+MAX_WORLDS = 4000
 """Worlds that an exhaustive search may take."""
 
 
@@ -44,13 +44,13 @@ def solve_all(scenes: int, count: int, seed: int) -> list[Case]:
     cases: list[Case] = []
     for scene in range(scenes):
         house = build_house(seed, scene, HouseConfig(), catalogue())
-        stage = HouseModel.of(house)
+        model = HouseModel.of(house)
         for place, episode in enumerate(build_episodes(house, count, pool)):
             if place == 0:
-                expert_of_episode(stage, episode, assets)
+                expert_of_episode(model, episode, assets)
             begin = time.perf_counter()
-            expert = expert_of_episode(stage, episode, assets)
-            cases.append((stage, episode, expert, 1e3 * (time.perf_counter() - begin)))
+            expert = expert_of_episode(model, episode, assets)
+            cases.append((model, episode, expert, 1e3 * (time.perf_counter() - begin)))
     return cases
 
 
@@ -98,15 +98,15 @@ def fewest(world: World, bound: int) -> int | None:
 
     A* over true worlds: no plan is faster than one in a house without any movable thing.
     """
-    ground = PlanningProblem.of(world)
-    free = np.zeros_like(ground.prices(world))
-    ahead = ground.costs(ground.masks(world), 0, free)
+    problem = PlanningProblem.of(world)
+    free = np.zeros_like(problem.prices(world))
+    ahead = problem.costs(problem.masks(world), 0, free)
     # Layers by spent + ahead, so that the worlds that matter come first.
     layers: dict[int, list[tuple[int, World]]] = defaultdict(list)
-    layers[int(ahead[ground.pose(world)]) + 1].append((0, world))
+    layers[int(ahead[problem.pose(world)]) + 1].append((0, world))
     known = {world.digest(): 0}
-    for promise in range(bound):
-        layer = layers[promise]
+    for f_cost in range(bound):
+        layer = layers[f_cost]
         while layer:
             spent, here = layer.pop()
             if known[here.digest()] < spent:
@@ -117,12 +117,12 @@ def fewest(world: World, bound: int) -> int | None:
                     continue
                 if action == Action.DONE:
                     return spent + 1
-                promised = spent + 1 + int(ahead[ground.pose(there)]) + 1
+                f_cost_there = spent + 1 + int(ahead[problem.pose(there)]) + 1
                 digest = there.digest()
-                if promised < bound and known.get(digest, bound) > spent + 1:
+                if f_cost_there < bound and known.get(digest, bound) > spent + 1:
                     known[digest] = spent + 1
-                    layers[promised].append((spent + 1, there))
-            if len(known) > WORLDS_AT_MOST:
+                    layers[f_cost_there].append((spent + 1, there))
+            if len(known) > MAX_WORLDS:
                 return None
     return bound
 
@@ -137,9 +137,9 @@ def against_best(cases: list[Case], wanted: int) -> dict[str, float]:
     ]
     small.sort(key=lambda case: (case[2].steps if case[2] else 0, case[1].episode_id))
     ratios, left_out = [], 0
-    for stage, episode, expert, _ in itertools.islice(small, wanted):
+    for model, episode, expert, _ in itertools.islice(small, wanted):
         assert expert is not None
-        best = fewest(World.of_episode(stage, episode, assets), expert.steps)
+        best = fewest(World.of_episode(model, episode, assets), expert.steps)
         if best is None:
             left_out += 1
         else:

@@ -21,13 +21,13 @@ import numpy as np
 import psutil
 
 from internav_data.envs import InterNavEnv
-from internav_data.physics.narrow_phase import outline_of
+from internav_data.physics.narrow_phase import prisms_of
 from internav_data.physics.push import _push_alone, _push_in
 from internav_data.physics.settle import _settle_alone
-from internav_data.physics.sweep import about_middle
-from internav_data.planner.problem import _marks
+from internav_data.physics.sweep import centred_corners
+from internav_data.planner.problem import _blocked_indices
 from internav_data.world.drop import _standing
-from internav_data.world.occlusion import placed_shell, shell_of
+from internav_data.world.occlusion import occlusion_shape, placed_occlusion_shape
 
 TARGET_MIB = 64.0
 SHARES = np.array([8, 2, 2, 0.5, 0.5, 0.4, 0.4, 0.4, 0.4, 1, 1, 0], np.float64)
@@ -36,12 +36,12 @@ CACHES = {
     "push alone": _push_alone,
     "push in a scene": _push_in,
     "settle alone": _settle_alone,
-    "shells of assets": shell_of,
-    "shells in place": placed_shell,
-    "outlines in place": outline_of,
+    "shells of assets": occlusion_shape,
+    "shells in place": placed_occlusion_shape,
+    "outlines in place": prisms_of,
     "footprints to drop": _standing,
-    "corners": about_middle,
-    "marks": _marks,
+    "corners": centred_corners,
+    "marks": _blocked_indices,
 }
 
 

@@ -73,9 +73,9 @@ def make_worlds(scenes: int, count: int) -> list[World]:
     pool, worlds = catalogue().spawnable, []
     for scene in range(scenes):
         house = build_house(0, scene, HouseConfig(), catalogue())
-        stage = HouseModel.of(house)
+        model = HouseModel.of(house)
         worlds += [
-            World.of_episode(stage, episode, catalogue().assets)
+            World.of_episode(model, episode, catalogue().assets)
             for episode in build_episodes(house, count, pool)
         ]
     return worlds
@@ -103,20 +103,18 @@ def kept_pushes(folder: Path) -> dict[str, float]:
         PhysicsScene((Body(asset, Pose(0.0, 0.0, 0.001, UPRIGHT), moves=True),)) for asset in pool
     ]
     first = CachedEngine(bullet(), ResultCache(folder), "here")
-    for setting in asked:
-        first.push(setting, PUSH_SPECS["force"])
-    first.solutions.flush()
+    for scene in asked:
+        first.push(scene, PUSH_SPECS["force"])
+    first.result_cache.flush()
     later = CachedEngine(bullet(), ResultCache(folder), "here")
-    return summary(
-        [timed(lambda s=setting: later.push(s, PUSH_SPECS["force"])) for setting in asked]
-    )
+    return summary([timed(lambda s=scene: later.push(s, PUSH_SPECS["force"])) for scene in asked])
 
 
 def pushes_in_houses(worlds: list[World]) -> dict[str, float]:
     """Pushes of obstacles where they stand, each asked for the first time."""
     return summary(
         [
-            timed(lambda h=heading, k=index, w=world: w.pushed(k, h, agent=False))
+            timed(lambda h=heading, k=index, w=world: w.simulate_push(k, h, agent=False))
             for world in worlds
             for index in world.obstacles
             if world.items[index].asset.pushable

@@ -82,11 +82,19 @@ def from_mapping(
     prefix
         Of the config's own key, ending in a dot; empty at the top.
 
+    Raises
+    ------
+    UsageError
+        An unknown key, a key that the config's `RENAMED` lists, or a value of the wrong type.
+
     """
     hints = typing.get_type_hints(type(config))
+    renamed: Mapping[str, str] = getattr(type(config), "RENAMED", {})
     changes: dict[str, Any] = {}
     for name, value in values.items():
         key = prefix + name
+        if name in renamed:
+            raise UsageError(f"{where}: '{key}' is called '{prefix}{renamed[name]}' now")
         if name not in hints:
             raise _unknown(key, where, known_keys(config, prefix), elsewhere)
         current = getattr(config, name)

@@ -93,7 +93,7 @@ def _poses(
         return
     there = world.copy()
     # A pocket of furniture that no way leads out of, obstacles or not, teaches nothing.
-    joined = world.stage.lattice.distances(episode.goal.i, episode.goal.j) >= 0
+    joined = world.model.lattice.distances(episode.goal.i, episode.goal.j) >= 0
     for i, j in _nodes_near(world, index, pose, _next_node(episode, number)):
         if not joined[i, j]:
             continue

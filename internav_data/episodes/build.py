@@ -120,7 +120,7 @@ def _build_episode(
 ) -> tuple[Episode, Counter[Redraw]]:
     house = site.house
     again: Counter[Redraw] = Counter()
-    for draw in range(config.redraws):
+    for draw in range(config.max_redraws):
         drawn = _draw(site, index, pool, config, (house.scene, attempt, index, draw))
         if isinstance(drawn, Episode):
             return drawn, again
@@ -128,8 +128,8 @@ def _build_episode(
     reasons = ", ".join(f"{reason}: {count}" for reason, count in sorted(again.items()))
     raise QuarantineError(
         f"{house.scene_id}, episode {index}: no start and goal could be "
-        f"{mode_of(house.scene, index)} in {config.redraws} draws ({reasons}); "
-        "raise episodes.max_obstacles or episodes.redraws, or furnish less"
+        f"{mode_of(house.scene, index)} in {config.max_redraws} draws ({reasons}); "
+        "raise episodes.max_obstacles or episodes.max_redraws, or furnish less"
     )
 
 
@@ -143,27 +143,27 @@ def _draw(
     """Draw a start, a goal and obstacles: an episode, or why to draw again."""
     seed = site.house.seed
     place = generator(seed, Purpose.EPISODE, *key)
-    way = _draw_way(site, mode_of(site.house.scene, index), config, place)
-    if way is None:
+    draft = _draw_endpoints(site, mode_of(site.house.scene, index), config, place)
+    if draft is None:
         return "no two nodes far enough apart"
-    if not spawn(way, pool, generator(seed, Purpose.SPAWN, *key)):
+    if not spawn(draft, pool, generator(seed, Purpose.SPAWN, *key)):
         return "condition not reached"
     yaw_deg = QUARTER_TURNS[int(place.integers(4))]
     world = World(
-        site.stage,
-        [(o.asset, o.settled.pose) for o in way.obstacles],
-        (*way.start, yaw_deg // 90),
-        way.goal,
+        site.model,
+        [(o.asset, o.settled.pose) for o in draft.obstacles],
+        (*draft.start, yaw_deg // 90),
+        draft.goal,
         config.push_model,
     )
     # The expert comes first: what it cannot solve needs no outcomes.
     expert = solve(world)
     if expert is None and not config.keep_unsolvable:
         return "no expert"
-    return _recorded(way, index, world, expert)
+    return _recorded(draft, index, world, expert)
 
 
-def _draw_way(
+def _draw_endpoints(
     site: SpawnSite, mode: Mode, config: EpisodeConfig, rng: Generator
 ) -> EpisodeDraft | None:
     """Draw a start and a goal, in two rooms where there are two; None if all are too close.
@@ -177,7 +177,7 @@ def _draw_way(
     for _ in range(PAIRS):
         chosen = rng.choice(rooms, size=2, replace=len(rooms) == 1)
         first, second = (int(rng.choice(np.flatnonzero(site.rooms == room))) for room in chosen)
-        shortest_path_m = site.ways.distance(
+        shortest_path_m = site.tangent_graph.distance(
             _point(_node(site, first)), _point(_node(site, second))
         )
         if shortest_path_m is not None and round_m(shortest_path_m) >= config.min_shortest_path_m:
@@ -229,10 +229,10 @@ def _point(node: tuple[int, int]) -> tuple[float, float]:
     return SPACING_M * node[0], SPACING_M * node[1]
 
 
-def _recorded(way: EpisodeDraft, index: int, world: World, expert: Expert | None) -> Episode:
+def _recorded(draft: EpisodeDraft, index: int, world: World, expert: Expert | None) -> Episode:
     """Write down a finished way; its predicates are judged on the rounded poses."""
-    house, obstructed_path_m = way.site.house, world.obstructed_path_m()
-    outcomes = outcomes_of(world, (way.steps, obstructed_path_m))
+    house, obstructed_path_m = draft.site.house, world.obstructed_path_m()
+    outcomes = outcomes_of(world, (draft.steps, obstructed_path_m))
     return Episode(
         episode_id=f"{house.scene_id}/{index:04d}",
         scene_id=house.scene_id,
@@ -240,23 +240,23 @@ def _recorded(way: EpisodeDraft, index: int, world: World, expert: Expert | None
         index=index,
         seed=house.seed,
         room_count=len(house.rooms),
-        mode=way.mode,
+        mode=draft.mode,
         sealed=obstructed_path_m is None,
-        rooms_on_path=len(way.room_paths[0]),
-        obstacle_count=len(way.obstacles),
-        shortest_path_m=way.shortest_path_m,
-        shortest_path_steps=way.shortest_path_steps,
+        rooms_on_path=len(draft.room_paths[0]),
+        obstacle_count=len(draft.obstacles),
+        shortest_path_m=draft.shortest_path_m,
+        shortest_path_steps=draft.shortest_path_steps,
         obstructed_path_m=obstructed_path_m,
-        obstructed_path_steps=way.steps,
-        start=Start(*way.start, *_point(way.start), 90 * world.quarter, way.start_room),
-        goal=Goal(*way.goal, *_point(way.goal), way.goal_room),
-        room_paths=way.room_paths,
-        room_paths_truncated=way.room_paths_truncated,
-        node_paths=way.node_paths,
-        node_paths_truncated=way.node_paths_truncated,
-        obstacles=tuple(map(_obstacle, way.obstacles, outcomes)),
+        obstructed_path_steps=draft.steps,
+        start=Start(*draft.start, *_point(draft.start), 90 * world.quarter, draft.start_room),
+        goal=Goal(*draft.goal, *_point(draft.goal), draft.goal_room),
+        room_paths=draft.room_paths,
+        room_paths_truncated=draft.room_paths_truncated,
+        node_paths=draft.node_paths,
+        node_paths_truncated=draft.node_paths_truncated,
+        obstacles=tuple(map(_obstacle, draft.obstacles, outcomes)),
         expert=expert,
-        physics=_physics(way),
+        physics=_physics(draft),
     )
 
 
@@ -280,11 +280,11 @@ def _obstacle(spawned: Spawned, outcomes: tuple[Outcome, ...]) -> Obstacle:
     )
 
 
-def _physics(way: EpisodeDraft) -> Physics:
+def _physics(draft: EpisodeDraft) -> Physics:
     engine = engine_of_this_process()
     return Physics(
         engine=engine.name,
         build=engine.build,
-        settle_s=max(o.settled.seconds for o in way.obstacles),
-        penetration_m=max(o.settled.penetration_m for o in way.obstacles),
+        settle_s=max(o.settled.seconds for o in draft.obstacles),
+        penetration_m=max(o.settled.penetration_m for o in draft.obstacles),
     )

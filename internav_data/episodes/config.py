@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 from internav_data.records.errors import UsageError
 
@@ -14,17 +14,24 @@ PUSH_MODELS = ("force", "kick")
 class EpisodeConfig:
     """Settings of the episodes; the defaults are calibrated to Table 2 of the paper."""
 
+    RENAMED: ClassVar[dict[str, str]] = {
+        "redraws": "max_redraws",
+        "sideways_m": "lateral_std_m",
+        "spots": "max_spawn_tries",
+    }
+    """Present names of keys of earlier versions, for the error that refuses these."""
+
     max_obstacles: tuple[int, int, int] = (4, 9, 16)
     """Most obstacles in houses of 1-2, 3-5 and 6-10 rooms; then start and goal are drawn anew."""
-    sideways_m: float = 0.40
+    lateral_std_m: float = 0.40
     """Standard deviation of an obstacle's distance from the way, metres."""
     gap_m: float = 0.01
     """Least distance between an obstacle and everything else when it is spawned, metres."""
     min_shortest_path_m: float = 2.0
     """Least any-angle distance from start to goal without obstacles, metres."""
-    spots: int = 200
+    max_spawn_tries: int = 200
     """Spots tried for the obstacles of one start and goal."""
-    redraws: int = 50
+    max_redraws: int = 50
     """Starts and goals tried for one episode."""
     keep_unsolvable: bool = False
     """Keep episodes for which the expert finds no plan, their `expert` null; else draw again."""
@@ -37,17 +44,23 @@ class EpisodeConfig:
         """Raise UsageError for a value that cannot be meant."""
         problems = [
             (
-                any(most < 1 for most in self.max_obstacles),
+                any(limit < 1 for limit in self.max_obstacles),
                 f"max_obstacles: expected three counts of at least 1, got {self.max_obstacles}",
             ),
-            (self.sideways_m < 0.0, f"sideways_m: expected 0 or more, got {self.sideways_m}"),
+            (
+                self.lateral_std_m < 0.0,
+                f"lateral_std_m: expected 0 or more, got {self.lateral_std_m}",
+            ),
             (self.gap_m < 0.0, f"gap_m: expected 0 or more, got {self.gap_m}"),
             (
                 self.min_shortest_path_m <= 0.0,
                 f"min_shortest_path_m: expected more than 0, got {self.min_shortest_path_m}",
             ),
-            (self.spots < 1, f"spots: expected at least 1, got {self.spots}"),
-            (self.redraws < 1, f"redraws: expected at least 1, got {self.redraws}"),
+            (
+                self.max_spawn_tries < 1,
+                f"max_spawn_tries: expected at least 1, got {self.max_spawn_tries}",
+            ),
+            (self.max_redraws < 1, f"max_redraws: expected at least 1, got {self.max_redraws}"),
             (
                 self.push_model not in PUSH_MODELS,
                 f"push_model: expected one of {', '.join(PUSH_MODELS)}, got {self.push_model!r}",
@@ -57,7 +70,7 @@ class EpisodeConfig:
             if wrong:
                 raise UsageError(f"episodes.{message}")
 
-    def most_obstacles(self, room_count: int) -> int:
+    def max_obstacles_for(self, room_count: int) -> int:
         """Most obstacles for a house of that many rooms."""
         few, some, many = self.max_obstacles
         if room_count <= 2:  # noqa: PLR2004 - the classes of Table 2

@@ -64,7 +64,7 @@ class _Lifted:
     def distances(self) -> Distances:
         """Steps and any-angle way to the goal."""
         there = self._there
-        return there.steps(), None if self._way is None else self._way[0]
+        return there.steps(), None if self._path is None else self._path[0]
 
     @cached_property
     def _there(self) -> World:
@@ -73,27 +73,27 @@ class _Lifted:
         return there
 
     @cached_property
-    def _way(self) -> tuple[float, NDArray[np.float64]] | None:
-        return self._there.way()
+    def _path(self) -> tuple[float, NDArray[np.float64]] | None:
+        return self._there.path()
 
     def laid(self, pose: Pose) -> Distances:
         """Distances once the thing lies somewhere and nothing else has moved."""
-        best_steps, best_way_m = self.distances
-        if best_steps is None and best_way_m is None:
+        best_steps, best_path_m = self.distances
+        if best_steps is None and best_path_m is None:
             return None, None
         there = self._there.copy()
         there.put([(self._index, pose)])
         steps = None if best_steps is None else there.steps()
         # A way that the thing leaves free is still the shortest one.
-        if self._way is None or keeps_clear(self._way[1], there.items[self._index].footprint):
-            return steps, best_way_m
+        if self._path is None or keeps_clear(self._path[1], there.items[self._index].footprint):
+            return steps, best_path_m
         return steps, there.obstructed_path_m()
 
 
 def _pushed(world: World, index: int, heading: int, before: Distances, lifted: _Lifted) -> Outcome:
     if not world.items[index].asset.pushable:
         return _failed(PUSHES[heading], "not pushable", before)
-    pushed = world.pushed(index, heading, agent=False)
+    pushed = world.simulate_push(index, heading, agent=False)
     if not pushed.success:
         return _failed(PUSHES[heading], pushed.reason, before, pushed.seconds)
     if pushed.moved:

@@ -23,19 +23,19 @@ class SpawnSite:
     """A furnished house with its lattice, its ways and the nodes where agents can be put."""
 
     house: House
-    stage: HouseModel
+    model: HouseModel
     """What the worlds of its episodes share."""
     footprints: Polygons
     """All that stands in the house, walls first."""
     lattice: Lattice
     """The stage's: of the house without obstacles. Never changed: copy it."""
-    ways: TangentGraph
+    tangent_graph: TangentGraph
     """The stage's, all furniture in its place."""
     nodes: NDArray[np.int64]
     """Free nodes of the largest component, shape (n, 2), in order of i, then j."""
     rooms: NDArray[np.int64]
     """Room of each node, shape (n,)."""
-    _ways_between: dict[tuple[Vec2, Vec2], tuple[Vec2, ...]] = field(default_factory=dict)
+    _paths_between: dict[tuple[Vec2, Vec2], tuple[Vec2, ...]] = field(default_factory=dict)
     _room_paths: dict[tuple[int, int], tuple[tuple[tuple[int, ...], ...], bool]] = field(
         default_factory=dict
     )
@@ -43,28 +43,30 @@ class SpawnSite:
     @staticmethod
     def of(house: House) -> SpawnSite:
         """Work out what the episodes of a house share."""
-        stage = HouseModel.of(house)
-        lattice = stage.lattice
+        model = HouseModel.of(house)
+        lattice = model.lattice
         components = lattice.components()
         sizes = np.bincount(components[components >= 0].ravel(), minlength=1)
         nodes = np.argwhere(components == int(np.argmax(sizes)))
         return SpawnSite(
             house=house,
-            stage=stage,
+            model=model,
             footprints=house_footprints(house),
             lattice=lattice,
-            ways=stage.ways(),
+            tangent_graph=model.tangent_graph(),
             nodes=nodes.astype(np.int64),
             rooms=rooms_of(house, SPACING_M * nodes.astype(np.float64)),
         )
 
-    def way_between(self, first: Vec2, second: Vec2) -> tuple[Vec2, ...]:
+    def path_between(self, first: Vec2, second: Vec2) -> tuple[Vec2, ...]:
         """Points of the any-angle way in the house without obstacles; () when there is none."""
         key = (first, second)
-        if key not in self._ways_between:
-            way = self.ways.path(first, second)
-            self._ways_between[key] = () if way is None else tuple((x, y) for x, y in way.tolist())
-        return self._ways_between[key]
+        if key not in self._paths_between:
+            path = self.tangent_graph.path(first, second)
+            self._paths_between[key] = (
+                () if path is None else tuple((x, y) for x, y in path.tolist())
+            )
+        return self._paths_between[key]
 
     def room_paths(self, first: int, second: int) -> tuple[tuple[tuple[int, ...], ...], bool]:
         """All room paths between two rooms, and whether there were more than are listed."""

@@ -84,7 +84,7 @@ def _standing(asset: Asset, yaw_deg: int) -> Polygons:
     return footprint(asset, Pose(0.0, 0.0, 0.0, yaw_quaternion(yaw_deg)))
 
 
-def spawn(way: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> bool:
+def spawn(draft: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> bool:
     """Put obstacles on a way until its mode's condition holds.
 
     Returns
@@ -93,85 +93,85 @@ def spawn(way: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> bool:
         False when the spots or the obstacles ran out: draw a new start and goal.
 
     """
-    most = way.config.most_obstacles(len(way.site.house.rooms))
-    for _ in range(way.config.spots):
-        if way.done:
+    limit = draft.config.max_obstacles_for(len(draft.site.house.rooms))
+    for _ in range(draft.config.max_spawn_tries):
+        if draft.done:
             return True
-        if len(way.obstacles) == most:
+        if len(draft.obstacles) == limit:
             return False
-        _try_spot(way, pool, rng)
-    return way.done
+        _try_spot(draft, pool, rng)
+    return draft.done
 
 
-def _try_spot(way: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> None:
+def _try_spot(draft: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> None:
     """Draw an asset and a spot, and keep it where nothing speaks against it.
 
     Each spot takes the same number of draws, whatever becomes of it.
     """
     asset = pool[int(rng.integers(len(pool)))]
-    path = way.node_paths[int(rng.integers(len(way.node_paths)))]
+    path = draft.node_paths[int(rng.integers(len(draft.node_paths)))]
     segment = int(rng.integers(len(path.points) - 1))
-    along, sideways = float(rng.random()), float(rng.standard_normal()) * way.config.sideways_m
+    along, lateral = float(rng.random()), float(rng.standard_normal()) * draft.config.lateral_std_m
     yaw_deg = YAW_STEP_DEG * int(rng.integers(360 // YAW_STEP_DEG))
-    spot = _spot(way.site, path.points[segment], path.points[segment + 1], along, sideways)
+    spot = _spot(draft.site, path.points[segment], path.points[segment + 1], along, lateral)
     if spot is None:
         return
     pose = Pose(round_m(spot[0]), round_m(spot[1]), 0.0, yaw_quaternion(yaw_deg))
-    gap = way.config.gap_m
+    gap = draft.config.gap_m
     standing = _standing(asset, yaw_deg)
     shifted = Polygons(standing.vertices + np.array([pose.x, pose.y]), standing.offsets)
-    if _distance(way, shifted, gap) < gap:
+    if _distance(draft, shifted, gap) < gap:
         return
-    settled = settle(asset, pose, gap, lambda: _near(way, shifted))
+    settled = settle(asset, pose, gap, lambda: _near(draft, shifted))
     if settled.refusal:
         return
     exact = footprint(asset, settled.pose)
-    if _distance(way, exact, gap) <= 0.0:
+    if _distance(draft, exact, gap) <= 0.0:
         return
-    _place(way, Spawned(asset, settled, segment, exact))
+    _place(draft, Spawned(asset, settled, segment, exact))
 
 
 def _spot(
-    site: SpawnSite, first: Vec2, second: Vec2, along: float, sideways: float
+    site: SpawnSite, first: Vec2, second: Vec2, along: float, lateral: float
 ) -> tuple[float, float] | None:
     """Point at a share of the way's length, moved sideways within its room."""
-    points = site.way_between(first, second)
+    points = site.path_between(first, second)
     left = along * sum(math.dist(a, b) for a, b in pairwise(points))
     for a, b in pairwise(points):
         leg = math.dist(a, b)
         if left <= leg and leg > 0.0:
             ux, uy = (b[0] - a[0]) / leg, (b[1] - a[1]) / leg
             x, y = a[0] + left * ux, a[1] + left * uy
-            spot = (x - sideways * uy, y + sideways * ux)
+            spot = (x - lateral * uy, y + lateral * ux)
             return spot if room_of(site.house, *spot) == room_of(site.house, x, y) else None
         left -= leg
     return None
 
 
-def _distance(way: EpisodeDraft, polygons: Polygons, stop_at: float) -> float:
+def _distance(draft: EpisodeDraft, polygons: Polygons, stop_at: float) -> float:
     """Distance to the house and to the other obstacles, at most `stop_at`."""
-    near = clearance(polygons, way.site.footprints, stop_at)
-    for other in way.obstacles:
+    near = clearance(polygons, draft.site.footprints, stop_at)
+    for other in draft.obstacles:
         near = min(near, clearance(polygons, other.footprint, stop_at))
     return near
 
 
-def _place(way: EpisodeDraft, spawned: Spawned) -> None:
+def _place(draft: EpisodeDraft, spawned: Spawned) -> None:
     """Keep an obstacle unless it stands over start or goal or cuts a way to be lengthened."""
-    handle = way.lattice.add(spawned.footprint)
-    free = way.lattice.free
-    steps = way.lattice.distance(way.start, way.goal)
-    cuts = steps is None and way.mode == "lengthened"
-    if not free[way.start] or not free[way.goal] or cuts:
-        way.lattice.remove(handle)
+    handle = draft.lattice.add(spawned.footprint)
+    free = draft.lattice.free
+    steps = draft.lattice.distance(draft.start, draft.goal)
+    cuts = steps is None and draft.mode == "lengthened"
+    if not free[draft.start] or not free[draft.goal] or cuts:
+        draft.lattice.remove(handle)
         return
-    way.obstacles.append(spawned)
-    way.steps = steps
+    draft.obstacles.append(spawned)
+    draft.steps = steps
 
 
-def _near(way: EpisodeDraft, here: Polygons) -> list[Body]:
+def _near(draft: EpisodeDraft, here: Polygons) -> list[Body]:
     """Things, obstacles and walls near a spot, as fixed bodies."""
-    house = way.site.house
+    house = draft.site.house
     bodies = [
         Body(house.assets[thing.asset_id], thing.pose, moves=False)
         for thing in house.objects
@@ -179,7 +179,7 @@ def _near(way: EpisodeDraft, here: Polygons) -> list[Body]:
     ]
     bodies += [
         Body(other.asset, other.settled.pose, moves=False)
-        for other in way.obstacles
+        for other in draft.obstacles
         if _is_near(here, other.footprint)
     ]
     bodies += [wall_body(wall) for wall in house.walls if _is_near(here, wall_footprints([wall]))]

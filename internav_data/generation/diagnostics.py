@@ -58,7 +58,7 @@ def examine(out: Path) -> list[Check]:
         _memory(),
         _disk(out),
         _numba_cache(),
-        *_solutions(),
+        *_solved_pushes(),
     ]
 
 
@@ -161,21 +161,21 @@ def _numba_cache() -> Check:
     )
 
 
-def _solutions() -> list[Check]:
+def _solved_pushes() -> list[Check]:
     """Look at the pushes kept on disk; nothing where a package is missing, which is told above."""
     try:
-        from internav_data.physics import result_cache as solutions  # noqa: PLC0415 - imported when used
+        from internav_data.physics import result_cache  # noqa: PLC0415 - imported when used
     except ImportError:
         return []
     name = "solved pushes"
-    folder = solutions.cache_folder()
+    folder = result_cache.cache_folder()
     if folder is None:
-        return [Check(name, "good", f"none kept: {solutions.FOLDER_VARIABLE} is empty", "")]
-    path = folder / solutions.FILE_NAME
-    if solutions.ResultCache(folder).is_open:
-        mb, most = path.stat().st_size / 1e6, solutions.BYTES_AT_MOST / 1e6
+        return [Check(name, "good", f"none kept: {result_cache.FOLDER_VARIABLE} is empty", "")]
+    path = folder / result_cache.FILE_NAME
+    if result_cache.ResultCache(folder).is_open:
+        mb, most = path.stat().st_size / 1e6, result_cache.MAX_BYTES / 1e6
         return [Check(name, "good", f"{mb:.0f} of at most {most:.0f} MB at {path}", "")]
-    remedy = f"set {solutions.FOLDER_VARIABLE} to a folder of yours, or to nothing to keep none"
+    remedy = f"set {result_cache.FOLDER_VARIABLE} to a folder of yours, or to nothing to keep none"
     return [Check(name, "warning", f"{path} cannot be written: none are kept", remedy)]
 
 

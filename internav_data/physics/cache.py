@@ -1,8 +1,8 @@
 """The physics engine of a process, with a memory that all processes of a user share.
 
 What it is asked about is plain data, and the answer depends on that alone: it is kept on disk
-(`solutions`). On free ground a thing settles and slides the same way in every house; and training
-asks again what generating has asked before.
+(`result_cache`). On free ground a thing settles and slides the same way in every house; and
+training asks again what generating has asked before.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ _SOLVERS: Final = ("internav_data.geometry", "internav_data.physics")
 """Packages that solutions come from: none is believed once a file that they import has changed."""
 _LIBRARIES: Final = ("pybullet", "numpy", "numba", "llvmlite")
 """Libraries that they come from; an installed one's RECORD holds the digests of all its files."""
-_REST: Final = struct.Struct("<7d3d?")
+_SETTLE: Final = struct.Struct("<7d3d?")
 """Pose; seconds, penetration, reach; at rest."""
-_MOTION: Final = struct.Struct("<d?H")
+_PUSH: Final = struct.Struct("<d?H")
 """Seconds, at rest, how many bodies move."""
 _MOVER: Final = struct.Struct("<7d8dI")
 """Pose, sweep, bytes of the path; the paths themselves follow."""
@@ -48,7 +48,7 @@ class CachedEngine:
     """An engine that is asked only what neither this process nor another one has had solved."""
 
     engine: Engine
-    solutions: ResultCache
+    result_cache: ResultCache
     origin: str
     """What the answers depend on besides the question: engine, rules, machine."""
 
@@ -62,31 +62,31 @@ class CachedEngine:
         """Version and build of the engine."""
         return self.engine.build
 
-    def settle(self, setting: PhysicsScene) -> SettleSolution:
+    def settle(self, scene: PhysicsScene) -> SettleSolution:
         """Let the first body of the setting fall until it rests."""
-        if not self.solutions.is_open:
-            return self.engine.settle(setting)
-        key = self._key("settle", setting)
-        known = _read_rest(self.solutions.get(key))
+        if not self.result_cache.is_open:
+            return self.engine.settle(scene)
+        key = self._key("settle", scene)
+        known = _read_settle(self.result_cache.get(key))
         if known is None:
-            known = self.engine.settle(setting)
-            self.solutions.put(key, _write_rest(known))
+            known = self.engine.settle(scene)
+            self.result_cache.put(key, _write_settle(known))
         return known
 
-    def push(self, setting: PhysicsScene, shove: PushSpec) -> PushSolution:
+    def push(self, scene: PhysicsScene, spec: PushSpec) -> PushSolution:
         """Push the first body of the setting along +x."""
-        if not self.solutions.is_open:
-            return self.engine.push(setting, shove)
-        key = self._key(repr(shove), setting)
-        known = _read_motion(self.solutions.get(key), sum(b.moves for b in setting.bodies))
+        if not self.result_cache.is_open:
+            return self.engine.push(scene, spec)
+        key = self._key(repr(spec), scene)
+        known = _read_push(self.result_cache.get(key), sum(b.moves for b in scene.bodies))
         if known is None:
-            known = self.engine.push(setting, shove)
-            self.solutions.put(key, _write_motion(known))
+            known = self.engine.push(scene, spec)
+            self.result_cache.put(key, _write_push(known))
         return known
 
-    def _key(self, what: str, setting: PhysicsScene) -> bytes:
-        bodies = ((_digest(b.asset), b.pose, b.moves) for b in setting.bodies)
-        asked = (self.origin, what, setting.column, *bodies)
+    def _key(self, what: str, scene: PhysicsScene) -> bytes:
+        bodies = ((_digest(b.asset), b.pose, b.moves) for b in scene.bodies)
+        asked = (self.origin, what, scene.agent, *bodies)
         return hashlib.sha256(repr(asked).encode()).digest()
 
 
@@ -99,37 +99,37 @@ def _numbers(pose: Pose) -> tuple[float, ...]:
     return (pose.x, pose.y, pose.z, *pose.quaternion)
 
 
-def _write_rest(rest: SettleSolution) -> bytes:
-    numbers = (rest.seconds, rest.penetration_m, rest.reach_m)
-    return _REST.pack(*_numbers(rest.pose), *numbers, rest.at_rest)
+def _write_settle(solution: SettleSolution) -> bytes:
+    numbers = (solution.seconds, solution.penetration_m, solution.reach_m)
+    return _SETTLE.pack(*_numbers(solution.pose), *numbers, solution.at_rest)
 
 
-def _read_rest(value: bytes | None) -> SettleSolution | None:
-    if value is None or len(value) != _REST.size:
+def _read_settle(value: bytes | None) -> SettleSolution | None:
+    if value is None or len(value) != _SETTLE.size:
         return None
-    x, y, z, a, b, c, d, *numbers, at_rest = _REST.unpack(value)
+    x, y, z, a, b, c, d, *numbers, at_rest = _SETTLE.unpack(value)
     if not all(map(math.isfinite, (x, y, z, a, b, c, d, *numbers))):
         return None
     seconds, penetration_m, reach_m = numbers
     return SettleSolution(Pose(x, y, z, (a, b, c, d)), seconds, at_rest, penetration_m, reach_m)
 
 
-def _write_motion(motion: PushSolution) -> bytes:
-    movers = zip(motion.poses, motion.sweeps, motion.paths, strict=True)
+def _write_push(solution: PushSolution) -> bytes:
+    movers = zip(solution.poses, solution.sweeps, solution.paths, strict=True)
     return b"".join((
-        _MOTION.pack(motion.seconds, motion.at_rest, len(motion.poses)),
+        _PUSH.pack(solution.seconds, solution.at_rest, len(solution.poses)),
         *(_MOVER.pack(*_numbers(pose), *sweep, len(path)) for pose, sweep, path in movers),
-        *motion.paths,
+        *solution.paths,
     ))  # fmt: skip
 
 
-def _read_motion(value: bytes | None, movers: int) -> PushSolution | None:
+def _read_push(value: bytes | None, movers: int) -> PushSolution | None:
     """Read a motion of so many bodies; None where it is none."""
-    at = _MOTION.size + movers * _MOVER.size
+    at = _PUSH.size + movers * _MOVER.size
     if value is None or len(value) < at:
         return None
-    seconds, at_rest, count = _MOTION.unpack_from(value)
-    rows = list(_MOVER.iter_unpack(value[_MOTION.size : at]))
+    seconds, at_rest, count = _PUSH.unpack_from(value)
+    rows = list(_MOVER.iter_unpack(value[_PUSH.size : at]))
     if count != movers or not all(math.isfinite(n) for n in (seconds, *chain(*rows))):
         return None
     poses, sweeps, paths = [], [], []

@@ -45,9 +45,9 @@ class Frame:
         x, y = turned(-self.heading, point[0] - self.x, point[1] - self.y)
         return round_m(x), round_m(y)
 
-    def leave_octagon(self, octagon: Dop8) -> Dop8:
+    def leave_dop8(self, dop8: Dop8) -> Dop8:
         """Octagon in the house."""
         first = -2 * self.heading
-        a, b, c, d, e, f, g, h = (octagon[(first + k) % 8] for k in range(8))
+        a, b, c, d, e, f, g, h = (dop8[(first + k) % 8] for k in range(8))
         x, y = self.x, self.y
         return a + x, b + x + y, c + y, d + y - x, e - x, f - x - y, g - y, h + x - y

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Dop8 = tuple[float, float, float, float, float, float, float, float]
 """Supports along x, x + y, y, y - x and their opposites, metres."""
 
-NOWHERE: Final[Dop8] = (-math.inf,) * 8
+EMPTY: Final[Dop8] = (-math.inf,) * 8
 """What is held: it touches nothing."""
 SLANT: Final = math.sqrt(2.0)
 """Length of the slanted directions: a margin of 1 m adds this much along them."""
@@ -56,9 +56,9 @@ def _touching(rows: Floats, reach: Floats) -> Ints:
     return found[:count]
 
 
-def touching(rows: Floats, octagon: Dop8) -> list[int]:
+def touching(rows: Floats, dop8: Dop8) -> list[int]:
     """Which of some octagons (n, 8) overlap another one, ascending."""
-    indices: list[int] = _touching(rows, np.array(octagon)).tolist()
+    indices: list[int] = _touching(rows, np.array(dop8)).tolist()
     return indices
 
 
@@ -67,14 +67,14 @@ def overlap(first: Dop8, second: Dop8) -> bool:
     return all(first[d] + second[(d + 4) % 8] > 0.0 for d in range(8))
 
 
-def grown(octagon: Dop8, margin: float) -> Dop8:
+def grown(dop8: Dop8, margin: float) -> Dop8:
     """Octagon of all within a margin, metres."""
-    a, b, c, d, e, f, g, h = octagon
+    a, b, c, d, e, f, g, h = dop8
     m, slant = margin, SLANT * margin
     return a + m, b + slant, c + m, d + slant, e + m, f + slant, g + m, h + slant
 
 
-def octagon_of_rectangle(low_x: float, low_y: float, high_x: float, high_y: float) -> Dop8:
+def dop8_of_rectangle(low_x: float, low_y: float, high_x: float, high_y: float) -> Dop8:
     """Octagon of a rectangle along the axes."""
     return (
         *(high_x, high_x + high_y, high_y, high_y - low_x),
@@ -82,11 +82,11 @@ def octagon_of_rectangle(low_x: float, low_y: float, high_x: float, high_y: floa
     )
 
 
-def octagon_of_disc(x: float, y: float, radius: float) -> Dop8:
+def dop8_of_disc(x: float, y: float, radius: float) -> Dop8:
     """Octagon round a disc."""
     return grown((x, x + y, y, y - x, -x, -x - y, -y, x - y), radius)
 
 
-def square_round(x: float, y: float, half: float) -> Dop8:
+def dop8_of_square(x: float, y: float, half: float) -> Dop8:
     """Octagon of a square along the axes."""
-    return octagon_of_rectangle(x - half, y - half, x + half, y + half)
+    return dop8_of_rectangle(x - half, y - half, x + half, y + half)

@@ -17,7 +17,7 @@ from numba import njit
 from internav_data.geometry import asset_corners, transform
 from internav_data.geometry.footprints import convex_hull
 from internav_data.geometry.headings import HEADINGS
-from internav_data.physics.sweep import about_middle
+from internav_data.physics.sweep import centred_corners
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -45,7 +45,7 @@ class ConvexPrisms(NamedTuple):
 
 
 @lru_cache(maxsize=8192)
-def outline_of(asset: Asset, pose: Pose) -> ConvexPrisms:
+def prisms_of(asset: Asset, pose: Pose) -> ConvexPrisms:
     """Outline of a thing where it lies; cached, read-only."""
     corners, starts = asset_corners(asset)
     placed = transform(corners, pose)
@@ -55,7 +55,7 @@ def outline_of(asset: Asset, pose: Pose) -> ConvexPrisms:
     return ConvexPrisms(vertices, firsts, boxes[:-1].copy())
 
 
-def outline_of_column(x: float, y: float, radius: float, low: float, high: float) -> ConvexPrisms:
+def prisms_of_collider(x: float, y: float, radius: float, low: float, high: float) -> ConvexPrisms:
     """Outline of the prism round an upright cylinder, metres."""
     out = radius / math.cos(math.pi / SIDES)
     angles = [2.0 * math.pi * k / SIDES for k in range(SIDES)]
@@ -210,7 +210,7 @@ def met_on_path(
     _, starts = asset_corners(asset)
     met: list[bool] = _met(
         np.frombuffer(path, dtype=np.float32).reshape(-1, 7),
-        about_middle(asset),
+        centred_corners(asset),
         starts,
         HEADINGS[frame.heading],
         (frame.x, frame.y),

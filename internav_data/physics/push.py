@@ -11,7 +11,7 @@ from internav_data.geometry import round_m
 from internav_data.physics.displacement import is_still, shift_m, tilt_deg
 from internav_data.physics.frames import Frame
 from internav_data.physics.kdop import grown
-from internav_data.physics.narrow_phase import met_on_path, outline_of, outline_of_column
+from internav_data.physics.narrow_phase import met_on_path, prisms_of, prisms_of_collider
 from internav_data.physics.registry import engine_of_this_process
 from internav_data.physics.scene import (
     AGENT_HEIGHT_M,
@@ -52,9 +52,9 @@ MEET_M: Final = 0.012
 between them is missed by half of that at most."""
 AGENT_M: Final = 0.21
 """Radius of the agent's column: nothing ends inside its disc of 0.2 m."""
-AGENT_LEAST_M: Final = 0.2005
+AGENT_MIN_M: Final = 0.2005
 """What already stands nearer than the column is not pressed away by it."""
-ROUNDS: Final = 8
+MAX_ROUNDS: Final = 8
 """What was reached though it was left out joins the next round; the last one takes all within
 `FAR_M`."""
 FAR_M: Final = 4.0
@@ -123,30 +123,32 @@ def push(
         "force" or "kick".
 
     """
-    shove = PUSH_SPECS[model]
+    spec = PUSH_SPECS[model]
     frame = Frame(pose.x, pose.y, heading)
     start = _start(frame, pose)
-    motion = free = _push_alone(asset, start, shove, engine_of_this_process())
+    solution = free = _push_alone(asset, start, spec, engine_of_this_process())
     movers: Movers = ()
     failure: Failure = "too heavy"
 
     def moves() -> bool:
-        return shift_m(asset, pose, frame.leave(motion.poses[0])) >= SUCCESS_M
+        return shift_m(asset, pose, frame.leave(solution.poses[0])) >= SUCCESS_M
 
     # What is too heavy alone is not lighter among others, nor freer beside the agent.
     known = _met(frame, near, (asset,), free) if moves() else {}
     if known:
         failure = "something is in the way"
-        motion, movers = _push_among(asset, start, frame, near, None, shove, known)
-    column = _column(frame, agent, agent_gap_m)
-    if column is not None and moves() and _meets(column, (asset, *_assets(movers)), motion):
+        solution, movers = _push_among(asset, start, frame, near, None, spec, known)
+    collider = _collider(frame, agent, agent_gap_m)
+    if collider is not None and moves() and _meets(collider, (asset, *_assets(movers)), solution):
         # Only now: what never comes near the agent is solved once, wherever it stands.
         failure = "the agent is in the way"
-        motion, movers = _push_among(asset, start, frame, near, column, shove, known)
-    return _judged(asset, pose, frame, motion, movers, failure)
+        solution, movers = _push_among(asset, start, frame, near, collider, spec, known)
+    return _judged(asset, pose, frame, solution, movers, failure)
 
 
-def crowd(asset: Asset, pose: Pose, heading: int, near: Near, model: PushModel = "force") -> int:
+def count_movers(
+    asset: Asset, pose: Pose, heading: int, near: Near, model: PushModel = "force"
+) -> int:
     """Count the things that may be moved besides what is pushed: what a push will cost to solve.
 
     Parameters as in `push`.
@@ -156,12 +158,12 @@ def crowd(asset: Asset, pose: Pose, heading: int, near: Near, model: PushModel =
     if shift_m(asset, pose, frame.leave(free.poses[0])) < SUCCESS_M:
         return 0
 
-    def loose(octagon: Dop8) -> list[tuple[int, Body]]:
-        return [pair for pair in near(octagon) if pair[1].moves]
+    def loose(dop8: Dop8) -> list[tuple[int, Body]]:
+        return [pair for pair in near(dop8) if pair[1].moves]
 
     known = _met(frame, loose, (asset,), free)
     for body in list(known.values()):
-        known.update(loose(grown(extent_of(body.asset, body.pose).octagon, ON_M)))
+        known.update(loose(grown(extent_of(body.asset, body.pose).dop8, ON_M)))
     return len(known)
 
 
@@ -170,14 +172,14 @@ def _start(frame: Frame, pose: Pose) -> Pose:
 
 
 @lru_cache(maxsize=32768)
-def _push_alone(asset: Asset, start: Pose, shove: PushSpec, engine: Engine) -> PushSolution:
-    return engine.push(PhysicsScene((Body(asset, start, moves=True),)), shove)
+def _push_alone(asset: Asset, start: Pose, spec: PushSpec, engine: Engine) -> PushSolution:
+    return engine.push(PhysicsScene((Body(asset, start, moves=True),)), spec)
 
 
 @lru_cache(maxsize=4096)
-def _push_in(setting: PhysicsScene, shove: PushSpec, engine: Engine) -> PushSolution:
+def _push_in(scene: PhysicsScene, spec: PushSpec, engine: Engine) -> PushSolution:
     """Push in a scene; what failed changed nothing and is likely to be tried again."""
-    return engine.push(setting, shove)
+    return engine.push(scene, spec)
 
 
 def _push_among(
@@ -185,8 +187,8 @@ def _push_among(
     start: Pose,
     frame: Frame,
     near: Near,
-    column: AgentCollider | None,
-    shove: PushSpec,
+    collider: AgentCollider | None,
+    spec: PushSpec,
     known: dict[int, Body],
 ) -> tuple[PushSolution, Movers]:
     """Push among what is touched: solved anew until nothing left out is.
@@ -194,23 +196,23 @@ def _push_among(
     What turns out to be touched joins `known`.
     """
     engine = engine_of_this_process()
-    for left in reversed(range(ROUNDS)):
+    for left in reversed(range(MAX_ROUNDS)):
         around = [(key, known[key]) for key in sorted(known)]
         movers = tuple(pair for pair in around if pair[1].moves)
         others = [pair for pair in around if not pair[1].moves]
         bodies = (
             Body(body.asset, frame.enter(body.pose), body.moves) for _, body in (*movers, *others)
         )
-        setting = PhysicsScene((Body(asset, start, moves=True), *bodies), column)
-        motion = _push_in(setting, shove, engine)
-        met = _met(frame, near, (asset, *_assets(movers)), motion, known)
+        scene = PhysicsScene((Body(asset, start, moves=True), *bodies), collider)
+        solution = _push_in(scene, spec, engine)
+        met = _met(frame, near, (asset, *_assets(movers)), solution, known)
         if not met:
             break
         known.update(met)
         if left == 1:
-            for sweep in motion.sweeps:
-                known.update(near(grown(frame.leave_octagon(sweep), FAR_M)))
-    return motion, movers
+            for sweep in solution.sweeps:
+                known.update(near(grown(frame.leave_dop8(sweep), FAR_M)))
+    return solution, movers
 
 
 def _assets(movers: Movers) -> tuple[Asset, ...]:
@@ -221,16 +223,16 @@ def _met(
     frame: Frame,
     near: Near,
     moving: Sequence[Asset],
-    motion: PushSolution,
+    solution: PushSolution,
     known: Container[int] = (),
 ) -> dict[int, Body]:
     """Gather what is not known yet and may be touched by what moves."""
     found: dict[int, Body] = {}
-    for asset, sweep, path in zip(moving, motion.sweeps, motion.paths, strict=True):
-        around = near(grown(frame.leave_octagon(sweep), MEET_M))
+    for asset, sweep, path in zip(moving, solution.sweeps, solution.paths, strict=True):
+        around = near(grown(frame.leave_dop8(sweep), MEET_M))
         asked = [pair for pair in around if pair[0] not in known and pair[0] not in found]
-        outlines = [outline_of(body.asset, body.pose) for _, body in asked]
-        met = met_on_path(asset, path, frame, outlines, MEET_M)
+        prisms = [prisms_of(body.asset, body.pose) for _, body in asked]
+        met = met_on_path(asset, path, frame, prisms, MEET_M)
         found.update(pair for pair, touched in zip(asked, met, strict=True) if touched)
     return found
 
@@ -239,15 +241,15 @@ def _judged(
     asset: Asset,
     pose: Pose,
     frame: Frame,
-    motion: PushSolution,
+    solution: PushSolution,
     movers: Movers,
     failure: Failure,
 ) -> PushResult:
     """Move a motion from the thing's own frame into the house, round it, and judge it."""
-    end = frame.leave(motion.poses[0])
+    end = frame.leave(solution.poses[0])
     far = round_m(shift_m(asset, pose, end))
     moved = []
-    for (key, body), after in zip(movers, motion.poses[1:], strict=True):
+    for (key, body), after in zip(movers, solution.poses[1:], strict=True):
         there = frame.leave(after)
         if not is_still(body.pose, there):
             moved.append((key, there))
@@ -255,12 +257,12 @@ def _judged(
     return PushResult(
         pose=end,
         displacement_m=far,
-        seconds=round(motion.seconds, 6),
+        seconds=round(solution.seconds, 6),
         toppled=tilt_deg(pose.quaternion, end.quaternion) > TOPPLED_DEG,
         moved=tuple(moved),
         success=success,
         reason="" if success else failure,
-        at_rest=motion.at_rest,
+        at_rest=solution.at_rest,
     )
 
 
@@ -269,17 +271,19 @@ def _coarse(quaternion: Quaternion) -> Quaternion:
     return x, y, z, w
 
 
-def _column(frame: Frame, agent: Vec2 | None, gap: float) -> AgentCollider | None:
+def _collider(frame: Frame, agent: Vec2 | None, gap: float) -> AgentCollider | None:
     if agent is None:
         return None
     x, y = frame.enter_point(agent)
-    return AgentCollider(x, y, min(AGENT_M, max(AGENT_LEAST_M, round_m(gap))))
+    return AgentCollider(x, y, min(AGENT_M, max(AGENT_MIN_M, round_m(gap))))
 
 
-def _meets(column: AgentCollider, moving: Sequence[Asset], motion: PushSolution) -> bool:
+def _meets(collider: AgentCollider, moving: Sequence[Asset], solution: PushSolution) -> bool:
     """Whether anything that moves comes near the agent's column."""
-    agent = outline_of_column(column.x, column.y, column.radius_m, AGENT_LOW_M, AGENT_HEIGHT_M)
+    agent = prisms_of_collider(
+        collider.x, collider.y, collider.radius_m, AGENT_LOW_M, AGENT_HEIGHT_M
+    )
     return any(
         any(met_on_path(asset, path, _OWN, [agent], MEET_M))
-        for asset, path in zip(moving, motion.paths, strict=True)
+        for asset, path in zip(moving, solution.paths, strict=True)
     )

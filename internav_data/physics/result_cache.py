@@ -20,16 +20,16 @@ from platformdirs import user_cache_path
 FOLDER_VARIABLE: Final = "INTERNAV_CACHE_DIR"
 """A folder to keep solutions in rather than the user's cache folder; empty: keep none."""
 FILE_NAME: Final = "solutions.sqlite"
-BYTES_AT_MOST: Final = 1 << 30
+MAX_BYTES: Final = 1 << 30
 """About 150,000 pushes. Once it is full, the file is emptied."""
 _PAGE: Final = 4096
 _OPENING_S: Final = 5.0
 """How long other processes are waited for at first, so that a busy moment does not cost all."""
 _WAIT_S: Final = 0.2
 """How long later on: a solution takes some milliseconds."""
-_AT_ONCE: Final = 32
+_BATCH: Final = 32
 """Values written down together: one by one each would cost a tenth of what it saves."""
-_VALUE_AT_MOST: Final = 4 << 20
+_MAX_VALUE_BYTES: Final = 4 << 20
 """Longer values are neither kept nor read: a push of twenty things takes a tenth of it."""
 _CHECK: Final = 4
 """Bytes of a value's CRC-32, before the value itself."""
@@ -84,9 +84,9 @@ class ResultCache:
 
     def put(self, key: bytes, value: bytes) -> None:
         """Keep a value, if that is possible: written down with the next few."""
-        if self.is_open and len(value) < _VALUE_AT_MOST:
+        if self.is_open and len(value) < _MAX_VALUE_BYTES:
             self._new[key] = _checked(value) + value
-            if len(self._new) >= _AT_ONCE:
+            if len(self._new) >= _BATCH:
                 self.flush()
 
     def flush(self) -> None:
@@ -142,13 +142,13 @@ def _opened(path: Path) -> sqlite3.Connection:
 def _connected(path: Path) -> sqlite3.Connection:
     # Worlds may be stepped in any thread, if in one at a time.
     file = sqlite3.connect(path, timeout=_OPENING_S, isolation_level=None, check_same_thread=False)
-    file.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _VALUE_AT_MOST + _CHECK)
+    file.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _MAX_VALUE_BYTES + _CHECK)
     file.execute("PRAGMA trusted_schema = OFF")
     # Nothing is waited for until it lies on the disk: a solution lost is solved again, and a power
     # cut's damage is told by the check sums.
     file.execute("PRAGMA synchronous = OFF")
     file.execute("PRAGMA journal_mode = TRUNCATE")
-    file.execute(f"PRAGMA max_page_count = {BYTES_AT_MOST // _PAGE}")
+    file.execute(f"PRAGMA max_page_count = {MAX_BYTES // _PAGE}")
     with suppress(sqlite3.OperationalError):
         file.execute(_TABLE)
     found = file.execute("SELECT type, sql FROM sqlite_schema").fetchall()
@@ -165,7 +165,7 @@ def _checked(value: bytes) -> bytes:
     return zlib.crc32(value).to_bytes(_CHECK, "little")
 
 
-def solutions() -> ResultCache:
+def result_cache() -> ResultCache:
     """Return this process's view of the solutions; a forked process opens its own."""
     return _of_process(os.getpid())
 

@@ -44,7 +44,7 @@ class PhysicsScene:
     """
 
     bodies: tuple[Body, ...]
-    column: AgentCollider | None = None
+    agent: AgentCollider | None = None
     """The agent, where it takes part."""
 
 
@@ -127,10 +127,10 @@ class Engine(Protocol):
     def build(self) -> str:
         """Version and build of the engine, as stored in certificates."""
 
-    def settle(self, setting: PhysicsScene) -> SettleSolution:
+    def settle(self, scene: PhysicsScene) -> SettleSolution:
         """Let the first body of the setting fall until it rests; the others stay."""
 
-    def push(self, setting: PhysicsScene, shove: PushSpec) -> PushSolution:
+    def push(self, scene: PhysicsScene, spec: PushSpec) -> PushSolution:
         """Push the first body along +x; bodies that move take part, the others stay."""
 
     def __hash__(self) -> int:

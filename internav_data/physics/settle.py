@@ -62,10 +62,10 @@ def settle(
 
     """
     engine = engine_of_this_process()
-    rest = _settle_alone(asset, engine)
-    if rest.reach_m + MARGIN_M > clearance_m:
-        rest = engine.settle(_setting(asset, pose, neighbours()))
-    return _judged(pose, rest)
+    solution = _settle_alone(asset, engine)
+    if solution.reach_m + MARGIN_M > clearance_m:
+        solution = engine.settle(_scene(asset, pose, neighbours()))
+    return _judged(pose, solution)
 
 
 @lru_cache(maxsize=8192)
@@ -76,7 +76,7 @@ def _settle_alone(asset: Asset, engine: Engine) -> SettleSolution:
 _START = Pose(0.0, 0.0, DROP_M, UPRIGHT)
 
 
-def _setting(asset: Asset, pose: Pose, neighbours: Sequence[Body]) -> PhysicsScene:
+def _scene(asset: Asset, pose: Pose, neighbours: Sequence[Body]) -> PhysicsScene:
     bodies = (Body(b.asset, _seen_from(pose, b.pose), moves=False) for b in neighbours)
     return PhysicsScene((Body(asset, _START, moves=True), *bodies))
 
@@ -91,9 +91,9 @@ def _seen_from(frame: Pose, pose: Pose) -> Pose:
     return Pose(round_m(px), round_m(py), round_m(pz), turned)
 
 
-def _judged(pose: Pose, rest: SettleSolution) -> SettleResult:
+def _judged(pose: Pose, solution: SettleSolution) -> SettleResult:
     """Move a rest from the thing's own frame into the house, round it, and judge it."""
-    shift = rest.pose
+    shift = solution.pose
     dx, dy, dz = (
         row[0] * shift.x + row[1] * shift.y + row[2] * shift.z
         for row in rotation_matrix(pose.quaternion)
@@ -108,12 +108,14 @@ def _judged(pose: Pose, rest: SettleSolution) -> SettleResult:
         math.acos(max(-1.0, min(1.0, float(rotation_matrix(shift.quaternion)[2, 2]))))
     )
     refusal = ""
-    if not rest.at_rest:
+    if not solution.at_rest:
         refusal = "did not come to rest"
     elif math.hypot(shift.x, shift.y) > MAX_SHIFT_M:
         refusal = "moved too far"
     elif tilt > MAX_TILT_DEG:
         refusal = "tilted too far"
-    elif rest.penetration_m > MAX_PENETRATION_M:
+    elif solution.penetration_m > MAX_PENETRATION_M:
         refusal = "sank in too deep"
-    return SettleResult(settled, round(rest.seconds, 6), round(rest.penetration_m, 6), refusal)
+    return SettleResult(
+        settled, round(solution.seconds, 6), round(solution.penetration_m, 6), refusal
+    )

@@ -34,16 +34,16 @@ the first eight numbers are the octagon's."""
 
 
 @lru_cache(maxsize=4096)
-def about_middle(asset: Asset) -> Floats:
+def centred_corners(asset: Asset) -> Floats:
     """Corners (n, 3) from the centre of mass, about which Bullet turns a body; read-only."""
     corners, _ = asset_corners(asset)
     return corners - np.array(centre_of_mass(asset))
 
 
 @lru_cache(maxsize=4096)
-def radius_m(asset: Asset) -> float:
+def bounding_radius_m(asset: Asset) -> float:
     """Farthest corner from the centre of mass: how far a turn can carry it, metres."""
-    corners = about_middle(asset)
+    corners = centred_corners(asset)
     return max(math.hypot(*corner) for corner in corners.tolist())
 
 
@@ -109,7 +109,7 @@ class SweepRecorder:
         return 2.0 * math.acos(min(1.0, turn)) > far_rad
 
     @property
-    def octagon(self) -> Dop8:
+    def dop8(self) -> Dop8:
         """Octagon round all of it."""
         a, b, c, d, e, f, g, h = self._state[:8].tolist()
         return a, b, c, d, e, f, g, h
@@ -122,19 +122,19 @@ class SweepRecorder:
         return poses.tobytes() + last.tobytes()
 
 
-def trail_of(asset: Asset, steps: int) -> SweepRecorder:
+def sweep_recorder(asset: Asset, steps: int) -> SweepRecorder:
     """Begin an empty trail of at most so many steps."""
     state = np.zeros(_LENGTH)
     state[:8] = -math.inf
     kept = np.empty((steps + 1, _POSE), dtype=np.float32)
-    return SweepRecorder(about_middle(asset), radius_m(asset), state, kept)
+    return SweepRecorder(centred_corners(asset), bounding_radius_m(asset), state, kept)
 
 
 @dataclass(frozen=True, slots=True)
 class Extent:
     """How far a thing reaches where it lies, metres."""
 
-    octagon: Dop8
+    dop8: Dop8
     low_m: float
     high_m: float
 

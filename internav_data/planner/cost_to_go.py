@@ -54,11 +54,11 @@ def _step_cost(
     there = _ahead(node, quarter, ny)
     if there < 0 or there >= fixed.shape[1]:
         return FAR
-    way = EAST if quarter % 2 == 0 else NORTH
+    path = EAST if quarter % 2 == 0 else NORTH
     edge = node if quarter < 2 else there  # noqa: PLR2004 - backwards along an edge
-    if fixed[way, edge] != 0 or (masks[way, edge] & banned) != 0:
+    if fixed[path, edge] != 0 or (masks[path, edge] & banned) != 0:
         return FAR
-    entered = masks[way, edge] & ~masks[NODE, node]
+    entered = masks[path, edge] & ~masks[NODE, node]
     cost = 1
     bit = 0
     while entered != 0:
@@ -70,7 +70,7 @@ def _step_cost(
 
 
 @njit(cache=True)
-def field(
+def bucket_dijkstra(
     fixed: Masks, masks: Ints, banned: int, prices: Ints, ny: int, seeds: Ints, until: int
 ) -> Costs:
     """Cost from every pose to the nearest of some poses, FAR where cut off.
@@ -129,9 +129,9 @@ def descend(
     fixed: Masks, masks: Ints, banned: int, prices: Ints, ny: int, costs: Costs, pose: int
 ) -> tuple[Ints, Ints]:
     """Follow a field down: the poses passed (n,), and the things entered on each step (n,)."""
-    most = costs[pose] + 1
-    poses = np.empty(most, dtype=np.int64)
-    entered = np.zeros(most, dtype=np.int64)
+    limit = costs[pose] + 1
+    poses = np.empty(limit, dtype=np.int64)
+    entered = np.zeros(limit, dtype=np.int64)
     count = 0
     while True:
         poses[count] = pose
@@ -142,9 +142,9 @@ def descend(
         price = _step_cost(node, quarter, ny, fixed, masks, banned, prices)
         there = 4 * _ahead(node, quarter, ny) + quarter
         if price < FAR and costs[there] + price == costs[pose]:
-            way = EAST if quarter % 2 == 0 else NORTH
+            path = EAST if quarter % 2 == 0 else NORTH
             edge = node if quarter < 2 else there // 4  # noqa: PLR2004 - backwards along an edge
-            entered[count - 1] = masks[way, edge] & ~masks[NODE, node]
+            entered[count - 1] = masks[path, edge] & ~masks[NODE, node]
             pose = there
             continue
         left = 4 * node + (quarter + 1) % 4
@@ -153,7 +153,7 @@ def descend(
 
 
 @njit(cache=True)
-def sightings(
+def viewpoints(
     points: Floats, reachable: Costs, ny: int, views: Floats, looks: Ints, after: Costs
 ) -> tuple[Ints, Ints, Ints]:
     """Find poses from which some point may be seen within reach, by cost.
@@ -182,10 +182,10 @@ def sightings(
     low_y, high_y = points[:, 1].min() - REACH_M, points[:, 1].max() + REACH_M
     i0, i1 = max(0, int(low_x / SPACING_M)), min(nx - 1, int(high_x / SPACING_M) + 1)
     j0, j1 = max(0, int(low_y / SPACING_M)), min(ny - 1, int(high_y / SPACING_M) + 1)
-    most = max(0, i1 - i0 + 1) * max(0, j1 - j0 + 1) * 4 * len(views)
-    poses = np.empty(most, dtype=np.int64)
-    horizons = np.empty(most, dtype=np.int64)
-    costs = np.empty(most, dtype=np.int64)
+    limit = max(0, i1 - i0 + 1) * max(0, j1 - j0 + 1) * 4 * len(views)
+    poses = np.empty(limit, dtype=np.int64)
+    horizons = np.empty(limit, dtype=np.int64)
+    costs = np.empty(limit, dtype=np.int64)
     count = 0
     for i in range(i0, i1 + 1):
         for j in range(j0, j1 + 1):

@@ -9,39 +9,39 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from internav_data.navigation import SPACING_M, grid
-from internav_data.planner.cost_to_go import descend, field
+from internav_data.planner.cost_to_go import bucket_dijkstra, descend
 from internav_data.records.agent import CLEARANCE_M
 
 if TYPE_CHECKING:
     from internav_data.core.typing import Costs, Ints, Masks
     from internav_data.world import HouseModel, MovableObject, World
 
-THINGS_AT_MOST: Final = 62
+MAX_OBJECTS: Final = 62
 """Bits of a mask; things beyond, the farthest from the start and the goal, count as fixed."""
 PICK_PRICE: Final = 1
 PUSH_PRICE: Final = 2
 FURNITURE_PRICE: Final = 2
 DROP_PRICE: Final = 2
 """What moving a thing out of the way costs at a guess. A low one searches more and finds more."""
-EVERYTHING: Final = (1 << THINGS_AT_MOST) - 1
+EVERYTHING: Final = (1 << MAX_OBJECTS) - 1
 """All movable things banned: the lattice as it lies."""
 
 
 @lru_cache(maxsize=8)
-def _closed(stage: HouseModel) -> Masks:
+def _static_blockers(model: HouseModel) -> Masks:
     """(3, nodes) uint8: what is closed with every movable thing away; cached, read-only."""
-    nx, ny = stage.lattice.shape
+    nx, ny = model.lattice.shape
     blockers = np.zeros((3, nx, ny), dtype=np.int32)
-    corners = np.ascontiguousarray(stage.house.outline, dtype=np.float64)
+    corners = np.ascontiguousarray(model.house.outline, dtype=np.float64)
     grid.close_outside(blockers, corners, SPACING_M)
-    plans = stage.footprints
+    plans = model.footprints
     grid.mark(blockers, plans.vertices, plans.offsets, SPACING_M, CLEARANCE_M, 1)
     flags: Masks = (blockers.reshape(3, -1) > 0).astype(np.uint8)
     return flags
 
 
 @lru_cache(maxsize=2048)
-def _marks(item: MovableObject, nx: int, ny: int) -> Ints:
+def _blocked_indices(item: MovableObject, nx: int, ny: int) -> Ints:
     """Which nodes and edges a thing blocks, as indices into a flat (3, nx, ny)."""
     blockers = np.zeros((3, nx, ny), dtype=np.int32)
     plan = item.footprint
@@ -57,7 +57,7 @@ class PlanningProblem:
     shape: tuple[int, int]
     fixed: Masks
     """(3, nodes)."""
-    things: tuple[int, ...]
+    objects: tuple[int, ...]
     """Index of the thing of each bit."""
     goals: Ints
     """The poses at the goal."""
@@ -65,43 +65,43 @@ class PlanningProblem:
     @staticmethod
     def of(world: World) -> PlanningProblem:
         """Gather what no action of a world can change."""
-        nx, ny = world.stage.lattice.shape
+        nx, ny = world.model.lattice.shape
         movable: list[int] = []
         lasting: list[int] = []
         for k, item in enumerate(world.items):
             able = item.asset.pushable or item.asset.pickable
             (movable if able else lasting).append(k)
         ends = (world.position, world.goal_point)
-        first = len(world.stage.items)
+        first = len(world.model.items)
         # Obstacles first, then what is nearest to either end.
         ranked = sorted(
             movable,
-            key=lambda k: (k < first, round(min(world.away(k, *end) for end in ends), 6), k),
+            key=lambda k: (k < first, round(min(world.distance_to(k, *end) for end in ends), 6), k),
         )
-        fixed = _closed(world.stage).copy()
+        fixed = _static_blockers(world.model).copy()
         flat = fixed.reshape(-1)
-        for k in (*lasting, *ranked[THINGS_AT_MOST:]):
-            flat[_marks(world.items[k], nx, ny)] = 1
+        for k in (*lasting, *ranked[MAX_OBJECTS:]):
+            flat[_blocked_indices(world.items[k], nx, ny)] = 1
         goal = 4 * (world.goal[0] * ny + world.goal[1])
         goals = np.arange(goal, goal + 4, dtype=np.int64)
-        return PlanningProblem(ny, (nx, ny), fixed, tuple(ranked[:THINGS_AT_MOST]), goals)
+        return PlanningProblem(ny, (nx, ny), fixed, tuple(ranked[:MAX_OBJECTS]), goals)
 
     def masks(self, world: World) -> Ints:
         """(3, nodes) int64: who blocks what, as things lie."""
         masks = np.zeros(self.fixed.shape, dtype=np.int64)
         flat = masks.reshape(-1)
-        for bit, k in enumerate(self.things):
+        for bit, k in enumerate(self.objects):
             item = world.items[k]
             if item.pose is not None:
-                flat[_marks(item, *self.shape)] |= 1 << bit
+                flat[_blocked_indices(item, *self.shape)] |= 1 << bit
         return masks
 
     def prices(self, world: World) -> Ints:
         """(62,) int64: what moving each thing costs at a guess; picking needs an empty hand."""
-        prices = np.zeros(THINGS_AT_MOST, dtype=np.int64)
+        prices = np.zeros(MAX_OBJECTS, dtype=np.int64)
         full = DROP_PRICE if world.held >= 0 else 0
-        furniture = len(world.stage.items)
-        for bit, k in enumerate(self.things):
+        furniture = len(world.model.items)
+        for bit, k in enumerate(self.objects):
             pickable = world.items[k].asset.pickable
             prices[bit] = PICK_PRICE + full if pickable else PUSH_PRICE
             # It stands in groups and against walls, where pushes are slow to solve and seldom help.
@@ -113,11 +113,13 @@ class PlanningProblem:
         return 4 * (world.i * self.ny + world.j) + world.quarter
 
     def costs(self, masks: Ints, banned: int, prices: Ints, until: int = -1) -> Costs:
-        """Cost from every pose to the goal, Done left out; `until` as in `field`."""
-        costs: Costs = field(self.fixed, masks, banned, prices, self.ny, self.goals, until)
+        """Cost from every pose to the goal, Done left out; `until` as in `bucket_dijkstra`."""
+        costs: Costs = bucket_dijkstra(
+            self.fixed, masks, banned, prices, self.ny, self.goals, until
+        )
         return costs
 
-    def way(
+    def path(
         self, masks: Ints, banned: int, prices: Ints, costs: Costs, pose: int
     ) -> tuple[Ints, Ints]:
         """Poses to the goal down a field, and the things entered on each step."""
@@ -130,13 +132,13 @@ class PlanningProblem:
         To go from a to b is to go from b to a facing the other way.
         """
         seeds = np.array([turned_round(pose)], dtype=np.int64)
-        none = np.zeros(THINGS_AT_MOST, dtype=np.int64)
-        back: Costs = field(self.fixed, masks, EVERYTHING, none, self.ny, seeds, -1)
+        none = np.zeros(MAX_OBJECTS, dtype=np.int64)
+        back: Costs = bucket_dijkstra(self.fixed, masks, EVERYTHING, none, self.ny, seeds, -1)
         return back.reshape(-1, 4)[:, [2, 3, 0, 1]].reshape(-1), back
 
     def walk(self, masks: Ints, back: Costs, pose: int) -> list[int]:
         """Poses from where `reach` began to a pose."""
-        none = np.zeros(THINGS_AT_MOST, dtype=np.int64)
+        none = np.zeros(MAX_OBJECTS, dtype=np.int64)
         poses, _ = descend(self.fixed, masks, EVERYTHING, none, self.ny, back, turned_round(pose))
         return [turned_round(p) for p in reversed(poses.tolist())]
 

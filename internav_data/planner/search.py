@@ -24,13 +24,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from internav_data.navigation import SPACING_M
-from internav_data.planner.cost_to_go import FAR, sightings
+from internav_data.planner.cost_to_go import FAR, viewpoints
 from internav_data.planner.problem import EVERYTHING, PICK_PRICE, PlanningProblem
-from internav_data.planner.push_heuristic import clearing, marks_on
+from internav_data.planner.push_heuristic import clearing_pushes, path_marks
 from internav_data.records import Expert
 from internav_data.world import Action, World
 from internav_data.world.actions import HORIZONS_DEG, PUSH_TURNS
-from internav_data.world.occlusion import placed_shell
+from internav_data.world.occlusion import placed_occlusion_shape
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -46,7 +46,7 @@ ALIKE_M: Final = 0.05
 
 
 @dataclass(slots=True, eq=False)
-class State:
+class SearchState:
     """A world after some actions. The world is never changed."""
 
     world: World
@@ -55,7 +55,7 @@ class State:
     prices: Ints
     last: tuple[int, int] = (-1, -1)
     """The thing pushed last, and along which heading of the house."""
-    doubt: int = 0
+    penalty: int = 0
     """What was added to its promises because its pushes looked unlikely to lead on."""
     proposed: int = 0
     """Bits of the things whose interactions were proposed."""
@@ -71,7 +71,7 @@ class State:
 class SearchNode:
     """A world to look at, some things taken as fixed (bits), and the field of costs for that."""
 
-    state: State
+    state: SearchState
     banned: int
     costs: Costs
 
@@ -80,20 +80,20 @@ class SearchNode:
 class Candidate:
     """An interaction to ask of the world, from a pose, and what its world would begin with."""
 
-    state: State
+    state: SearchState
     pose: int
     horizon: int
     """Index into HORIZONS_DEG."""
     action: Action
     back: Costs
-    spare: Candidate | None = None
+    fallback: Candidate | None = None
     """The same from another node, where the agent may be less in the way."""
-    promise: int = 0
+    f_cost: int = 0
     last: tuple[int, int] = (-1, -1)
-    doubt: int = 0
+    penalty: int = 0
 
 
-def roughly(pose: Pose | None) -> tuple[int, ...]:
+def coarse_position(pose: Pose | None) -> tuple[int, ...]:
     """Return where a thing lies, coarsely; () for a held one."""
     return () if pose is None else (round(pose.x / ALIKE_M), round(pose.y / ALIKE_M))
 
@@ -130,26 +130,26 @@ def looks_between(horizon_deg: int, horizon: int) -> tuple[int, ...]:
     return (int(action),) * abs(steps)
 
 
-TRIES: Final = 10
+MAX_TRIES: Final = 10
 """Interactions asked of the world; those that are too heavy cost nothing and do not count, nor do
 pushes that go on as the last one did. Of the blocked episodes that 16 solve, 10 solve 98 % in two
 thirds of the time: nearly all of it goes to those that none solves."""
-ASKED: Final = 20
+MAX_QUERIES: Final = 20
 """Interactions asked in all, pushes that go on included."""
-CROWD: Final = 1
+MAX_MOVERS: Final = 1
 """Pushes that may move more things besides are not asked: they cost most and seldom help."""
-TRIES_MORE: Final = 2
+MAX_EXTRA_TRIES: Final = 2
 """Interactions still tried once a plan is known: of 400 plans a third one shortens 2."""
-ENOUGH: Final = 0.95
+ACCEPT_RATIO: Final = 0.95
 """A plan is good enough once no other promises to be shorter than this share of it."""
-VISITS: Final = 150
-SIGHTS: Final = 40
+MAX_EXPANSIONS: Final = 150
+MAX_VIEWPOINTS: Final = 40
 """Poses that are asked whether they see a thing."""
 PUSH_NODES: Final = 2
 """Nodes that a thing is pushed from: from one of them the agent may be in the way."""
-DOUBT: Final = 2
+TURN_PENALTY: Final = 2
 """What pushing a thing another way than just before adds to the guess: pushes go on as a rule."""
-UNLIKELY: Final = 2
+UNLIKELY_PENALTY: Final = 2
 """What a push that would not clear the way, as it seems, adds to the guess; it is asked later, not
 never: the seeming leaves out what turns or topples."""
 
@@ -170,43 +170,43 @@ _AGENTS_FAULT: Final = ("the agent is in the way", "would come to lie on the age
 _PUSHES: Final = (Action.PUSH_LEFT, Action.PUSH_RIGHT, Action.PUSH_AHEAD, Action.PUSH_BACK)
 
 
-def plan(world: World, limit: int) -> tuple[int, ...] | None:
+def search(world: World, limit: int) -> tuple[int, ...] | None:
     """Find actions, at most `limit`, that end with Done at the goal; None without any.
 
     The world is not changed. Bounded by counts; a pure function of the world.
     """
-    return _Search(world, limit).run()
+    return _BestFirstSearch(world, limit).run()
 
 
-class _Search:
+class _BestFirstSearch:
     def __init__(self, world: World, limit: int) -> None:
-        self.ground = PlanningProblem.of(world)
+        self.problem = PlanningProblem.of(world)
         self.best: tuple[int, ...] | None = None
         self.bound = limit + 1
         """A plan has to be shorter than this."""
-        self.tries_left = TRIES
-        self.asked_left = ASKED
+        self.tries_left = MAX_TRIES
+        self.queries_left = MAX_QUERIES
         self.queue: list[tuple[int, int, int, SearchNode | Candidate]] = []
         self.entries = 0
         self.known: dict[tuple[object, ...], int] = {}
         self._enter(world.copy(), ())
 
     def run(self) -> tuple[int, ...] | None:
-        for _ in range(VISITS):
-            if not self.queue or self.tries_left <= 0 or self.asked_left <= 0:
+        for _ in range(MAX_EXPANSIONS):
+            if not self.queue or self.tries_left <= 0 or self.queries_left <= 0:
                 break
-            promise, _, _, entry = heappop(self.queue)
-            if promise >= self.bound or (self.best and promise > self.bound * ENOUGH):
+            f_cost, _, _, entry = heappop(self.queue)
+            if f_cost >= self.bound or (self.best and f_cost > self.bound * ACCEPT_RATIO):
                 break
             if isinstance(entry, SearchNode):
-                self._visit(entry, promise)
+                self._expand(entry, f_cost)
             else:
                 self._attempt(entry)
         return self.best
 
-    def _push(self, promise: int, rank: int, entry: SearchNode | Candidate) -> None:
-        if promise < self.bound:
-            heappush(self.queue, (promise, rank, self.entries, entry))
+    def _push(self, f_cost: int, rank: int, entry: SearchNode | Candidate) -> None:
+        if f_cost < self.bound:
+            heappush(self.queue, (f_cost, rank, self.entries, entry))
             self.entries += 1
 
     def _enter(
@@ -214,91 +214,91 @@ class _Search:
         world: World,
         actions: tuple[int, ...],
         last: tuple[int, int] = (-1, -1),
-        doubt: int = 0,
+        penalty: int = 0,
     ) -> None:
         """Take up a world, unless it was reached as cheaply before."""
-        poses = tuple(roughly(world.items[k].pose) for k in self.ground.things)
+        poses = tuple(coarse_position(world.items[k].pose) for k in self.problem.objects)
         key = (world.i, world.j, world.quarter, world.horizon_deg, world.held, poses)
         if self.known.get(key, FAR) <= len(actions):
             return
         self.known[key] = len(actions)
-        masks, prices = self.ground.masks(world), self.ground.prices(world)
-        state = State(world, actions, masks, prices, last, doubt)
+        masks, prices = self.problem.masks(world), self.problem.prices(world)
+        state = SearchState(world, actions, masks, prices, last, penalty)
         self._consider(state, 0)
 
-    def _consider(self, state: State, banned: int) -> None:
+    def _consider(self, state: SearchState, banned: int) -> None:
         """Put a visit into the queue, where the goal may be reached at all."""
         if banned in state.visited:
             return
         state.visited.add(banned)
-        here = self.ground.pose(state.world)
-        costs = self.ground.costs(state.masks, banned, state.prices, here)
+        here = self.problem.pose(state.world)
+        costs = self.problem.costs(state.masks, banned, state.prices, here)
         ahead = int(costs[here])
         if ahead < FAR:
-            self._push(state.spent + ahead + 1 + state.doubt, 0, SearchNode(state, banned, costs))
+            self._push(state.spent + ahead + 1 + state.penalty, 0, SearchNode(state, banned, costs))
 
-    def _visit(self, visit: SearchNode, promise: int) -> None:
-        state, ground = visit.state, self.ground
-        pose = ground.pose(state.world)
-        poses, entered = ground.way(state.masks, visit.banned, state.prices, visit.costs, pose)
+    def _expand(self, node: SearchNode, f_cost: int) -> None:
+        state, problem = node.state, self.problem
+        pose = problem.pose(state.world)
+        poses, entered = problem.path(state.masks, node.banned, state.prices, node.costs, pose)
         bits = bits_in_order(entered.tolist())
         if not bits:
-            self._found(state, poses.tolist())
+            self._accept(state, poses.tolist())
             return
-        if visit.banned == 0:
-            self._go_round(state, pose)
-            if promise >= self.bound:
+        if node.banned == 0:
+            self._detour(state, pose)
+            if f_cost >= self.bound:
                 return
         for bit in bits:
-            self._consider(state, visit.banned | 1 << bit)
-        reach, back = ground.reach(state.masks, pose)
+            self._consider(state, node.banned | 1 << bit)
+        reach, back = problem.reach(state.masks, pose)
         full = state.world.held >= 0
         wanted = False
-        way = marks_on(poses.tolist(), ground.fixed.shape[1])
+        path = path_marks(poses.tolist(), problem.fixed.shape[1])
         for bit in bits:
             if not state.proposed >> bit & 1:
                 state.proposed |= 1 << bit
-                asset = state.world.items[ground.things[bit]].asset
+                asset = state.world.items[problem.objects[bit]].asset
                 wanted |= asset.pickable
                 if asset.pushable or not full:
-                    self._propose(visit, bit, reach, back, way)
+                    self._propose(node, bit, reach, back, path)
         if full and wanted:
             first = int(np.flatnonzero(entered)[0])
-            self._propose_drops(visit, poses[: first + 1].tolist(), reach, back)
+            self._propose_drops(node, poses[: first + 1].tolist(), reach, back)
 
-    def _go_round(self, state: State, pose: int) -> None:
+    def _detour(self, state: SearchState, pose: int) -> None:
         """Know the way without any interaction, where there is one: it bounds all others."""
-        ground = self.ground
-        costs = ground.costs(state.masks, EVERYTHING, state.prices, pose)
+        problem = self.problem
+        costs = problem.costs(state.masks, EVERYTHING, state.prices, pose)
         if costs[pose] < FAR:
-            poses, _ = ground.way(state.masks, EVERYTHING, state.prices, costs, pose)
-            self._found(state, poses.tolist())
+            poses, _ = problem.path(state.masks, EVERYTHING, state.prices, costs, pose)
+            self._accept(state, poses.tolist())
 
-    def _found(self, state: State, poses: Sequence[int]) -> None:
+    def _accept(self, state: SearchState, poses: Sequence[int]) -> None:
         actions = (*state.actions, *moves(poses), int(Action.DONE))
         if len(actions) < self.bound:
             if self.best is None:
-                self.tries_left = min(self.tries_left, TRIES_MORE)
+                self.tries_left = min(self.tries_left, MAX_EXTRA_TRIES)
             self.best, self.bound = actions, len(actions)
 
-    def _propose(self, visit: SearchNode, bit: int, reach: Costs, back: Costs, way: Ints) -> None:
+    def _propose(self, node: SearchNode, bit: int, reach: Costs, back: Costs, path: Ints) -> None:
         """Propose to push a thing, or to pick it up, from the cheapest poses that see it."""
-        state, ground = visit.state, self.ground
-        thing = ground.things[bit]
+        state, problem = node.state, self.problem
+        thing = problem.objects[bit]
         item = state.world.items[thing]
         if item.pose is None:
             return
         prices = state.prices.copy()
         prices[bit] = 0
-        after = ground.costs(state.masks, visit.banned, prices)
-        points = placed_shell(item.asset, item.pose).points
+        after = problem.costs(state.masks, node.banned, prices)
+        points = placed_occlusion_shape(item.asset, item.pose).points
         now = HORIZONS_DEG.index(state.world.horizon_deg)
         looks = np.abs(np.arange(len(HORIZONS_DEG)) - now)
-        found = sightings(points, reach, ground.ny, _VIEWS, looks, after)
+        found = viewpoints(points, reach, problem.ny, _VIEWS, looks, after)
         pick = item.asset.pickable
         probe = state.world.copy()
         places: list[tuple[int, int, int]] = []
-        for place in zip(*(f[:SIGHTS].tolist() for f in found), strict=True):
+        for place in zip(*(f[:MAX_VIEWPOINTS].tolist() for f in found), strict=True):
             if all(place[0] // 4 != known[0] // 4 for known in places):
                 self._place(probe, *place[:2])
                 if probe.target(pick=pick) == thing:
@@ -308,13 +308,13 @@ class _Search:
         if pick and places:
             self._offer(state, thing, Action.PICKUP, places, back)
         elif places:
-            clears = clearing(state.world, thing, way, ground.shape)
+            clears = clearing_pushes(state.world, thing, path, problem.shape)
             for action in _PUSHES:
                 self._offer(state, thing, action, places, back, clears)
 
     def _offer(
         self,
-        state: State,
+        state: SearchState,
         thing: int,
         action: Action,
         places: Sequence[tuple[int, int, int]],
@@ -324,69 +324,69 @@ class _Search:
         """Put an interaction into the queue, from the first place; the others are its spares."""
         entry = None
         for pose, horizon, cost in reversed(places):
-            doubt, last = state.doubt, (-1, -1)
+            penalty, last = state.penalty, (-1, -1)
             if action in PUSH_TURNS:
                 last = (thing, (pose + PUSH_TURNS[action]) % 4)
                 turn = (last[1] - state.last[1]) % 4 if state.last[0] == thing else 0
                 if turn == 2:  # noqa: PLR2004 - to and fro
                     continue
-                doubt += DOUBT if turn else 0
+                penalty += TURN_PENALTY if turn else 0
                 if last != state.last and not clears[last[1]]:
-                    doubt += UNLIKELY
-            promise = state.spent + cost + 1 + doubt
-            entry = Candidate(state, pose, horizon, action, back, entry, promise, last, doubt)
+                    penalty += UNLIKELY_PENALTY
+            f_cost = state.spent + cost + 1 + penalty
+            entry = Candidate(state, pose, horizon, action, back, entry, f_cost, last, penalty)
         if entry is not None:
-            self._push(entry.promise, _RANKS[action], entry)
+            self._push(entry.f_cost, _RANKS[action], entry)
 
     def _propose_drops(
-        self, visit: SearchNode, way: Sequence[int], reach: Costs, back: Costs
+        self, node: SearchNode, path: Sequence[int], reach: Costs, back: Costs
     ) -> None:
         """Propose to empty the hand on the way to the next thing to pick up, in any direction."""
-        state, ground = visit.state, self.ground
+        state, problem = node.state, self.problem
         prices = state.prices.copy()
-        for bit, thing in enumerate(ground.things):
+        for bit, thing in enumerate(problem.objects):
             if state.world.items[thing].asset.pickable:
                 prices[bit] = PICK_PRICE
-        after = ground.costs(state.masks, visit.banned, prices)
+        after = problem.costs(state.masks, node.banned, prices)
         horizon = HORIZONS_DEG.index(state.world.horizon_deg)
-        nodes = dict.fromkeys(way[place] // 4 for place in (0, len(way) // 2, len(way) - 1))
-        for node in nodes:
-            for pose in range(4 * node, 4 * node + 4):
-                cost = int(reach[pose]) + int(after[pose]) + 2 + state.doubt
+        nodes = dict.fromkeys(path[place] // 4 for place in (0, len(path) // 2, len(path) - 1))
+        for k in nodes:
+            for pose in range(4 * k, 4 * k + 4):
+                cost = int(reach[pose]) + int(after[pose]) + 2 + state.penalty
                 entry = Candidate(state, pose, horizon, Action.DROP, back)
                 self._push(state.spent + cost, _RANKS[Action.DROP], entry)
 
     def _attempt(self, entry: Candidate) -> None:
         """Ask the world; where it works, go on from there."""
-        state, ground = entry.state, self.ground
-        if entry.action in PUSH_TURNS and state.world.crowd(*entry.last) > CROWD:
+        state, problem = entry.state, self.problem
+        if entry.action in PUSH_TURNS and state.world.count_movers(*entry.last) > MAX_MOVERS:
             return
         world = state.world.copy()
         self._place(world, entry.pose, entry.horizon)
         result = world.step(entry.action)
         if result.reason != "too heavy":
-            self.asked_left -= 1
+            self.queries_left -= 1
             goes_on = result.success and entry.last == state.last
             self.tries_left -= not goes_on
         if result.success:
-            walk = moves(ground.walk(state.masks, entry.back, entry.pose))
+            walk = moves(problem.walk(state.masks, entry.back, entry.pose))
             looks = looks_between(state.world.horizon_deg, entry.horizon)
             actions = (*state.actions, *walk, *looks, int(entry.action))
-            self._enter(world, actions, entry.last, entry.doubt)
-        elif entry.spare is not None and result.reason in _AGENTS_FAULT:
-            self._push(entry.spare.promise, _RANKS[entry.action], entry.spare)
+            self._enter(world, actions, entry.last, entry.penalty)
+        elif entry.fallback is not None and result.reason in _AGENTS_FAULT:
+            self._push(entry.fallback.f_cost, _RANKS[entry.action], entry.fallback)
 
     def _place(self, world: World, pose: int, horizon: int) -> None:
         node, world.quarter = divmod(pose, 4)
-        world.i, world.j = divmod(node, self.ground.ny)
+        world.i, world.j = divmod(node, self.problem.ny)
         world.horizon_deg = HORIZONS_DEG[horizon]
 
 
-STEPS_AT_MOST: Final = 500
+MAX_STEPS: Final = 500
 """An episode ends after this many actions."""
 
 
-def solve(world: World, limit: int = STEPS_AT_MOST) -> Expert | None:
+def solve(world: World, limit: int = MAX_STEPS) -> Expert | None:
     """Plan from a world as it stands, and replay the plan in a world in the same state.
 
     Parameters
@@ -403,17 +403,17 @@ def solve(world: World, limit: int = STEPS_AT_MOST) -> Expert | None:
         be moved, or moving it does not help.
 
     """
-    actions = plan(world, limit)
+    actions = search(world, limit)
     return None if actions is None else replay(world.copy(), actions)
 
 
 def expert_of(
-    stage: HouseModel,
+    model: HouseModel,
     obstacles: Iterable[tuple[Asset, Pose]],
     start: tuple[int, int, int],
     goal: tuple[int, int],
-    model: PushModel = "force",
-    limit: int = STEPS_AT_MOST,
+    push_model: PushModel = "force",
+    limit: int = MAX_STEPS,
 ) -> Expert | None:
     """Solve an episode from its parts, and replay the plan in a fresh world.
 
@@ -427,17 +427,22 @@ def expert_of(
         Node i, j and quarter turn.
     goal
         Node i, j.
-    model, limit
+    push_model, limit
         As in `World`, as in `solve`.
 
     """
-    things = tuple(obstacles)
-    actions = plan(World(stage, things, start, goal, model), limit)
-    return None if actions is None else replay(World(stage, things, start, goal, model), actions)
+    objects = tuple(obstacles)
+    actions = search(World(model, objects, start, goal, push_model), limit)
+    return (
+        None if actions is None else replay(World(model, objects, start, goal, push_model), actions)
+    )
 
 
 def expert_of_episode(
-    stage: HouseModel, episode: Episode, assets: Mapping[str, Asset], model: PushModel = "force"
+    model: HouseModel,
+    episode: Episode,
+    assets: Mapping[str, Asset],
+    push_model: PushModel = "force",
 ) -> Expert | None:
     """Solve an episode.
 
@@ -447,10 +452,10 @@ def expert_of_episode(
         The stage is of another house.
 
     """
-    actions = plan(World.of_episode(stage, episode, assets, model), STEPS_AT_MOST)
+    actions = search(World.of_episode(model, episode, assets, push_model), MAX_STEPS)
     if actions is None:
         return None
-    return replay(World.of_episode(stage, episode, assets, model), actions)
+    return replay(World.of_episode(model, episode, assets, push_model), actions)
 
 
 def replay(world: World, actions: Sequence[int]) -> Expert | None:

@@ -19,7 +19,7 @@ from internav_data.geometry import (
 from internav_data.geometry.headings import TURNS, turned
 from internav_data.geometry.planar import segment_polygon_distance
 from internav_data.navigation import CLEARANCE_M, RADIUS_M
-from internav_data.physics.kdop import square_round
+from internav_data.physics.kdop import dop8_of_square
 from internav_data.physics.settle import settle
 from internav_data.records import Pose
 from internav_data.world.visibility import axis_distance
@@ -54,7 +54,9 @@ class DropObstructions(NamedTuple):
     """Gathers what reaches into an octagon of the house."""
 
 
-def drop(asset: Asset, agent: Vec2, heading: int, ground: DropObstructions) -> SettleResult | None:
+def drop(
+    asset: Asset, agent: Vec2, heading: int, obstructions: DropObstructions
+) -> SettleResult | None:
     """Try gap after gap at bearing after bearing; None where there is no room.
 
     The thing stands upright, turned as the agent is.
@@ -66,8 +68,8 @@ def drop(asset: Asset, agent: Vec2, heading: int, ground: DropObstructions) -> S
             ux, uy = turned(heading, *ahead)
             spot = _spot(plan, agent, ux, uy, gap)
             pose = Pose(*spot, 0.0, turn)
-            if _fits(plan, spot, agent, ground):
-                settled = _let_go(asset, pose, agent, ground)
+            if _fits(plan, spot, agent, obstructions):
+                settled = _let_go(asset, pose, agent, obstructions)
                 if settled is not None:
                     return settled
     return None
@@ -85,12 +87,12 @@ def _spot(plan: Polygons, agent: Vec2, ux: float, uy: float, gap: float) -> Vec2
     return round_m(agent[0] + far * ux), round_m(agent[1] + far * uy)
 
 
-def _fits(plan: Polygons, spot: Vec2, agent: Vec2, ground: DropObstructions) -> bool:
+def _fits(plan: Polygons, spot: Vec2, agent: Vec2, obstructions: DropObstructions) -> bool:
     """Whether there is room, and no wall in between."""
     there = Polygons(plan.vertices + np.array(spot), plan.offsets)
-    if any(clearance(there, other, ROOM_M) < ROOM_M for other in ground.solid):
+    if any(clearance(there, other, ROOM_M) < ROOM_M for other in obstructions.solid):
         return False
-    walls = ground.walls
+    walls = obstructions.walls
     return not _crosses(*agent, *spot, walls.vertices, walls.offsets)
 
 
@@ -103,13 +105,15 @@ def _crosses(ax: float, ay: float, bx: float, by: float, vertices: Floats, offse
     return False
 
 
-def _let_go(asset: Asset, pose: Pose, agent: Vec2, ground: DropObstructions) -> SettleResult | None:
+def _let_go(
+    asset: Asset, pose: Pose, agent: Vec2, obstructions: DropObstructions
+) -> SettleResult | None:
     reach = math.hypot(asset.size[0], asset.size[1]) / 2.0 + NEAR_M
-    around = square_round(pose.x, pose.y, reach)
-    settled = settle(asset, pose, ROOM_M, lambda: ground.bodies(around))
+    around = dop8_of_square(pose.x, pose.y, reach)
+    settled = settle(asset, pose, ROOM_M, lambda: obstructions.bodies(around))
     if settled.refusal:
         return None
     exact = footprint(asset, settled.pose)
-    if any(clearance(exact, other, ROOM_M) <= 0.0 for other in ground.solid):
+    if any(clearance(exact, other, ROOM_M) <= 0.0 for other in obstructions.solid):
         return None
     return settled if axis_distance(*agent, exact) >= CLEARANCE_M else None

@@ -9,7 +9,7 @@ import numpy as np
 
 from internav_data.geometry import Polygons, footprint, wall_footprints
 from internav_data.navigation import SPACING_M, Lattice, TangentGraph
-from internav_data.physics.kdop import NOWHERE, octagon_of_rectangle
+from internav_data.physics.kdop import EMPTY, dop8_of_rectangle
 from internav_data.physics.scene import Body, wall_body
 from internav_data.physics.sweep import extent_of
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from internav_data.physics.kdop import Dop8
     from internav_data.records import Asset, House, Pose, Vec2
 
-WAYS_KEPT: Final = 16
+MAX_TANGENT_GRAPHS: Final = 16
 """Any-angle graphs kept a house: one for each set of furniture that was moved."""
 
 
@@ -32,7 +32,7 @@ class MovableObject:
     pose: Pose | None
     """None while it is held."""
     footprint: Polygons
-    octagon: Dop8
+    dop8: Dop8
     low_m: float
     high_m: float
 
@@ -40,10 +40,10 @@ class MovableObject:
     def at(asset: Asset, pose: Pose | None) -> MovableObject:
         """Put an asset somewhere, or into a hand."""
         if pose is None:
-            return MovableObject(asset, None, Polygons.of([]), NOWHERE, np.inf, -np.inf)
+            return MovableObject(asset, None, Polygons.of([]), EMPTY, np.inf, -np.inf)
         extent = extent_of(asset, pose)
         return MovableObject(
-            asset, pose, footprint(asset, pose), extent.octagon, extent.low_m, extent.high_m
+            asset, pose, footprint(asset, pose), extent.dop8, extent.low_m, extent.high_m
         )
 
 
@@ -59,7 +59,7 @@ class HouseModel:
     house: House
     fixed: tuple[Body, ...]
     """Walls, then things that never move; rugs and their like left out."""
-    octagons: Floats
+    dop8s: Floats
     """How far each of `fixed` reaches in the plane, (n, 8)."""
     walls: Polygons
     footprints: Polygons
@@ -72,13 +72,13 @@ class HouseModel:
     """With all furniture in its place; never changed."""
     handles: tuple[int, ...]
     """The lattice's handles of `items`."""
-    _ways: dict[tuple[int, ...], TangentGraph] = field(default_factory=dict)
+    _tangent_graphs: dict[tuple[int, ...], TangentGraph] = field(default_factory=dict)
 
     @staticmethod
     def of(house: House) -> HouseModel:
         """Prepare a house for any number of worlds."""
         bodies = [wall_body(wall) for wall in house.walls]
-        octagons = [octagon_of_rectangle(w.x_min, w.y_min, w.x_max, w.y_max) for w in house.walls]
+        dop8s = [dop8_of_rectangle(w.x_min, w.y_min, w.x_max, w.y_max) for w in house.walls]
         walls = wall_footprints(house.walls)
         plans, items, object_ids = [walls], [], []
         for thing in house.objects:
@@ -88,7 +88,7 @@ class HouseModel:
                 object_ids.append(thing.object_id)
             elif asset.blocks:
                 bodies.append(Body(asset, thing.pose, moves=False))
-                octagons.append(extent_of(asset, thing.pose).octagon)
+                dop8s.append(extent_of(asset, thing.pose).dop8)
                 plans.append(footprint(asset, thing.pose))
         footprints = Polygons.joined(plans)
         lattice = Lattice.of_polygons(footprints, house.outline)
@@ -96,7 +96,7 @@ class HouseModel:
         return HouseModel(
             house=house,
             fixed=tuple(bodies),
-            octagons=np.array(octagons, dtype=np.float64).reshape(-1, 8),
+            dop8s=np.array(dop8s, dtype=np.float64).reshape(-1, 8),
             walls=walls,
             footprints=footprints,
             items=tuple(items),
@@ -105,17 +105,17 @@ class HouseModel:
             handles=handles,
         )
 
-    def ways(self, displaced: tuple[int, ...] = ()) -> TangentGraph:
+    def tangent_graph(self, displaced: tuple[int, ...] = ()) -> TangentGraph:
         """Any-angle ways among all furniture but some items (indices, ascending)."""
-        finder = self._ways.get(displaced)
-        if finder is None:
+        graph = self._tangent_graphs.get(displaced)
+        if graph is None:
             left = (item.footprint for k, item in enumerate(self.items) if k not in displaced)
-            finder = TangentGraph.of_polygons(Polygons.joined([self.footprints, *left]))
-            if len(self._ways) >= WAYS_KEPT:
+            graph = TangentGraph.of_polygons(Polygons.joined([self.footprints, *left]))
+            if len(self._tangent_graphs) >= MAX_TANGENT_GRAPHS:
                 # The oldest goes, but never the one with all furniture in its place.
-                del self._ways[next(key for key in self._ways if key)]
-            self._ways[displaced] = finder
-        return finder
+                del self._tangent_graphs[next(key for key in self._tangent_graphs if key)]
+            self._tangent_graphs[displaced] = graph
+        return graph
 
     def shortest_path_m(self, here: Vec2, goal: Vec2) -> float | None:
         """Any-angle distance with all furniture in its place and no obstacle.
@@ -123,7 +123,7 @@ class HouseModel:
         Where the agent stands off the clear ground (furniture was moved away there), that of the
         nearest clear node plus the straight distance to it.
         """
-        clear = self.ways()
+        clear = self.tangent_graph()
         if clear.can_stand(here):
             return clear.distance(here, goal)
         steps = self.lattice.distances(*_node(goal))
@@ -134,15 +134,15 @@ class HouseModel:
         # The first of equally near ones, in order of i, then j.
         best = int(np.argmin(np.round(x * x + y * y, 9)))
         there = (SPACING_M * int(nodes[best, 0]), SPACING_M * int(nodes[best, 1]))
-        way = clear.distance(there, goal)
+        path = clear.distance(there, goal)
         straight = float(np.sqrt(x[best] * x[best] + y[best] * y[best]))
-        return None if way is None else way + straight
+        return None if path is None else path + straight
 
 
 def _node(point: Vec2) -> tuple[int, int]:
     return round(point[0] / SPACING_M), round(point[1] / SPACING_M)
 
 
-def octagon_rows(items: Iterable[MovableObject]) -> Floats:
+def dop8_rows(items: Iterable[MovableObject]) -> Floats:
     """Octagons of items, (n, 8)."""
-    return np.array([item.octagon for item in items], dtype=np.float64).reshape(-1, 8)
+    return np.array([item.dop8 for item in items], dtype=np.float64).reshape(-1, 8)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from internav_data.core.typing import Floats, Ints
     from internav_data.records import Asset, Part, Pose
 
-POINTS_AT_MOST: Final = 32
+MAX_POINTS: Final = 32
 """Visibility points of an asset: all parts' centres first, then corners, evenly chosen."""
 
 
@@ -70,7 +70,7 @@ def moved_planes(planes: Floats, matrix: Floats, shift: tuple[float, float, floa
 
 
 @lru_cache(maxsize=2048)
-def shell_of(asset: Asset) -> OcclusionShape:
+def occlusion_shape(asset: Asset) -> OcclusionShape:
     """Shell in the asset's frame; cached, read-only."""
     planes = [_part_planes(part) for part in asset.parts]
     starts = np.cumsum([0, *(len(p) for p in planes)]).astype(np.int64)
@@ -81,8 +81,8 @@ def shell_of(asset: Asset) -> OcclusionShape:
 def _visibility_points(asset: Asset) -> tuple[Floats, Ints]:
     corners, starts = asset_corners(asset)
     parts = len(starts) - 1
-    centres = np.array([part.centre for part in asset.parts])[:POINTS_AT_MOST]
-    room = min(POINTS_AT_MOST - len(centres), len(corners))
+    centres = np.array([part.centre for part in asset.parts])[:MAX_POINTS]
+    room = min(MAX_POINTS - len(centres), len(corners))
     # Evenly spaced rows touch every part where there are at least as many as parts.
     rows = [k * len(corners) // room for k in range(room)]
     owner = np.repeat(np.arange(parts), np.diff(starts))
@@ -92,9 +92,9 @@ def _visibility_points(asset: Asset) -> tuple[Floats, Ints]:
 
 
 @lru_cache(maxsize=4096)
-def placed_shell(asset: Asset, pose: Pose) -> OcclusionShape:
+def placed_occlusion_shape(asset: Asset, pose: Pose) -> OcclusionShape:
     """Shell of a thing where it lies in the house; cached, read-only."""
-    own = shell_of(asset)
+    own = occlusion_shape(asset)
     matrix = rotation_matrix(pose.quaternion)
     planes = moved_planes(own.planes, matrix, (pose.x, pose.y, pose.z))
     x, y, z = own.points[:, 0], own.points[:, 1], own.points[:, 2]

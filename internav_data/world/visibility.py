@@ -116,7 +116,7 @@ _DOWN: Final = {
 }
 
 
-def view_from(x: float, y: float, ahead: tuple[float, float], horizon_deg: int) -> CameraPose:
+def camera_pose(x: float, y: float, ahead: tuple[float, float], horizon_deg: int) -> CameraPose:
     """Return the view of an agent that stands at (x, y) and looks so far down."""
     return CameraPose(np.array([x, y, CAMERA_M]), *ahead, *_DOWN[horizon_deg])
 
@@ -124,28 +124,28 @@ def view_from(x: float, y: float, ahead: tuple[float, float], horizon_deg: int) 
 class Occluders:
     """Everything near the agent that can hide something, gathered once for several questions."""
 
-    def __init__(self, shells: Sequence[OcclusionShape]) -> None:
-        self._shells = shells
-        planes = [shell.planes for shell in shells]
+    def __init__(self, shapes: Sequence[OcclusionShape]) -> None:
+        self._shapes = shapes
+        planes = [shape.planes for shape in shapes]
         counts = [0]
         self._first = []
         height = 0
-        for shell in shells:
+        for shape in shapes:
             self._first.append(len(counts) - 1)
-            counts += (shell.starts[1:] + height).tolist()
-            height += len(shell.planes)
+            counts += (shape.starts[1:] + height).tolist()
+            height += len(shape.planes)
         self._planes: Floats = np.concatenate(planes) if planes else np.empty((0, 4))
         self._starts: Ints = np.array(counts, dtype=np.int64)
 
     def seen(self, view: CameraPose, place: int) -> bool:
         """Whether the thing of one of the shells is seen and within reach."""
-        shell = self._shells[place]
+        shape = self._shapes[place]
         return bool(
             _seen(
                 view.eye,
                 (view.ahead_x, view.ahead_y, view.cos_down, view.sin_down),
-                shell.points,
-                shell.owners,
+                shape.points,
+                shape.owners,
                 self._first[place],
                 self._planes,
                 self._starts,

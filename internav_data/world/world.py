@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Final
 from internav_data.geometry import Polygons, clearance, round_m
 from internav_data.geometry.headings import HEADINGS
 from internav_data.navigation import CLEARANCE_M, SPACING_M
-from internav_data.physics.kdop import grown, square_round, touching
-from internav_data.physics.push import AGENT_M, TOUCH_M, crowd, push
+from internav_data.physics.kdop import dop8_of_square, grown, touching
+from internav_data.physics.push import AGENT_M, TOUCH_M, count_movers, push
 from internav_data.physics.scene import Body
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import (
@@ -26,9 +26,9 @@ from internav_data.world.actions import (
     StepResult,
 )
 from internav_data.world.drop import DropObstructions, drop
-from internav_data.world.house_model import HouseModel, MovableObject, octagon_rows
-from internav_data.world.occlusion import placed_shell
-from internav_data.world.visibility import REACH_M, Occluders, axis_distance, view_from
+from internav_data.world.house_model import HouseModel, MovableObject, dop8_rows
+from internav_data.world.occlusion import placed_occlusion_shape
+from internav_data.world.visibility import REACH_M, Occluders, axis_distance, camera_pose
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -46,7 +46,7 @@ GOAL_M: Final = 0.2
 """Done succeeds within this of the goal."""
 REST_M: Final = 0.01
 """What begins this much above another thing's lowest point, and not above its top, rests on it."""
-DROP_ROUND_M: Final = 2.5
+MAX_DROP_M: Final = 2.5
 """No drop reaches farther: the widest gap, the largest thing that can be picked up, and room."""
 
 _STEPPED: Final = StepResult(Action.MOVE_AHEAD, success=True)
@@ -93,7 +93,7 @@ def _push(world: World, action: Action) -> StepResult:
     target = world.target(pick=False)
     if target < 0:
         return _failed(action, "nothing to push in sight and reach")
-    pushed = world.pushed(target, (world.quarter + PUSH_TURNS[action]) % 4)
+    pushed = world.simulate_push(target, (world.quarter + PUSH_TURNS[action]) % 4)
     if not pushed.success:
         reason: Reason = pushed.reason
         return StepResult(
@@ -144,7 +144,7 @@ def _pick(world: World, action: Action) -> StepResult:
 def carries(world: World, index: int) -> bool:
     """Whether another movable thing rests on a thing, and would hang in the air without it."""
     below = world.items[index]
-    for key, _ in world.near(grown(below.octagon, TOUCH_M), index):
+    for key, _ in world.near(grown(below.dop8, TOUCH_M), index):
         if key >= len(world.items):
             break
         above = world.items[key]
@@ -160,15 +160,15 @@ def _drop(world: World, action: Action) -> StepResult:
     if world.held < 0:
         return _failed(action, "hands are empty")
     target, (x, y) = world.held, world.position
-    around = world.near(square_round(x, y, DROP_ROUND_M))
-    solid: list[Polygons] = [world.stage.footprints]
+    around = world.near(dop8_of_square(x, y, MAX_DROP_M))
+    solid: list[Polygons] = [world.model.footprints]
     solid += [world.items[k].footprint for k, _ in around if k < len(world.items)]
 
-    def bodies(octagon: Dop8) -> Sequence[Body]:
-        return [body for _, body in world.near(octagon)]
+    def bodies(dop8: Dop8) -> Sequence[Body]:
+        return [body for _, body in world.near(dop8)]
 
-    ground = DropObstructions(world.stage.walls, solid, bodies)
-    settled = drop(world.items[target].asset, world.position, world.quarter, ground)
+    obstructions = DropObstructions(world.model.walls, solid, bodies)
+    settled = drop(world.items[target].asset, world.position, world.quarter, obstructions)
     if settled is None:
         return StepResult(action, success=False, reason="no room to drop it", target=target)
     moved = ((target, settled.pose),)
@@ -210,7 +210,7 @@ class World:
     The state is small and plain: the agent's node, quarter turn and horizon, each thing's pose, and
     what is held. `step` is a function of it and the action alone, to the last bit.
 
-    Things are numbered: the house's movable furniture first (`stage.items`), then obstacles.
+    Things are numbered: the house's movable furniture first (`model.items`), then obstacles.
 
     Attributes
     ----------
@@ -231,8 +231,8 @@ class World:
     """
 
     __slots__ = (
+        "_dop8s",
         "_handles",
-        "_octagons",
         "goal",
         "held",
         "horizon_deg",
@@ -241,40 +241,43 @@ class World:
         "j",
         "lattice",
         "model",
+        "push_model",
         "quarter",
-        "stage",
     )
 
-    stage: HouseModel
+    model: HouseModel
     items: tuple[MovableObject, ...]
     lattice: Lattice
-    _octagons: NDArray[np.float64]
+    _dop8s: NDArray[np.float64]
     _handles: tuple[int, ...]
 
     def __init__(
         self,
-        stage: HouseModel,
+        model: HouseModel,
         obstacles: Iterable[tuple[Asset, Pose]],
         start: tuple[int, int, int],
         goal: tuple[int, int],
-        model: PushModel = "force",
+        push_model: PushModel = "force",
     ) -> None:
         """Put obstacles and an agent (node i, j and quarter turn) into a house."""
         extra = [MovableObject.at(asset, pose) for asset, pose in obstacles]
-        self.stage = stage
-        self.lattice = stage.lattice.copy()
-        self._handles = stage.handles + tuple(self.lattice.add(e.footprint) for e in extra)
-        self.items = stage.items + tuple(extra)
-        self._octagons = octagon_rows(self.items)
+        self.model = model
+        self.lattice = model.lattice.copy()
+        self._handles = model.handles + tuple(self.lattice.add(e.footprint) for e in extra)
+        self.items = model.items + tuple(extra)
+        self._dop8s = dop8_rows(self.items)
         self.i, self.j, self.quarter = start[0], start[1], start[2] % 4
         self.horizon_deg = START_HORIZON_DEG
         self.held = -1
         self.goal = goal
-        self.model: PushModel = model
+        self.push_model: PushModel = push_model
 
     @staticmethod
     def of_episode(
-        stage: HouseModel, episode: Episode, assets: Mapping[str, Asset], model: PushModel = "force"
+        model: HouseModel,
+        episode: Episode,
+        assets: Mapping[str, Asset],
+        push_model: PushModel = "force",
     ) -> World:
         """Set up an episode at its start.
 
@@ -283,18 +286,18 @@ class World:
         UsageError
             The stage is of another house.
         """
-        if stage.house.scene_id != episode.scene_id:
+        if model.house.scene_id != episode.scene_id:
             raise UsageError(
                 f"World.of_episode: episode {episode.episode_id} belongs to {episode.scene_id}, "
-                f"got the house {stage.house.scene_id}; build the stage of its own house"
+                f"got the house {model.house.scene_id}; build the stage of its own house"
             )
         start, goal = episode.start, episode.goal
         return World(
-            stage,
+            model,
             [(assets[o.asset_id], o.pose) for o in episode.obstacles],
             (start.i, start.j, start.yaw_deg // 90),
             (goal.i, goal.j),
-            model,
+            push_model,
         )
 
     def copy(self) -> World:
@@ -316,7 +319,7 @@ class World:
     @property
     def obstacles(self) -> range:
         """Indices of the obstacles among `items`."""
-        return range(len(self.stage.items), len(self.items))
+        return range(len(self.model.items), len(self.items))
 
     def steps(self) -> int | None:
         """Lattice distance to the goal, things as they lie; None when cut off."""
@@ -324,96 +327,102 @@ class World:
 
     def obstructed_path_m(self) -> float | None:
         """Any-angle distance to the goal, things as they lie; None when cut off."""
-        return self.way_between(self.position, self.goal_point)
+        return self.path_m_between(self.position, self.goal_point)
 
-    def way_between(self, here: Vec2, there: Vec2) -> float | None:
+    def path_m_between(self, here: Vec2, there: Vec2) -> float | None:
         """Any-angle distance between two points, things as they lie; None when cut off."""
-        finder, loose = self._loose()
-        way = finder.distance(here, there, loose)
-        return None if way is None else round_m(way)
+        graph, loose = self._loose()
+        path = graph.distance(here, there, loose)
+        return None if path is None else round_m(path)
 
-    def way(self) -> tuple[float, NDArray[np.float64]] | None:
+    def path(self) -> tuple[float, NDArray[np.float64]] | None:
         """Any-angle distance to the goal and the way's points (n, 2); None when cut off."""
-        finder, loose = self._loose()
-        found = finder.way(self.position, self.goal_point, loose)
+        graph, loose = self._loose()
+        found = graph.way(self.position, self.goal_point, loose)
         return None if found is None else (round_m(found[0]), found[1])
 
     def _loose(self) -> tuple[TangentGraph, Polygons]:
         """Finder of ways among what has not moved, and all else that stands in the way."""
-        home = self.stage.items
+        home = self.model.items
         displaced = tuple(k for k, item in enumerate(home) if self.items[k] is not item)
         loose = [self.items[k].footprint for k in (*displaced, *self.obstacles)]
-        return self.stage.ways(displaced), Polygons.joined(loose)
+        return self.model.tangent_graph(displaced), Polygons.joined(loose)
 
     def shortest_path_m(self) -> float | None:
         """Any-angle distance to the goal without obstacles, furniture in its place."""
-        way = self.stage.shortest_path_m(self.position, self.goal_point)
-        return None if way is None else round_m(way)
+        path = self.model.shortest_path_m(self.position, self.goal_point)
+        return None if path is None else round_m(path)
 
     def target(self, *, pick: bool) -> int:
         """Index of the closest visible thing to pick up, or to push; -1 without one."""
         x, y = self.position
-        round_here = square_round(x, y, REACH_M)
-        near = touching(self._octagons, round_here)
+        round_here = dop8_of_square(x, y, REACH_M)
+        near = touching(self._dop8s, round_here)
         wanted = []
         for k in near:
             asset = self.items[k].asset
             if asset.pickable if pick else asset.pushable:
-                wanted.append((self.away(k, x, y), k))
+                wanted.append((self.distance_to(k, x, y), k))
         if not wanted:
             return -1
-        shells = [placed_shell(item.asset, pose) for k in near for item, pose in [self._at(k)]]
-        fixed = [self.stage.fixed[k] for k in touching(self.stage.octagons, round_here)]
-        screen = Occluders(shells + [placed_shell(body.asset, body.pose) for body in fixed])
-        view = view_from(x, y, HEADINGS[self.quarter], self.horizon_deg)
+        shapes = [
+            placed_occlusion_shape(item.asset, pose) for k in near for item, pose in [self._at(k)]
+        ]
+        fixed = [self.model.fixed[k] for k in touching(self.model.dop8s, round_here)]
+        occluders = Occluders(
+            shapes + [placed_occlusion_shape(body.asset, body.pose) for body in fixed]
+        )
+        view = camera_pose(x, y, HEADINGS[self.quarter], self.horizon_deg)
         for _, k in sorted(wanted):
-            if screen.seen(view, near.index(k)):
+            if occluders.seen(view, near.index(k)):
                 return k
         return -1
 
-    def pushed(self, index: int, heading: int, *, agent: bool = True) -> PushResult:
+    def simulate_push(self, index: int, heading: int, *, agent: bool = True) -> PushResult:
         """Answer what pushing a thing along a heading of the house (0 … 3) would do."""
         item, pose = self._at(index)
         gap = math.inf
         if agent:
             x, y = self.position
-            loose = touching(self._octagons, square_round(x, y, AGENT_M))
-            gap = min((self.away(k, x, y) for k in loose), default=math.inf)
+            loose = touching(self._dop8s, dop8_of_square(x, y, AGENT_M))
+            gap = min((self.distance_to(k, x, y) for k in loose), default=math.inf)
         return push(
             item.asset,
             pose,
             heading,
-            lambda octagon: self.near(octagon, index),
+            lambda dop8: self.near(dop8, index),
             self.position if agent else None,
             agent_gap_m=gap,
-            model=self.model,
+            model=self.push_model,
         )
 
-    def crowd(self, index: int, heading: int) -> int:
+    def count_movers(self, index: int, heading: int) -> int:
         """Count the things that pushing one along a heading may move besides it."""
         item, pose = self._at(index)
-        return crowd(item.asset, pose, heading, lambda o: self.near(o, index), self.model)
+        return count_movers(
+            item.asset, pose, heading, lambda o: self.near(o, index), self.push_model
+        )
 
     def put(self, changes: Iterable[tuple[int, Pose | None]]) -> None:
         """Lay things elsewhere, or (pose None) take them off the floor: no questions asked."""
         lattice = self.lattice.copy()
         items, handles = list(self.items), list(self._handles)
-        octagons = self._octagons.copy()
+        dop8s = self._dop8s.copy()
         for k, pose in changes:
             if items[k].pose is not None:
                 lattice.remove(handles[k])
-            home = self.stage.items[k] if k < len(self.stage.items) else None
+            home = self.model.items[k] if k < len(self.model.items) else None
             back = home is not None and home.pose == pose
             items[k] = home if back and home is not None else MovableObject.at(items[k].asset, pose)
-            octagons[k] = items[k].octagon
+            dop8s[k] = items[k].dop8
             handles[k] = -1 if pose is None else lattice.add(items[k].footprint)
         self.lattice, self.items = lattice, tuple(items)
-        self._handles, self._octagons = tuple(handles), octagons
+        self._handles, self._dop8s = tuple(handles), dop8s
 
     def digest(self) -> str:
         """Sha256 of the state: equal for equal worlds, whatever happened before."""
-        goal, model = self.goal, self.model.encode()
-        parts = [self.stage.house.scene_id.encode(), model]
+        goal, push_model = self.goal, self.push_model.encode()
+        parts = [self.model.house.scene_id.encode(), push_model]
         parts.append(
             struct.pack("<7i", self.i, self.j, self.quarter, self.horizon_deg, self.held, *goal)
         )
@@ -443,21 +452,21 @@ class World:
             )
         return item, item.pose
 
-    def away(self, index: int, x: float, y: float) -> float:
+    def distance_to(self, index: int, x: float, y: float) -> float:
         """Distance from the agent's axis to a thing's footprint (its box, where it has none)."""
         item = self.items[index]
         if len(item.footprint):
             return axis_distance(x, y, item.footprint)
-        east, _, north, _, west, _, south, _ = item.octagon
+        east, _, north, _, west, _, south, _ = item.dop8
         return math.hypot(max(-west - x, 0.0, x - east), max(-south - y, 0.0, y - north))
 
-    def near(self, octagon: Dop8, skip: int = -1) -> list[tuple[int, Body]]:
+    def near(self, dop8: Dop8, skip: int = -1) -> list[tuple[int, Body]]:
         """Bodies that reach into an octagon: items by their index, then what is fixed."""
         bodies = []
-        for k in touching(self._octagons, octagon):
+        for k in touching(self._dop8s, dop8):
             if k != skip:
                 item, pose = self._at(k)
                 bodies.append((k, Body(item.asset, pose, moves=True)))
         first = len(self.items)
-        bodies += [(first + k, self.stage.fixed[k]) for k in touching(self.stage.octagons, octagon)]
+        bodies += [(first + k, self.model.fixed[k]) for k in touching(self.model.dop8s, dop8)]
         return bodies

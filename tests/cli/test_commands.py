@@ -211,13 +211,15 @@ def test_no_dataset_is_corrupt_data(tmp_path):
 
 
 def test_the_resolved_config_reads_back(tmp_path):
-    told = run("generate", "--print-config", "--rooms", "2-4", "--set", "episodes.spots=77")
+    told = run(
+        "generate", "--print-config", "--rooms", "2-4", "--set", "episodes.max_spawn_tries=77"
+    )
     path = tmp_path / "mine.toml"
     path.write_text(told.stdout)
     again = run("generate", "--print-config", "--config", path)
     assert again.stdout == told.stdout
     assert 'rooms = "2-4"' in told.stdout
-    assert "spots = 77" in told.stdout
+    assert "max_spawn_tries = 77" in told.stdout
 
 
 def test_a_dry_run_tells_time_and_size(tmp_path):

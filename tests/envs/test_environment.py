@@ -245,7 +245,7 @@ def test_experts_reach_the_goal_by_the_push_model_of_their_dataset(small, tmp_pa
     env = make(out)
     assert open_source(out).push_model == model
     env.reset(seed=0)
-    assert env.unwrapped._slot.run.world.model == model
+    assert env.unwrapped._slot.run.world.push_model == model
     for episode in load_dataset(out):
         env.reset(options={"episode_id": episode.episode_id})
         for action in episode.expert.actions:

@@ -45,7 +45,7 @@ def test_what_is_kept_on_disk_changes_nothing(houses, pool, episodes, tmp_path, 
     counts = []
     for _ in range(2):
         held = ResultCache(tmp_path)
-        monkeypatch.setattr("internav_data.physics.registry.solutions", lambda held=held: held)
+        monkeypatch.setattr("internav_data.physics.registry.result_cache", lambda held=held: held)
         assert build_episodes(houses[6], 6, pool) == episodes[6]
         counts.append(held.count())
     assert counts[0] == counts[1] > 50  # the second time nothing was solved
@@ -207,11 +207,11 @@ def test_obstacles_stay_at_rest_in_a_whole_scene_of_bullet(houses, episodes):
 
 def test_outcomes_and_expert_are_those_of_a_fresh_world(houses, episodes):
     for scene, batch in episodes.items():
-        stage = HouseModel.of(houses[scene])
+        model = HouseModel.of(houses[scene])
         for episode in batch:
 
-            def world(stage=stage, episode=episode):
-                return World.of_episode(stage, episode, catalogue().assets)
+            def world(model=model, episode=episode):
+                return World.of_episode(model, episode, catalogue().assets)
 
             assert tuple(o.outcomes for o in episode.obstacles) == outcomes_of(world())
             assert replay(world(), episode.expert.actions) == episode.expert
@@ -247,8 +247,8 @@ def test_an_episode_without_expert_is_drawn_again_and_counted(refused, pool):
     draws = sum(batch.redraws.values())
     # With one draw less than it took, there is none.
     with pytest.raises(QuarantineError, match=rf"in {draws} draws .*no expert: \d"):
-        build_batch(house, 1, pool, EpisodeConfig(redraws=draws), first=index)
-    again = build_batch(house, 1, pool, EpisodeConfig(redraws=draws + 1), first=index)
+        build_batch(house, 1, pool, EpisodeConfig(max_redraws=draws), first=index)
+    again = build_batch(house, 1, pool, EpisodeConfig(max_redraws=draws + 1), first=index)
     assert again == batch
 
 
@@ -276,10 +276,10 @@ def test_redraws_of_a_batch_are_those_of_its_episodes(houses, pool):
 
 def test_the_push_model_is_the_configs(houses, pool):
     kick = EpisodeConfig(push_model="kick", keep_unsolvable=True)
-    stage = HouseModel.of(houses[1])
+    model = HouseModel.of(houses[1])
     made = build_episodes(houses[1], 3, pool, kick)
     for episode in made:
-        world = World.of_episode(stage, episode, catalogue().assets, "kick")
+        world = World.of_episode(model, episode, catalogue().assets, "kick")
         assert tuple(o.outcomes for o in episode.obstacles) == outcomes_of(world)
         assert episode.expert is None or replay(world, episode.expert.actions) == episode.expert
     forced = build_episodes(houses[1], 3, pool, EpisodeConfig(keep_unsolvable=True))
@@ -289,7 +289,7 @@ def test_the_push_model_is_the_configs(houses, pool):
 
 
 def test_an_impossible_episode_is_quarantined_and_named(houses, pool):
-    config = EpisodeConfig(redraws=2, min_shortest_path_m=1000.0)
+    config = EpisodeConfig(max_redraws=2, min_shortest_path_m=1000.0)
     with pytest.raises(QuarantineError, match=r"scene-000006, episode 0: .*blocked in 2 draws"):
         build_episodes(houses[6], 1, pool, config)
 
@@ -297,11 +297,11 @@ def test_an_impossible_episode_is_quarantined_and_named(houses, pool):
 @pytest.mark.parametrize(
     ("field", "value"),
     [
-        ("spots", 0),
-        ("redraws", -1),
+        ("max_spawn_tries", 0),
+        ("max_redraws", -1),
         ("gap_m", -0.1),
         ("min_shortest_path_m", 0.0),
-        ("sideways_m", -1.0),
+        ("lateral_std_m", -1.0),
     ],
 )
 def test_settings_that_cannot_be_meant_are_refused(field, value):

@@ -18,9 +18,9 @@ def tables():
     out = []
     for scene in (0, 6):
         house = build_house(0, scene, HouseConfig(), catalogue())
-        stage = HouseModel.of(house)
+        model = HouseModel.of(house)
         for episode in build_episodes(house, 3, catalogue().spawnable):
-            world = World.of_episode(stage, episode, catalogue().assets)
+            world = World.of_episode(model, episode, catalogue().assets)
             before = world.digest()
             out.append((episode, world, outcomes_of(world)))
             assert world.digest() == before
@@ -67,13 +67,13 @@ def test_distances_are_those_of_fresh_graphs(tables):
                 poses = {k: item.pose for k, item in enumerate(world.items)}
                 poses[index] = None
                 if outcome.action != PICK:
-                    pushed = world.pushed(index, heading, agent=False)
+                    pushed = world.simulate_push(index, heading, agent=False)
                     poses |= {index: pushed.pose, **dict(pushed.moved)}
                 there = world.copy()
                 there.put(poses.items())
                 loose = [item.footprint for item in there.items]
-                everything = Polygons.joined([world.stage.footprints, *loose])
-                fresh = Lattice.of_polygons(everything, world.stage.house.outline)
+                everything = Polygons.joined([world.model.footprints, *loose])
+                fresh = Lattice.of_polygons(everything, world.model.house.outline)
                 assert outcome.path_steps_after == fresh.distance(start, goal)
                 way = TangentGraph.of_polygons(everything).distance(
                     (episode.start.x, episode.start.y), (episode.goal.x, episode.goal.y)

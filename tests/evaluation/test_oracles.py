@@ -49,7 +49,7 @@ def test_where_cut_off_the_planner_walks_as_near_as_it_can(played_data, rows):
             continue
         blocked += 1
         world = world_of(played_data, episode)
-        clear = world.stage.lattice.distances(*world.goal)
+        clear = world.model.lattice.distances(*world.goal)
         labels = world.lattice.components()
         mine = labels[world.i, world.j]
         reach = [clear[i, j] for i, j in np.argwhere(labels == mine) if clear[i, j] >= 0]

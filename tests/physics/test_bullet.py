@@ -8,7 +8,7 @@ import pytest
 from internav_data.geometry import yaw_quaternion
 from internav_data.physics import AgentCollider, Body, PhysicsScene, wall_body
 from internav_data.physics.engines.bullet import Bullet, bullet
-from internav_data.physics.engines.bullet_scene import SCENES_A_WORLD, Builder, pybullet
+from internav_data.physics.engines.bullet_scene import SCENES_PER_WORLD, Builder, pybullet
 from internav_data.physics.push import PUSH_SPECS
 from internav_data.records import Asset, Part, Pose, Wall
 
@@ -55,21 +55,21 @@ def scenes(count):
         ]
         if rng.random() < 0.5:
             around.append(wall_body(Wall(1.5, -2.0, 1.62, 2.0, 0.0, 2.6)))
-        column = AgentCollider(0.1, 0.85, 0.21) if rng.random() < 0.3 else None
+        collider = AgentCollider(0.1, 0.85, 0.21) if rng.random() < 0.3 else None
         start = Pose(0.0, 0.0, 0.001 if k % 5 else 0.01, yaw_quaternion(15 * (k % 24)))
-        made.append((PhysicsScene((Body(thing, start, moves=True), *around), column), k % 5 == 0))
+        made.append((PhysicsScene((Body(thing, start, moves=True), *around), collider), k % 5 == 0))
     return made
 
 
-def answer(engine, setting, falls):
-    return engine.settle(setting) if falls else engine.push(setting, PUSH_SPECS["force"])
+def answer(engine, scene, falls):
+    return engine.settle(scene) if falls else engine.push(scene, PUSH_SPECS["force"])
 
 
 @pytest.fixture
 def fresh(tmp_path):
     """Bullet with an empty world for every scene."""
     client = pybullet.connect(pybullet.DIRECT)
-    yield Bullet(Builder(client, tmp_path, scenes_a_world=1))
+    yield Bullet(Builder(client, tmp_path, scenes_per_world=1))
     pybullet.disconnect(client)
 
 
@@ -82,9 +82,9 @@ def test_an_emptied_world_is_as_good_as_new(fresh):
 
 
 def test_what_an_interrupt_left_in_a_world_is_swept_away(fresh, monkeypatch):
-    asked = [setting for setting, falls in scenes(60) if not falls]
-    lone = next(setting for setting in asked if len(setting.bodies) == 1)
-    crowded = next(setting for setting in asked if len(setting.bodies) > 1)
+    asked = [scene for scene, falls in scenes(60) if not falls]
+    lone = next(scene for scene in asked if len(scene.bodies) == 1)
+    crowded = next(scene for scene in asked if len(scene.bodies) > 1)
     expected = fresh.push(lone, PUSH_SPECS["force"])
     real = Builder._place
 
@@ -108,19 +108,19 @@ def test_a_world_is_given_up_before_it_leaks_much(monkeypatch):
     monkeypatch.setattr(Builder, "_begin", lambda self: begun.append(real(self)))
     engine = bullet()
     lone = PhysicsScene((Body(THINGS[2], Pose(0.0, 0.0, 0.001, UPRIGHT), moves=True),))
-    for _ in range(3 * SCENES_A_WORLD):
+    for _ in range(3 * SCENES_PER_WORLD):
         engine._builder.build(lone)
     assert len(begun) == 3
     assert pybullet.getNumBodies(engine._builder.client) == 1 + len(lone.bodies)
 
 
 def test_what_a_users_own_client_sets_changes_nothing():
-    asked = [setting for setting, falls in scenes(30) if not falls]
-    expected = [bullet().push(setting, PUSH_SPECS["force"]) for setting in asked]
+    asked = [scene for scene, falls in scenes(30) if not falls]
+    expected = [bullet().push(scene, PUSH_SPECS["force"]) for scene in asked]
     client = pybullet.connect(pybullet.DIRECT)
     # Bullet's own global, whichever client it is set by.
     pybullet.setPhysicsEngineParameter(contactBreakingThreshold=0.02, physicsClientId=client)
-    answers = [bullet().push(setting, PUSH_SPECS["force"]) for setting in asked]
+    answers = [bullet().push(scene, PUSH_SPECS["force"]) for scene in asked]
     pybullet.disconnect(client)
     assert answers == expected
 

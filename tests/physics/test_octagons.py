@@ -11,10 +11,10 @@ from internav_data.geometry import yaw_quaternion
 from internav_data.geometry.headings import turned
 from internav_data.physics.frames import Frame
 from internav_data.physics.kdop import (
-    NOWHERE,
+    EMPTY,
+    dop8_of_disc,
+    dop8_of_rectangle,
     grown,
-    octagon_of_disc,
-    octagon_of_rectangle,
     overlap,
     touching,
     widen,
@@ -31,7 +31,7 @@ SHAPES = st.lists(st.tuples(SPOTS, SPOTS), min_size=1, max_size=6).map(
 )
 
 
-def octagon_of(shape):
+def dop8_of(shape):
     """By the kernel, from corners that lie at some height and are not turned."""
     xy = shapely.get_coordinates(shape)
     reach = np.full(8, -math.inf)
@@ -39,10 +39,10 @@ def octagon_of(shape):
     return tuple(reach.tolist())
 
 
-def polygon_of(octagon):
+def polygon_of(dop8):
     """What an octagon means: where eight half-planes meet."""
     out = shapely.box(-50, -50, 50, 50)
-    for (nx, ny), far in zip(NORMALS, octagon, strict=True):
+    for (nx, ny), far in zip(NORMALS, dop8, strict=True):
         size = math.hypot(nx, ny)
         ux, uy = nx / size, ny / size
         x, y = far / size * ux, far / size * uy
@@ -54,17 +54,17 @@ def polygon_of(octagon):
 @settings(max_examples=60, deadline=None)
 @given(SHAPES)
 def test_an_octagon_holds_its_shape_and_touches_it_on_every_side(shape):
-    octagon = octagon_of(shape)
-    assert polygon_of(octagon).buffer(1e-6).covers(shape)
+    dop8 = dop8_of(shape)
+    assert polygon_of(dop8).buffer(1e-6).covers(shape)
     corners = shapely.get_coordinates(shape)
-    for (nx, ny), far in zip(NORMALS, octagon, strict=True):
+    for (nx, ny), far in zip(NORMALS, dop8, strict=True):
         assert abs(max(nx * x + ny * y for x, y in corners.tolist()) - far) < NEARLY
 
 
 @settings(max_examples=120, deadline=None)
 @given(SHAPES, SHAPES)
 def test_overlap_says_yes_wherever_shapes_do(one, other):
-    a, b = octagon_of(one), octagon_of(other)
+    a, b = dop8_of(one), dop8_of(other)
     assert overlap(a, b) == overlap(b, a)
     if one.intersection(other).area > 1e-6:
         assert overlap(a, b)
@@ -79,45 +79,45 @@ def test_overlap_says_yes_wherever_shapes_do(one, other):
 @settings(max_examples=60, deadline=None)
 @given(SHAPES, SHAPES, st.floats(0.001, 1.0))
 def test_a_margin_reaches_all_within_it(one, other, margin):
-    a = grown(octagon_of(one), margin)
+    a = grown(dop8_of(one), margin)
     if one.distance(other) < margin - 1e-6:
-        assert overlap(a, octagon_of(other))
+        assert overlap(a, dop8_of(other))
     assert polygon_of(a).buffer(1e-6).covers(one.buffer(margin))
 
 
 @given(SPOTS, SPOTS, st.floats(0.01, 1.0))
 def test_a_disc_lies_inside_its_octagon_and_touches_all_sides(x, y, radius):
-    octagon = octagon_of_disc(x, y, radius)
-    for (nx, ny), far in zip(NORMALS, octagon, strict=True):
+    dop8 = dop8_of_disc(x, y, radius)
+    for (nx, ny), far in zip(NORMALS, dop8, strict=True):
         assert abs(nx * x + ny * y + radius * math.hypot(nx, ny) - far) < NEARLY
 
 
 @given(SPOTS, SPOTS, st.floats(0.0, 2.0), st.floats(0.0, 2.0))
 def test_a_rectangle_is_its_own_octagon(x, y, wide, deep):
-    expected = octagon_of(shapely.box(x, y, x + wide + 0.01, y + deep + 0.01))
-    found = octagon_of_rectangle(x, y, x + wide + 0.01, y + deep + 0.01)
+    expected = dop8_of(shapely.box(x, y, x + wide + 0.01, y + deep + 0.01))
+    found = dop8_of_rectangle(x, y, x + wide + 0.01, y + deep + 0.01)
     assert np.allclose(found, expected, rtol=0.0, atol=NEARLY)
 
 
 @settings(max_examples=60, deadline=None)
 @given(st.lists(SHAPES, max_size=6), SHAPES)
 def test_touching_is_overlap_with_each(shapes, one):
-    octagons = [octagon_of(shape) for shape in shapes] + [NOWHERE]
-    rows = np.array(octagons).reshape(-1, 8)
-    wanted = octagon_of(one)
-    expected = [k for k, other in enumerate(octagons) if overlap(other, wanted)]
+    dop8s = [dop8_of(shape) for shape in shapes] + [EMPTY]
+    rows = np.array(dop8s).reshape(-1, 8)
+    wanted = dop8_of(one)
+    expected = [k for k, other in enumerate(dop8s) if overlap(other, wanted)]
     assert touching(rows, wanted) == expected
-    assert len(octagons) - 1 not in expected, "what is held touches nothing"
+    assert len(dop8s) - 1 not in expected, "what is held touches nothing"
 
 
 def test_shapes_side_by_side_do_not_overlap():
-    one = octagon_of_rectangle(0.0, 0.0, 1.0, 1.0)
+    one = dop8_of_rectangle(0.0, 0.0, 1.0, 1.0)
     for dx, dy in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.5), (1.0, 1.0)):
-        assert not overlap(one, octagon_of_rectangle(dx, dy, dx + 1.0, dy + 1.0))
+        assert not overlap(one, dop8_of_rectangle(dx, dy, dx + 1.0, dy + 1.0))
     # Slanted neighbours whose boxes overlap are told apart: boxes alone would not.
-    diamond = octagon_of(shapely.Polygon([(1.0, 0.1), (1.9, 1.0), (1.0, 1.9), (0.1, 1.0)]))
-    assert not overlap(diamond, octagon_of_rectangle(0.0, 0.0, 0.5, 0.5))
-    assert overlap(diamond, octagon_of_rectangle(0.0, 0.0, 0.6, 0.6))
+    diamond = dop8_of(shapely.Polygon([(1.0, 0.1), (1.9, 1.0), (1.0, 1.9), (0.1, 1.0)]))
+    assert not overlap(diamond, dop8_of_rectangle(0.0, 0.0, 0.5, 0.5))
+    assert overlap(diamond, dop8_of_rectangle(0.0, 0.0, 0.6, 0.6))
 
 
 @settings(max_examples=60, deadline=None)
@@ -125,8 +125,8 @@ def test_shapes_side_by_side_do_not_overlap():
 def test_leaving_a_frame_turns_an_octagon_as_it_turns_points(shape, heading, x, y):
     points = [turned(heading, *point) for point in shapely.get_coordinates(shape).tolist()]
     moved = shapely.Polygon([(px + x, py + y) for px, py in points])
-    left = Frame(x, y, heading).leave_octagon(octagon_of(shape))
-    assert np.allclose(left, octagon_of(moved), rtol=0.0, atol=NEARLY)
+    left = Frame(x, y, heading).leave_dop8(dop8_of(shape))
+    assert np.allclose(left, dop8_of(moved), rtol=0.0, atol=NEARLY)
 
 
 @settings(max_examples=100, deadline=None)
@@ -137,6 +137,6 @@ def test_a_kernel_turns_and_moves_corners(shape, yaw, x, y):
     widen(reach, np.column_stack([xy, np.zeros(len(xy))]), x, y, *yaw_quaternion(yaw))
     c, s = math.cos(math.radians(yaw)), math.sin(math.radians(yaw))
     points = [(c * px - s * py + x, s * px + c * py + y) for px, py in xy.tolist()]
-    expected = octagon_of(shapely.MultiPoint(points))
+    expected = dop8_of(shapely.MultiPoint(points))
     # Stored quaternions are rounded to 1e-6, two metres away.
     assert np.allclose(reach, expected, rtol=0.0, atol=2e-5)

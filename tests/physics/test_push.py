@@ -10,7 +10,7 @@ from internav_data.geometry import asset_corners, footprint, transform, yaw_quat
 from internav_data.physics import Body, push, wall_body
 from internav_data.physics.engines.bullet import pybullet
 from internav_data.physics.kdop import overlap
-from internav_data.physics.push import AGENT_LEAST_M, PUSH_SPECS
+from internav_data.physics.push import AGENT_MIN_M, PUSH_SPECS
 from internav_data.physics.sweep import extent_of
 from internav_data.records import Asset, Part, Pose, Wall
 from internav_data.world.visibility import axis_distance
@@ -49,10 +49,10 @@ def alone(box):
 
 def among(*bodies):
     """Everything whose octagon overlaps one, as a world gathers it."""
-    extents = [extent_of(body.asset, body.pose).octagon for body in bodies]
+    extents = [extent_of(body.asset, body.pose).dop8 for body in bodies]
 
-    def near(octagon):
-        return [(k, bodies[k]) for k, extent in enumerate(extents) if overlap(extent, octagon)]
+    def near(dop8):
+        return [(k, bodies[k]) for k, extent in enumerate(extents) if overlap(extent, dop8)]
 
     return near
 
@@ -141,7 +141,7 @@ def test_what_a_neighbour_runs_into_takes_part():
     wall = wall_body(Wall(5.2, 0.0, 5.32, 8.0, 0.0, 2.6))
     pushed = push(low_box(3.0, 0.4), STANDING, 0, among(*row, wall))
     for k, pose in pushed.moved:
-        assert extent_of(row[k].asset, pose).octagon[0] <= 5.2 + 0.002
+        assert extent_of(row[k].asset, pose).dop8[0] <= 5.2 + 0.002
 
 
 def test_what_only_a_neighbour_reaches_takes_part_too():
@@ -161,9 +161,7 @@ def test_nothing_pulled_ends_inside_the_agent(distance):
     thing = low_box(5.0, 0.5)
     agent = (3.0 - 0.3 - distance, 4.0)
     pulled = push(thing, STANDING, 2, alone, agent, agent_gap_m=distance)
-    assert (
-        axis_distance(*agent, footprint(thing, pulled.pose)) >= min(distance, AGENT_LEAST_M) - 2e-3
-    )
+    assert axis_distance(*agent, footprint(thing, pulled.pose)) >= min(distance, AGENT_MIN_M) - 2e-3
     assert pulled.pose.x >= 3.0 - (distance - 0.2) - 2e-3
 
 

@@ -10,11 +10,11 @@ from internav_data.houses import HouseConfig, build_house
 from internav_data.physics import Body, push, wall_body
 from internav_data.physics.engines.bullet import Bullet
 from internav_data.physics.kdop import overlap
-from internav_data.physics.push import crowd
+from internav_data.physics.push import count_movers
 from internav_data.physics.sweep import extent_of
 from internav_data.records import Asset, Part, Pose, Wall
 from internav_data.world import Action, HouseModel, World
-from internav_data.world.house_model import WAYS_KEPT
+from internav_data.world.house_model import MAX_TANGENT_GRAPHS
 from internav_data.world.visibility import axis_distance
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -31,10 +31,10 @@ SMALL = box("small beside the agent", (0.3, 0.3, 0.2), 2.0)
 
 
 def among(*bodies):
-    extents = [extent_of(body.asset, body.pose).octagon for body in bodies]
+    extents = [extent_of(body.asset, body.pose).dop8 for body in bodies]
 
-    def near(octagon):
-        return [(k, bodies[k]) for k, extent in enumerate(extents) if overlap(extent, octagon)]
+    def near(dop8):
+        return [(k, bodies[k]) for k, extent in enumerate(extents) if overlap(extent, dop8)]
 
     return near
 
@@ -53,9 +53,9 @@ def solved(monkeypatch):
     asked = []
     solve = Bullet.push
 
-    def watched(self, setting, shove):
-        asked.append(setting)
-        return solve(self, setting, shove)
+    def watched(self, scene, spec):
+        asked.append(scene)
+        return solve(self, scene, spec)
 
     monkeypatch.setattr(Bullet, "push", watched)
     return asked
@@ -82,7 +82,7 @@ def test_an_agent_that_something_comes_near_takes_part(solved):
     agent = (there.x + 0.3, there.y)  # what is run into would come to rest at its feet
     solved.clear()
     beside = push(CRATE, pose, 0, near, agent, agent_gap_m=0.22)
-    assert all(setting.column is not None for setting in solved)
+    assert all(scene.agent is not None for scene in solved)
     assert solved
     assert beside != without
     ends = [(CRATE, beside.pose), *((SMALL, there) for _, there in beside.moved)]
@@ -161,28 +161,28 @@ def test_a_crowd_is_what_may_be_moved():
 def crowd_of(pose, loose, wall, asset=CRATE):
     """Crowds of a push east and of one west."""
     near = among(*loose, wall)
-    return crowd(asset, pose, 0, near), crowd(asset, pose, 2, near)
+    return count_movers(asset, pose, 0, near), count_movers(asset, pose, 2, near)
 
 
 def test_a_crowd_is_never_fewer_than_what_moves():
     house = build_house(0, 6, HouseConfig(), catalogue())
-    stage = HouseModel.of(house)
-    world = World(stage, [], (4, 4, 0), (8, 8))
+    model = HouseModel.of(house)
+    world = World(model, [], (4, 4, 0), (8, 8))
     checked = 0
     for index, heading in itertools.product(range(0, len(world.items), 2), range(4)):
         if world.items[index].asset.pushable:
-            moved = world.pushed(index, heading, agent=False).moved
-            assert world.crowd(index, heading) >= len(moved)
+            moved = world.simulate_push(index, heading, agent=False).moved
+            assert world.count_movers(index, heading) >= len(moved)
             checked += bool(moved)
     assert checked
 
 
 def test_the_graph_with_all_furniture_is_kept():
-    stage = HouseModel.of(build_house(0, 6, HouseConfig(), catalogue()))
-    home = stage.ways()
-    sets = list(itertools.combinations(range(len(stage.items)), 2))[:20]
+    model = HouseModel.of(build_house(0, 6, HouseConfig(), catalogue()))
+    home = model.tangent_graph()
+    sets = list(itertools.combinations(range(len(model.items)), 2))[:20]
     assert len(sets) == 20
-    graphs = [stage.ways(displaced) for displaced in sets]
-    assert stage.ways(()) is home
-    assert stage.ways(sets[-1]) is graphs[-1], "the latest are kept too"
-    assert len(stage._ways) == WAYS_KEPT
+    graphs = [model.tangent_graph(displaced) for displaced in sets]
+    assert model.tangent_graph(()) is home
+    assert model.tangent_graph(sets[-1]) is graphs[-1], "the latest are kept too"
+    assert len(model._tangent_graphs) == MAX_TANGENT_GRAPHS

@@ -22,10 +22,10 @@ from internav_data.physics import (
 )
 from internav_data.physics.cache import (
     CachedEngine,
-    _read_motion,
-    _read_rest,
-    _write_motion,
-    _write_rest,
+    _read_push,
+    _read_settle,
+    _write_push,
+    _write_settle,
     origin,
 )
 from internav_data.physics.engines.bullet import bullet
@@ -56,7 +56,7 @@ LONE = PhysicsScene((Body(BOX, Pose(0.0, 0.0, 0.001, UPRIGHT), moves=True),))
 PAIR = PhysicsScene((*LONE.bodies, Body(BOX, Pose(0.7, 0.1, 0.001, UPRIGHT), moves=True)))
 
 
-SHOVE = PUSH_SPECS["force"]
+FORCE = PUSH_SPECS["force"]
 
 
 class Counting:
@@ -67,28 +67,28 @@ class Counting:
     def __init__(self):
         self.asked = 0
 
-    def push(self, setting, shove):
+    def push(self, scene, spec):
         self.asked += 1
-        return bullet().push(setting, shove)
+        return bullet().push(scene, spec)
 
-    def settle(self, setting):
+    def settle(self, scene):
         self.asked += 1
-        return bullet().settle(setting)
+        return bullet().settle(scene)
 
 
 def remembering(folder, origin="here", engine=None):
     return CachedEngine(engine or Counting(), ResultCache(folder), origin)
 
 
-@pytest.mark.parametrize("setting", [LONE, PAIR], ids=["lone", "pair"])
-def test_a_later_process_reads_what_was_solved_to_the_last_bit(tmp_path, setting):
+@pytest.mark.parametrize("scene", [LONE, PAIR], ids=["lone", "pair"])
+def test_a_later_process_reads_what_was_solved_to_the_last_bit(tmp_path, scene):
     first = remembering(tmp_path)
-    pushed, settled = first.push(setting, SHOVE), first.settle(setting)
+    pushed, settled = first.push(scene, FORCE), first.settle(scene)
     assert first.engine.asked == 2
-    first.solutions.flush()
+    first.result_cache.flush()
     later = remembering(tmp_path)
-    assert later.push(setting, SHOVE) == pushed == bullet().push(setting, SHOVE)
-    assert later.settle(setting) == settled == bullet().settle(setting)
+    assert later.push(scene, FORCE) == pushed == bullet().push(scene, FORCE)
+    assert later.settle(scene) == settled == bullet().settle(scene)
     assert later.engine.asked == 0
 
 
@@ -96,27 +96,27 @@ def test_every_difference_in_what_is_asked_is_another_question(tmp_path):
     engine = remembering(tmp_path)
     body = LONE.bodies[0]
     asked = [
-        (LONE, SHOVE),
+        (LONE, FORCE),
         (LONE, PUSH_SPECS["kick"]),
-        (PAIR, SHOVE),
-        (PhysicsScene((replace(body, asset=replace(BOX, friction=0.6)),)), SHOVE),
-        (PhysicsScene((replace(body, asset=replace(BOX, mass_kg=3.5)),)), SHOVE),
-        (PhysicsScene((replace(body, pose=Pose(0.0, 0.0, 0.001, (0.0, 0.0, 1.0, 0.0))),)), SHOVE),
-        (PhysicsScene((body, replace(PAIR.bodies[1], moves=False))), SHOVE),
+        (PAIR, FORCE),
+        (PhysicsScene((replace(body, asset=replace(BOX, friction=0.6)),)), FORCE),
+        (PhysicsScene((replace(body, asset=replace(BOX, mass_kg=3.5)),)), FORCE),
+        (PhysicsScene((replace(body, pose=Pose(0.0, 0.0, 0.001, (0.0, 0.0, 1.0, 0.0))),)), FORCE),
+        (PhysicsScene((body, replace(PAIR.bodies[1], moves=False))), FORCE),
     ]
-    for setting, shove in asked:
-        engine.push(setting, shove)
+    for scene, spec in asked:
+        engine.push(scene, spec)
     engine.settle(LONE)
     assert engine.engine.asked == len(asked) + 1
-    assert engine.solutions.count() == len(asked) + 1
+    assert engine.result_cache.count() == len(asked) + 1
 
 
 def test_other_rules_or_machines_are_not_believed(tmp_path):
     first = remembering(tmp_path)
-    first.push(LONE, SHOVE)
-    first.solutions.flush()
+    first.push(LONE, FORCE)
+    first.result_cache.flush()
     later = remembering(tmp_path, origin="another processor")
-    later.push(LONE, SHOVE)
+    later.push(LONE, FORCE)
     assert later.engine.asked == 1
 
 
@@ -181,7 +181,7 @@ poses = st.builds(lambda *n: Pose(*n[:3], n[3:]), *[finite] * 7)
 paths = st.integers(1, 3).flatmap(lambda n: st.binary(min_size=28 * n, max_size=28 * n))
 
 
-motions = st.builds(
+push_solutions = st.builds(
     lambda movers, seconds, at_rest: PushSolution(
         tuple(m[0] for m in movers),
         tuple(m[1] for m in movers),
@@ -195,48 +195,48 @@ motions = st.builds(
 )
 
 
-@given(motions)
-def test_motions_come_back_as_they_were(motion):
-    count, written = len(motion.poses), _write_motion(motion)
-    assert repr(_read_motion(written, count)) == repr(motion)  # tells -0.0 from 0.0
-    assert all(_read_motion(written[:k], count) is None for k in range(len(written)))
-    assert _read_motion(written + b"x", count) is None
-    assert _read_motion(written, count + 1) is None
-    assert _read_motion(written, count - 1) is None
+@given(push_solutions)
+def test_motions_come_back_as_they_were(solution):
+    count, written = len(solution.poses), _write_push(solution)
+    assert repr(_read_push(written, count)) == repr(solution)  # tells -0.0 from 0.0
+    assert all(_read_push(written[:k], count) is None for k in range(len(written)))
+    assert _read_push(written + b"x", count) is None
+    assert _read_push(written, count + 1) is None
+    assert _read_push(written, count - 1) is None
 
 
-@given(motions, st.sampled_from([math.nan, math.inf, -math.inf]))
-def test_a_motion_that_is_not_finite_is_none(motion, number):
-    pose = replace(motion.poses[-1], y=number)
+@given(push_solutions, st.sampled_from([math.nan, math.inf, -math.inf]))
+def test_a_motion_that_is_not_finite_is_none(solution, number):
+    pose = replace(solution.poses[-1], y=number)
     for wrong in (
-        replace(motion, poses=(*motion.poses[:-1], pose)),
-        replace(motion, seconds=number),
-        replace(motion, sweeps=((number, *motion.sweeps[0][1:]), *motion.sweeps[1:])),
-        replace(motion, paths=(*motion.paths[:-1], b"")),
-        replace(motion, paths=(*motion.paths[:-1], b"abc")),
+        replace(solution, poses=(*solution.poses[:-1], pose)),
+        replace(solution, seconds=number),
+        replace(solution, sweeps=((number, *solution.sweeps[0][1:]), *solution.sweeps[1:])),
+        replace(solution, paths=(*solution.paths[:-1], b"")),
+        replace(solution, paths=(*solution.paths[:-1], b"abc")),
     ):
-        assert _read_motion(_write_motion(wrong), len(motion.poses)) is None
+        assert _read_push(_write_push(wrong), len(solution.poses)) is None
 
 
 @given(poses, finite, finite, finite, st.booleans())
 def test_rests_come_back_as_they_were(pose, seconds, penetration_m, reach_m, at_rest):
     rest = SettleSolution(pose, seconds, at_rest, penetration_m, reach_m)
-    assert repr(_read_rest(_write_rest(rest))) == repr(rest)
-    assert _read_rest(_write_rest(rest)[:-1]) is None
-    assert _read_rest(_write_rest(replace(rest, reach_m=math.nan))) is None
+    assert repr(_read_settle(_write_settle(rest))) == repr(rest)
+    assert _read_settle(_write_settle(rest)[:-1]) is None
+    assert _read_settle(_write_settle(replace(rest, reach_m=math.nan))) is None
 
 
 @given(st.binary(max_size=400), st.integers(0, 3))
 def test_no_bytes_make_reading_fail(value, movers):
-    _read_motion(value, movers)
-    _read_rest(value)
+    _read_push(value, movers)
+    _read_settle(value)
 
 
 def kept(folder):
     engine = remembering(folder)
-    motion = engine.push(LONE, SHOVE)
-    engine.solutions.flush()
-    return motion
+    solution = engine.push(LONE, FORCE)
+    engine.result_cache.flush()
+    return solution
 
 
 def rows(folder, *question):
@@ -245,25 +245,25 @@ def rows(folder, *question):
 
 
 def test_a_damaged_value_is_solved_anew(tmp_path):
-    motion = kept(tmp_path)
+    solution = kept(tmp_path)
     [(key, value)] = rows(tmp_path, "SELECT key, value FROM solutions")
     for at in (0, 5, len(value) - 1):
         damaged = bytearray(value)
         damaged[at] ^= 1
         rows(tmp_path, "UPDATE solutions SET value = ? WHERE key = ?", (bytes(damaged), key))
         later = remembering(tmp_path)
-        assert later.push(LONE, SHOVE) == motion
+        assert later.push(LONE, FORCE) == solution
         assert later.engine.asked == 1
     rows(tmp_path, "UPDATE solutions SET value = 'text'")
-    assert remembering(tmp_path).push(LONE, SHOVE) == motion
+    assert remembering(tmp_path).push(LONE, FORCE) == solution
 
 
 @pytest.mark.parametrize("content", [b"", b"no database, but a text\n" * 400])
 def test_what_is_no_database_is_begun_anew(tmp_path, content):
     (tmp_path / FILE_NAME).write_bytes(content)
-    motion = kept(tmp_path)
+    solution = kept(tmp_path)
     later = remembering(tmp_path)
-    assert later.push(LONE, SHOVE) == motion
+    assert later.push(LONE, FORCE) == solution
     assert later.engine.asked == 0
 
 
@@ -278,19 +278,19 @@ def test_what_is_no_database_is_begun_anew(tmp_path, content):
 )
 def test_another_database_is_begun_anew(tmp_path, schema):
     rows(tmp_path, schema)
-    motion = kept(tmp_path)
+    solution = kept(tmp_path)
     later = remembering(tmp_path)
-    assert later.push(LONE, SHOVE) == motion
+    assert later.push(LONE, FORCE) == solution
     assert later.engine.asked == 0
 
 
 @pytest.mark.parametrize("where", [0.0, 0.3, 0.6])
 def test_a_file_damaged_anywhere_costs_no_answer_and_is_begun_anew(tmp_path, where):
     engine = remembering(tmp_path)
-    motion = engine.push(LONE, SHOVE)
+    solution = engine.push(LONE, FORCE)
     for k in range(200):
-        engine.solutions.put(bytes([k]) * 32, bytes(3000))
-    engine.solutions.flush()
+        engine.result_cache.put(bytes([k]) * 32, bytes(3000))
+    engine.result_cache.flush()
     path = tmp_path / FILE_NAME
     with path.open("r+b") as file:
         file.seek(int(where * path.stat().st_size))
@@ -298,41 +298,41 @@ def test_a_file_damaged_anywhere_costs_no_answer_and_is_begun_anew(tmp_path, whe
     asked = [bytes([k]) * 32 for k in range(200)]
     for _ in range(2):
         later = remembering(tmp_path)
-        assert {later.solutions.get(key) for key in asked} <= {None, bytes(3000)}
-        assert later.push(LONE, SHOVE) == engine.push(LONE, SHOVE) == motion
-    assert kept(tmp_path) == motion
-    assert remembering(tmp_path).solutions.count() >= 1
+        assert {later.result_cache.get(key) for key in asked} <= {None, bytes(3000)}
+        assert later.push(LONE, FORCE) == engine.push(LONE, FORCE) == solution
+    assert kept(tmp_path) == solution
+    assert remembering(tmp_path).result_cache.count() >= 1
 
 
 def test_a_folder_that_cannot_be_made_keeps_nothing(tmp_path):
     (tmp_path / "file").write_text("in the way")
     engine = remembering(tmp_path / "file" / "below")
-    assert engine.push(LONE, SHOVE) == bullet().push(LONE, SHOVE)
-    assert engine.solutions.count() == 0
+    assert engine.push(LONE, FORCE) == bullet().push(LONE, FORCE)
+    assert engine.result_cache.count() == 0
 
 
 def test_a_read_only_file_is_read(tmp_path):
     kept(tmp_path)
     engine = remembering(tmp_path)
-    engine.solutions._file.execute("PRAGMA query_only = ON")
-    engine.push(LONE, SHOVE)
+    engine.result_cache._file.execute("PRAGMA query_only = ON")
+    engine.push(LONE, FORCE)
     assert engine.engine.asked == 0
-    engine.push(PAIR, SHOVE)
-    assert engine.solutions.count() == 1
+    engine.push(PAIR, FORCE)
+    assert engine.result_cache.count() == 1
 
 
 def test_a_writer_who_is_waited_for_in_vain_costs_no_answer(tmp_path, monkeypatch):
     monkeypatch.setattr("internav_data.physics.result_cache._OPENING_S", 0.2)
-    motion = kept(tmp_path)
+    solution = kept(tmp_path)
     held = remembering(tmp_path)
     with contextlib.closing(opened(tmp_path)) as other:
         other.execute("BEGIN EXCLUSIVE")
         shut_out = remembering(tmp_path)
         for engine in (held, shut_out):
-            assert engine.push(LONE, SHOVE) == motion
-            engine.solutions.flush()
-    assert not shut_out.solutions.is_open
-    assert held.push(LONE, SHOVE) == remembering(tmp_path).push(LONE, SHOVE) == motion
+            assert engine.push(LONE, FORCE) == solution
+            engine.result_cache.flush()
+    assert not shut_out.result_cache.is_open
+    assert held.push(LONE, FORCE) == remembering(tmp_path).push(LONE, FORCE) == solution
 
 
 def opened(folder):
@@ -340,13 +340,13 @@ def opened(folder):
 
 
 def test_solving_anew_believes_nothing_that_is_kept(tmp_path, monkeypatch):
-    monkeypatch.setattr("internav_data.physics.registry.solutions", lambda: held)
+    monkeypatch.setattr("internav_data.physics.registry.result_cache", lambda: held)
     held = ResultCache(tmp_path)
     engine = engine_of_this_process()
-    lie = replace(engine.push(LONE, SHOVE), seconds=123.0)
-    held.put(engine._key(repr(SHOVE), LONE), _write_motion(lie))
+    lie = replace(engine.push(LONE, FORCE), seconds=123.0)
+    held.put(engine._key(repr(FORCE), LONE), _write_push(lie))
     held.flush()
-    assert engine_of_this_process().push(LONE, SHOVE) == lie
+    assert engine_of_this_process().push(LONE, FORCE) == lie
     with cache_disabled():
-        assert engine_of_this_process().push(LONE, SHOVE) == bullet().push(LONE, SHOVE) != lie
-    assert engine_of_this_process().push(LONE, SHOVE) == lie
+        assert engine_of_this_process().push(LONE, FORCE) == bullet().push(LONE, FORCE) != lie
+    assert engine_of_this_process().push(LONE, FORCE) == lie

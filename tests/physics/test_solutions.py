@@ -15,7 +15,7 @@ from internav_data.physics.result_cache import FILE_NAME, ResultCache, cache_fol
 
 def test_a_full_file_is_emptied(tmp_path, monkeypatch):
     module = sys.modules["internav_data.physics.result_cache"]
-    monkeypatch.setattr(module, "BYTES_AT_MOST", 1_200_000)
+    monkeypatch.setattr(module, "MAX_BYTES", 1_200_000)
     held, counts = ResultCache(tmp_path), []
     for k in range(1000):
         held.put(k.to_bytes(32, "little"), os.urandom(3000))

@@ -12,8 +12,8 @@ from internav_data.physics import Body, push
 from internav_data.physics.engines.bullet import Bullet
 from internav_data.physics.frames import Frame
 from internav_data.physics.kdop import overlap
-from internav_data.physics.narrow_phase import met_on_path, outline_of, outline_of_column
-from internav_data.physics.sweep import KEPT_M, about_middle, extent_of, trail_of
+from internav_data.physics.narrow_phase import met_on_path, prisms_of, prisms_of_collider
+from internav_data.physics.sweep import KEPT_M, centred_corners, extent_of, sweep_recorder
 from internav_data.records import Asset, Part, Pose
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -38,7 +38,7 @@ TABLE = asset(
 
 def hulls(thing, middle, turn):
     """Plan and heights of each part, its body's centre of mass and orientation given."""
-    matrix, corners = rotation_matrix(turn), about_middle(thing)
+    matrix, corners = rotation_matrix(turn), centred_corners(thing)
     placed, first = corners @ matrix.T + np.array(middle), 0
     for part in thing.parts:
         count = len(part_corners(part))
@@ -53,7 +53,7 @@ def gap(one, other):
 
 
 def placed(thing, pose):
-    middle = -about_middle(thing)[0] + np.array(part_corners(thing.parts[0]))[0]
+    middle = -centred_corners(thing)[0] + np.array(part_corners(thing.parts[0]))[0]
     matrix = rotation_matrix(pose.quaternion)
     return list(hulls(thing, matrix @ middle + np.array((pose.x, pose.y, pose.z)), pose.quaternion))
 
@@ -76,16 +76,16 @@ def test_what_is_met_is_what_shapely_says(seed):
         Pose(*rng.uniform(-1.2, 1.2, 2), 0.0, yaw_quaternion(int(rng.integers(360))))
         for _ in range(12)
     ]
-    trail, nearest = trail_of(CHAIR, 200), [math.inf] * len(others)
+    recorder, nearest = sweep_recorder(CHAIR, 200), [math.inf] * len(others)
     bodies = [placed(TABLE, pose) for pose in others]
     for middle, turn in walk(rng):
-        trail.follow(middle, turn)
+        recorder.follow(middle, turn)
         here = list(hulls(CHAIR, middle, turn))
         for k, body in enumerate(bodies):
             least = min(gap(one, other) for one, other in itertools.product(here, body))
             nearest[k] = min(nearest[k], least)
-    outlines = [outline_of(TABLE, frame.leave(pose)) for pose in others]
-    met = met_on_path(CHAIR, trail.path, frame, outlines, MARGIN)
+    prisms = [prisms_of(TABLE, frame.leave(pose)) for pose in others]
+    met = met_on_path(CHAIR, recorder.path, frame, prisms, MARGIN)
     for hit, least in zip(met, nearest, strict=True):
         # Poses are kept every 4 mm; 32 directions round a corner off by half a percent.
         assert not hit or least < MARGIN + 0.004
@@ -95,47 +95,45 @@ def test_what_is_met_is_what_shapely_says(seed):
 
 
 def test_a_path_keeps_its_ends_and_leaves_out_what_stands_still():
-    trail = trail_of(CHAIR, 1000)
+    recorder = sweep_recorder(CHAIR, 1000)
     for k in range(1000):
-        trail.follow((0.0, 0.0, min(k, 10) * 0.001), UPRIGHT)
-    path = np.frombuffer(trail.path, dtype=np.float32).reshape(-1, 7)
+        recorder.follow((0.0, 0.0, min(k, 10) * 0.001), UPRIGHT)
+    path = np.frombuffer(recorder.path, dtype=np.float32).reshape(-1, 7)
     assert path[:, 2] == pytest.approx([0.0, 0.004, 0.008, 0.01], abs=1e-6)
 
 
 @pytest.mark.parametrize("distance", [0.4, 0.5])
 def test_a_column_is_round(distance):
-    trail = trail_of(CHAIR, 1)
-    trail.follow((0.0, 0.0, 0.3), UPRIGHT)
+    recorder = sweep_recorder(CHAIR, 1)
+    recorder.follow((0.0, 0.0, 0.3), UPRIGHT)
     ((plan, *_), _) = hulls(CHAIR, (0.0, 0.0, 0.3), UPRIGHT)
     for angle in np.linspace(0.0, 2.0 * math.pi, 25):
         x, y = distance * math.cos(angle), distance * math.sin(angle)
-        column = outline_of_column(x, y, 0.15, 0.022, 1.8)
-        (met,) = met_on_path(CHAIR, trail.path, Frame(0.0, 0.0, 0), [column], MARGIN)
+        collider = prisms_of_collider(x, y, 0.15, 0.022, 1.8)
+        (met,) = met_on_path(CHAIR, recorder.path, Frame(0.0, 0.0, 0), [collider], MARGIN)
         between = plan.distance(Point(x, y)) - 0.15
         assert abs(between - MARGIN) < 0.002 or met == (between < MARGIN)
 
 
 def near_to(*bodies):
-    extents = [extent_of(body.asset, body.pose).octagon for body in bodies]
-    return lambda octagon: [
-        (k, body) for k, body in enumerate(bodies) if overlap(extents[k], octagon)
-    ]
+    extents = [extent_of(body.asset, body.pose).dop8 for body in bodies]
+    return lambda dop8: [(k, body) for k, body in enumerate(bodies) if overlap(extents[k], dop8)]
 
 
 def test_a_chair_pulled_out_from_under_a_table_leaves_the_table_out(monkeypatch):
     asked = []
     solve = Bullet.push
 
-    def watched(self, setting, shove):
-        asked.append(setting)
-        return solve(self, setting, shove)
+    def watched(self, scene, spec):
+        asked.append(scene)
+        return solve(self, scene, spec)
 
     monkeypatch.setattr(Bullet, "push", watched)
     table = Body(TABLE, Pose(3.0, 4.0, 0.001, UPRIGHT), moves=True)
     seat = Pose(3.5, 4.0, 0.001, UPRIGHT)
     free = push(CHAIR, seat, 0, near_to())
     assert push(CHAIR, seat, 0, near_to(table)) == free
-    assert [len(setting.bodies) for setting in asked] == [1]
+    assert [len(scene.bodies) for scene in asked] == [1]
     # Pushed on under it, its back runs into the top.
     assert push(CHAIR, seat, 2, near_to(table)).moved
-    assert [len(setting.bodies) for setting in asked] == [1, 1, 2]
+    assert [len(scene.bodies) for scene in asked] == [1, 1, 2]

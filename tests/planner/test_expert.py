@@ -92,7 +92,7 @@ def fewest(world, bound, cap=60_000):
     Only states from which the goal may still be reached in time are kept: no plan can walk faster
     than on a lattice without any movable thing.
     """
-    bare = Lattice.of_polygons(world.stage.footprints, world.stage.house.outline)
+    bare = Lattice.of_polygons(world.model.footprints, world.model.house.outline)
     ahead = bare.distances(*world.goal)
     layer, known = [world], {world.digest()}
     for spent in range(bound - 1):
@@ -119,19 +119,19 @@ def episodes():
     out = []
     for scene in (0, 1, 2, 5):
         house = build_house(0, scene, HouseConfig(), catalogue())
-        stage = HouseModel.of(house)
+        model = HouseModel.of(house)
         made = build_episodes(house, 8, catalogue().spawnable)
-        out += [(stage, episode) for episode in made]
+        out += [(model, episode) for episode in made]
     return out
 
 
-def check(stage, episode):
+def check(model, episode):
     """Solve; where there is an expert, hold every claim it makes against a fresh world."""
     assets = catalogue().assets
-    expert = expert_of_episode(stage, episode, assets)
+    expert = expert_of_episode(model, episode, assets)
     if expert is None:
         return False
-    world = World.of_episode(stage, episode, assets)
+    world = World.of_episode(model, episode, assets)
     results = [world.step(action) for action in expert.actions]
     assert all(result.success for result in results)
     assert (world.i, world.j) == (episode.goal.i, episode.goal.j)
@@ -147,14 +147,14 @@ def check(stage, episode):
 
 
 def test_every_expert_replays(episodes):
-    solved = [check(stage, episode) for stage, episode in episodes]
+    solved = [check(model, episode) for model, episode in episodes]
     assert sum(solved) >= 0.6 * len(solved)
 
 
 def test_what_is_not_blocked_is_solved(episodes):
-    for stage, episode in episodes:
+    for model, episode in episodes:
         if episode.mode == "lengthened":
-            assert expert_of_episode(stage, episode, catalogue().assets) is not None
+            assert expert_of_episode(model, episode, catalogue().assets) is not None
 
 
 @pytest.mark.slow
@@ -162,9 +162,9 @@ def test_a_thousand_experts_replay():
     solved = []
     for scene in range(100):
         house = build_house(1, scene, HouseConfig(), catalogue())
-        stage = HouseModel.of(house)
+        model = HouseModel.of(house)
         made = build_episodes(house, 10, catalogue().spawnable)
-        solved += [check(stage, episode) for episode in made]
+        solved += [check(model, episode) for episode in made]
     assert sum(solved) >= 700
 
 
@@ -228,23 +228,23 @@ def test_a_limit_is_kept():
 
 
 @pytest.mark.parametrize(
-    ("stage", "obstacles", "start", "goal"),
+    ("model", "obstacles", "start", "goal"),
     [
         (CORRIDOR, [at(PARCEL, 2.0, 0.75)], (4, 3, 0), (11, 3)),
         (CORRIDOR, [at(PARCEL, 2.0, 0.75)], (4, 2, 1), (11, 4)),
     ],
 )
-def test_plans_are_nearly_the_shortest(stage, obstacles, start, goal):
-    expert = expert_of(stage, obstacles, start, goal)
+def test_plans_are_nearly_the_shortest(model, obstacles, start, goal):
+    expert = expert_of(model, obstacles, start, goal)
     assert expert is not None
     # No plan is shorter than ten elevenths of it.
     bound = math.ceil(expert.steps / 1.1)
-    assert fewest(World(stage, obstacles, start, goal), bound) == bound
+    assert fewest(World(model, obstacles, start, goal), bound) == bound
 
 
 def test_solving_changes_nothing_and_begins_anywhere(episodes):
-    stage, episode = next(pair for pair in episodes if pair[1].mode == "lengthened")
-    world = World.of_episode(stage, episode, catalogue().assets)
+    model, episode = next(pair for pair in episodes if pair[1].mode == "lengthened")
+    world = World.of_episode(model, episode, catalogue().assets)
     expert = solve(world)
     before = world.digest()
     assert solve(world) == expert
@@ -270,31 +270,31 @@ def test_replay_refuses_what_fails():
 
 
 def test_fields_count_what_the_lattice_counts(episodes):
-    for stage, episode in episodes[::5]:
-        world = World.of_episode(stage, episode, catalogue().assets)
-        ground = PlanningProblem.of(world)
-        masks = ground.masks(world)
-        reach, _ = ground.reach(masks, ground.pose(world))
-        nearest = reach.reshape(-1, 4).min(axis=1).reshape(ground.shape)
+    for model, episode in episodes[::5]:
+        world = World.of_episode(model, episode, catalogue().assets)
+        problem = PlanningProblem.of(world)
+        masks = problem.masks(world)
+        reach, _ = problem.reach(masks, problem.pose(world))
+        nearest = reach.reshape(-1, 4).min(axis=1).reshape(problem.shape)
         steps = world.lattice.distances(world.i, world.j)
         assert np.array_equal(nearest < FAR, steps >= 0)
         there = steps >= 0
         assert (nearest[there] >= steps[there]).all()
-        costs = ground.costs(masks, EVERYTHING, ground.prices(world))
-        ahead = int(costs[ground.pose(world)])
+        costs = problem.costs(masks, EVERYTHING, problem.prices(world))
+        ahead = int(costs[problem.pose(world)])
         assert (ahead < FAR) == (world.steps() is not None)
         if ahead < FAR:
             # There and back are equally far.
-            goal = 4 * (world.goal[0] * ground.ny + world.goal[1])
+            goal = 4 * (world.goal[0] * problem.ny + world.goal[1])
             assert ahead == reach[goal : goal + 4].min()
 
 
 def experts():
     """Digest of some experts; a pure function."""
     house = build_house(0, 2, HouseConfig(), catalogue())
-    stage = HouseModel.of(house)
+    model = HouseModel.of(house)
     made = build_episodes(house, 4, catalogue().spawnable)
-    found = [expert_of_episode(stage, episode, catalogue().assets) for episode in made]
+    found = [expert_of_episode(model, episode, catalogue().assets) for episode in made]
     return hashlib.sha256(repr(found).encode()).hexdigest()
 
 

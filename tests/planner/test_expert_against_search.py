@@ -20,7 +20,7 @@ HALF = 0.06
 HIGH = 2.6
 AHEAD = ((1, 0), (0, 1), (-1, 0), (0, -1))
 ACTIONS = tuple(a for a in range(12) if a not in (Action.LOOK_DOWN, Action.LOOK_UP))
-WORLDS_AT_MOST = 30_000
+MAX_WORLDS = 30_000
 
 
 def block(name, size, mass_kg, **flags):
@@ -80,9 +80,9 @@ CASES = {
 FEW = ("a crate, off the row", "a crate, not far to go", "turned away at first", "beside a door")
 
 
-def distances(stage, goal):
+def distances(model, goal):
     """Actions to the goal from every pose of the lattice without any movable thing."""
-    bare = Lattice.of_polygons(stage.footprints, stage.house.outline)
+    bare = Lattice.of_polygons(model.footprints, model.house.outline)
     far = {(*goal, quarter): 0 for quarter in range(4)}
     queue = deque(far)
     while queue:
@@ -100,13 +100,13 @@ def distances(stage, goal):
 
 def fewest(world, bound):
     """Length of the shortest plan, `bound` where none is shorter; and how many worlds it took."""
-    ahead = distances(world.stage, world.goal)
+    ahead = distances(world.model, world.goal)
 
-    def promise(spent, there):
+    def f_cost(spent, there):
         return spent + ahead.get((there.i, there.j, there.quarter), bound) + 1
 
     layers = defaultdict(list)
-    layers[promise(0, world)].append((0, world))
+    layers[f_cost(0, world)].append((0, world))
     known = {world.digest(): 0}
     for total in range(bound):
         while layers[total]:
@@ -119,21 +119,21 @@ def fewest(world, bound):
                     continue
                 if action == Action.DONE:
                     return spent + 1, len(known)
-                promised, digest = promise(spent + 1, there), there.digest()
-                if promised < bound and known.get(digest, bound) > spent + 1:
+                f_cost_there, digest = f_cost(spent + 1, there), there.digest()
+                if f_cost_there < bound and known.get(digest, bound) > spent + 1:
                     known[digest] = spent + 1
-                    layers[promised].append((spent + 1, there))
-        assert len(known) < WORLDS_AT_MOST
+                    layers[f_cost_there].append((spent + 1, there))
+        assert len(known) < MAX_WORLDS
     return bound, len(known)
 
 
 def compared(name):
     """Steps of the expert, and of the best plan."""
-    stage, things, start, goal = CASES[name]
-    obstacles = [(asset, Pose(x, y, 0.001, UPRIGHT)) for asset, x, y in things]
-    expert = expert_of(stage, obstacles, start, goal)
+    model, objects, start, goal = CASES[name]
+    obstacles = [(asset, Pose(x, y, 0.001, UPRIGHT)) for asset, x, y in objects]
+    expert = expert_of(model, obstacles, start, goal)
     assert expert is not None, name
-    best, worlds = fewest(World(stage, obstacles, start, goal), expert.steps)
+    best, worlds = fewest(World(model, obstacles, start, goal), expert.steps)
     return expert, best, worlds
 
 

@@ -5,9 +5,9 @@ import pytest
 
 from internav_data.catalog import catalogue
 from internav_data.houses import HouseConfig, build_house
-from internav_data.planner.cost_to_go import FAR, field
+from internav_data.planner.cost_to_go import FAR, bucket_dijkstra
 from internav_data.planner.problem import EVERYTHING, PlanningProblem
-from internav_data.planner.push_heuristic import clearing, marks_on, slide_m
+from internav_data.planner.push_heuristic import clearing_pushes, path_marks, slide_m
 from internav_data.world import HouseModel, World
 
 SIXES = range(0, 12, 3)
@@ -15,8 +15,8 @@ SIXES = range(0, 12, 3)
 
 @pytest.fixture(scope="module")
 def worlds():
-    stages = [HouseModel.of(build_house(0, scene, HouseConfig(), catalogue())) for scene in SIXES]
-    return [World(stage, [], (0, 0, 0), (4, 4)) for stage in stages]
+    models = [HouseModel.of(build_house(0, scene, HouseConfig(), catalogue())) for scene in SIXES]
+    return [World(model, [], (0, 0, 0), (4, 4)) for model in models]
 
 
 def pushables(world):
@@ -30,7 +30,7 @@ def test_free_slides_are_guessed(worlds):
         for thing in pushables(world):
             before = world.items[thing].pose
             for heading in range(4):
-                pushed = world.pushed(thing, heading, agent=False)
+                pushed = world.simulate_push(thing, heading, agent=False)
                 upright = abs(pushed.pose.z - before.z) < 0.01 and not pushed.toppled
                 if pushed.success and upright:
                     assert pushed.displacement_m < 1.1 * slide_m(world, thing) + 0.1
@@ -42,17 +42,17 @@ def test_most_guesses_are_right(worlds):
     """Ways straight over each thing: what the screen says of them, and what a push does."""
     right = wrong = 0
     for world in worlds:
-        nx, ny = world.stage.lattice.shape
-        ground = PlanningProblem.of(world)
+        nx, ny = world.model.lattice.shape
+        problem = PlanningProblem.of(world)
         for thing in pushables(world):
             i, j = np.rint(world.items[thing].footprint.vertices.mean(axis=0) / 0.25).astype(int)
-            way = marks_on([4 * ((i + k) * ny + j) for k in range(-1, 2)], nx * ny)
-            bit = 1 << ground.things.index(thing)
-            for heading, clears in enumerate(clearing(world, thing, way, (nx, ny))):
-                there, pushed = world.copy(), world.pushed(thing, heading, agent=False)
+            path = path_marks([4 * ((i + k) * ny + j) for k in range(-1, 2)], nx * ny)
+            bit = 1 << problem.objects.index(thing)
+            for heading, clears in enumerate(clearing_pushes(world, thing, path, (nx, ny))):
+                there, pushed = world.copy(), world.simulate_push(thing, heading, agent=False)
                 if pushed.success:
                     there.put([(thing, pushed.pose), *pushed.moved])
-                blocks = (ground.masks(there).reshape(-1)[way] & bit).any()
+                blocks = (problem.masks(there).reshape(-1)[path] & bit).any()
                 right += clears != blocks
                 wrong += clears == blocks
     assert right + wrong > 100
@@ -61,21 +61,23 @@ def test_most_guesses_are_right(worlds):
 
 def test_a_field_that_stops_early_knows_the_way_down(worlds):
     world = worlds[1]
-    ground = PlanningProblem.of(world)
-    masks, prices = ground.masks(world), ground.prices(world)
-    goals = ground.goals
-    whole = field(ground.fixed, masks, 0, prices, ground.ny, goals, -1)
+    problem = PlanningProblem.of(world)
+    masks, prices = problem.masks(world), problem.prices(world)
+    goals = problem.goals
+    whole = bucket_dijkstra(problem.fixed, masks, 0, prices, problem.ny, goals, -1)
     poses = np.flatnonzero(whole < FAR)
     assert len(poses) > 100
     for pose in poses[:: len(poses) // 40].tolist():
-        part = field(ground.fixed, masks, 0, prices, ground.ny, goals, pose)
+        part = bucket_dijkstra(problem.fixed, masks, 0, prices, problem.ny, goals, pose)
         assert part[pose] == whole[pose]
         below = whole <= whole[pose]
         assert (part[below] == whole[below]).all()
         first, second = (
-            ground.way(masks, 0, prices, costs, pose)[0].tolist() for costs in (part, whole)
+            problem.path(masks, 0, prices, costs, pose)[0].tolist() for costs in (part, whole)
         )
         assert first == second
     cut_off = np.flatnonzero(whole == FAR)
-    closed = field(ground.fixed, masks, EVERYTHING, prices, ground.ny, goals, int(cut_off[0]))
+    closed = bucket_dijkstra(
+        problem.fixed, masks, EVERYTHING, prices, problem.ny, goals, int(cut_off[0])
+    )
     assert closed[cut_off[0]] == FAR

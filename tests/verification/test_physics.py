@@ -42,7 +42,7 @@ def judged(tmp_path, scenes, level="physics", assets=None, config=None, **option
 
 def test_nothing_that_is_kept_on_disk_is_believed(tmp_path, monkeypatch, scenes):
     def keep_in(held):
-        monkeypatch.setattr("internav_data.physics.registry.solutions", lambda: held)
+        monkeypatch.setattr("internav_data.physics.registry.result_cache", lambda: held)
         return held
 
     held = keep_in(ResultCache(tmp_path))
@@ -126,7 +126,7 @@ def test_scenes_hold_what_the_tests_need(scenes):
     assert scenes[0][1][0].expert.pushes > 0
     stage = physical.HouseModel.of(replace(scenes[2][0], assets=ASSETS))
     world = World.of_episode(stage, scenes[2][1][0], ASSETS)
-    assert [k for k, _ in world.pushed(2, 1, agent=False).moved] == [0]
+    assert [k for k, _ in world.simulate_push(2, 1, agent=False).moved] == [0]
     assert stage.object_ids[0] == 1
 
 
@@ -298,13 +298,13 @@ def test_world_that_reaches_everything(scenes, monkeypatch):
 
 @pytest.mark.parametrize("into", [{"z": -0.02}, {"x": 3.7, "y": 1.0}])
 def test_world_that_pushes_into_floor_or_wall(scenes, monkeypatch, into):
-    push = World.pushed
+    push = World.simulate_push
 
     def sinking(world, *args, **options):
         pushed = push(world, *args, **options)
         return replace(pushed, pose=replace(pushed.pose, **into))
 
-    monkeypatch.setattr(World, "pushed", sinking)
+    monkeypatch.setattr(World, "simulate_push", sinking)
     assert "physics.outcome-sunk" in found_in(scenes, 1, 1)
 
 

@@ -9,8 +9,8 @@ from scipy.spatial import Delaunay
 from internav_data.geometry import part_corners, transform, yaw_quaternion
 from internav_data.geometry.headings import HEADINGS
 from internav_data.records import Asset, Part, Pose
-from internav_data.world.occlusion import POINTS_AT_MOST, placed_shell, shell_of
-from internav_data.world.visibility import CAMERA_M, REACH_M, Occluders, _hidden, view_from
+from internav_data.world.occlusion import MAX_POINTS, occlusion_shape, placed_occlusion_shape
+from internav_data.world.visibility import CAMERA_M, REACH_M, Occluders, _hidden, camera_pose
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 SHAPES = ("box", "cylinder", "sphere")
@@ -47,7 +47,7 @@ def test_rays_are_obstructed_where_samples_lie_inside_a_hull():
     for trial in range(40):
         thing = some_asset(rng, f"thing {trial}")
         pose = Pose(*rng.uniform(-0.2, 0.2, 3), yaw_quaternion(float(rng.uniform(0, 360))))
-        shell = placed_shell(thing, pose)
+        shell = placed_occlusion_shape(thing, pose)
         hulls = [Delaunay(transform(part_corners(p), pose)) for p in thing.parts]
         for _ in range(5):
             eye, end = rng.uniform(-1.5, 1.5, 3), rng.uniform((-0.4, -0.4, 0), (0.4, 0.4, 1))
@@ -70,16 +70,16 @@ def test_points_are_few_and_belong_to_their_parts():
     rng = np.random.default_rng(1)
     for trial in range(20):
         thing = some_asset(rng, f"points {trial}")
-        shell = shell_of(thing)
-        assert len(thing.parts) < len(shell.points) <= POINTS_AT_MOST
+        shell = occlusion_shape(thing)
+        assert len(thing.parts) < len(shell.points) <= MAX_POINTS
         for point, owner in zip(shell.points, shell.owners, strict=True):
             planes = shell.planes[shell.starts[owner] : shell.starts[owner + 1]]
             assert (planes[:, :3] @ point - planes[:, 3] <= 1e-6).all()
 
 
 def sees(things, place=0, *, heading=0, horizon=30, eye=(0.0, 0.0)):
-    screen = Occluders([placed_shell(thing, pose) for thing, pose in things])
-    return screen.seen(view_from(*eye, HEADINGS[heading], horizon), place)
+    occluders = Occluders([placed_occlusion_shape(thing, pose) for thing, pose in things])
+    return occluders.seen(camera_pose(*eye, HEADINGS[heading], horizon), place)
 
 
 @pytest.mark.parametrize("heading", range(4))
@@ -112,11 +112,11 @@ def test_the_horizon_decides_what_is_seen_of_the_floor():
 
 
 def test_what_stands_between_hides():
-    screen = asset("screen", [part("box", (0.0, 0.0, 0.9), (0.05, 2.0, 1.8))])
+    occluders = asset("occluders", [part("box", (0.0, 0.0, 0.9), (0.05, 2.0, 1.8))])
     behind = (cube(), Pose(1.0, 0.0, 0.0, UPRIGHT))
     assert sees([behind])
-    assert not sees([behind, (screen, Pose(0.5, 0.0, 0.0, UPRIGHT))])
-    assert sees([behind, (screen, Pose(1.4, 0.0, 0.0, UPRIGHT))])
+    assert not sees([behind, (occluders, Pose(0.5, 0.0, 0.0, UPRIGHT))])
+    assert sees([behind, (occluders, Pose(1.4, 0.0, 0.0, UPRIGHT))])
     low = asset("low", [part("box", (0.0, 0.0, 0.05), (0.05, 2.0, 0.1))])
     assert sees([behind, (low, Pose(0.5, 0.0, 0.0, UPRIGHT))])
 

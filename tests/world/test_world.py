@@ -56,9 +56,9 @@ def beside_thing(world, rng):
 def worlds():
     houses = [build_house(0, scene, HouseConfig(), catalogue()) for scene in SCENES]
     return [
-        (episode, World.of_episode(stage, episode, catalogue().assets))
-        for stage in map(HouseModel.of, houses)
-        for episode in build_episodes(stage.house, 2, catalogue().spawnable)
+        (episode, World.of_episode(model, episode, catalogue().assets))
+        for model in map(HouseModel.of, houses)
+        for episode in build_episodes(model.house, 2, catalogue().spawnable)
     ]
 
 
@@ -66,8 +66,8 @@ def worlds():
 def small(hand_house):
     """The agent at (3, 1) looking along +x, a chair 0.75 m ahead, nothing else near."""
     chair = hand_house.assets["Chair_0"]
-    stage = HouseModel.of(hand_house)
-    return World(stage, [(chair, Pose(3.75, 1.0, 0.0, UPRIGHT))], (12, 4, 0), (28, 4))
+    model = HouseModel.of(hand_house)
+    return World(model, [(chair, Pose(3.75, 1.0, 0.0, UPRIGHT))], (12, 4, 0), (28, 4))
 
 
 def test_actions_have_the_released_order():
@@ -90,7 +90,7 @@ def test_an_episode_begins_with_its_own_distances(worlds):
 
 def test_another_house_is_refused(worlds):
     with pytest.raises(UsageError, match="own house"):
-        World.of_episode(worlds[0][1].stage, worlds[-1][0], catalogue().assets)
+        World.of_episode(worlds[0][1].model, worlds[-1][0], catalogue().assets)
 
 
 def test_an_unknown_action_is_refused(small):
@@ -165,19 +165,19 @@ def test_the_closest_is_taken_and_ties_go_by_index(hand_house):
     poses = [Pose(3.8, 1.5, 0.0, UPRIGHT), Pose(3.8, 0.5, 0.0, yaw_quaternion(180))]
     # Footprints of both, mirrored at the agent's row, are equally far away.
     near = Pose(3.6, 1.0, 0.0, UPRIGHT)
-    stage = HouseModel.of(hand_house)
-    first = len(stage.items)
-    tie = World(stage, [(chair, p) for p in poses], (12, 4, 0), (28, 4))
+    model = HouseModel.of(hand_house)
+    first = len(model.items)
+    tie = World(model, [(chair, p) for p in poses], (12, 4, 0), (28, 4))
     assert tie.target(pick=False) == first
-    world = World(stage, [*((chair, p) for p in poses), (chair, near)], (12, 4, 0), (28, 4))
+    world = World(model, [*((chair, p) for p in poses), (chair, near)], (12, 4, 0), (28, 4))
     assert world.target(pick=False) == first + 2
 
 
 def test_pick_and_drop(hand_house):
     apple = hand_house.assets["Apple_0"]
-    stage = HouseModel.of(hand_house)
+    model = HouseModel.of(hand_house)
     poses = [Pose(3.5, 1.0, 0.0, UPRIGHT), Pose(3.5, 1.3, 0.0, UPRIGHT)]
-    world = World(stage, [(apple, p) for p in poses], (12, 4, 0), (28, 4))
+    world = World(model, [(apple, p) for p in poses], (12, 4, 0), (28, 4))
     assert world.step(Action.DROP).reason == "hands are empty"
     # Pickable things are never pushed.
     assert world.step(Action.PUSH_AHEAD).reason == "nothing to push in sight and reach"
@@ -198,9 +198,9 @@ def test_pick_and_drop(hand_house):
 
 def test_what_carries_something_is_not_picked(hand_house):
     apple = hand_house.assets["Apple_0"]
-    stage = HouseModel.of(hand_house)
+    model = HouseModel.of(hand_house)
     stack = [Pose(3.5, 1.0, 0.0, UPRIGHT), Pose(3.5, 1.0, 0.1, UPRIGHT)]
-    world = World(stage, [(apple, p) for p in stack], (12, 4, 0), (28, 4))
+    world = World(model, [(apple, p) for p in stack], (12, 4, 0), (28, 4))
     result = world.step(Action.PICKUP)
     assert (result.success, result.reason) == (False, "something rests on it")
 
@@ -229,9 +229,9 @@ def test_the_lattice_follows_what_lies_where(worlds):
             if action > 4:
                 beside_thing(world, rng)
             done += world.step(action).success and action > 4
-        house = world.stage.house
+        house = world.model.house
         loose = Polygons.joined(item.footprint for item in world.items)
-        fresh = Lattice.of_polygons(Polygons.joined([world.stage.footprints, loose]), house.outline)
+        fresh = Lattice.of_polygons(Polygons.joined([world.model.footprints, loose]), house.outline)
         assert done
         assert (fresh._blockers == world.lattice._blockers).all()
 
@@ -242,14 +242,14 @@ def test_a_push_opens_the_way_exactly_when_the_lattice_says_so(worlds):
         for index, heading in itertools.product(world.obstacles, range(4)):
             if not world.items[index].asset.pushable:
                 continue
-            pushed = world.pushed(index, heading, agent=False)
+            pushed = world.simulate_push(index, heading, agent=False)
             there = world.copy()
             there.put([(index, pushed.pose), *pushed.moved])
             polygons = [
                 footprint(item.asset, item.pose) for item in there.items if item.pose is not None
             ]
             fresh = Lattice.of_polygons(
-                Polygons.joined([world.stage.footprints, *polygons]), world.stage.house.outline
+                Polygons.joined([world.model.footprints, *polygons]), world.model.house.outline
             )
             start = (episode.start.i, episode.start.j)
             assert there.steps() == fresh.distance(start, world.goal)
@@ -311,11 +311,11 @@ def test_the_same_in_fresh_processes():
 def stands_in_nothing(world):
     """Shapely's word for it: the disc meets no wall and no thing."""
     axis = shapely.Point(world.position)
-    for polygon in wall_footprints(world.stage.house.walls):
+    for polygon in wall_footprints(world.model.house.walls):
         assert shapely.Polygon(polygon).distance(axis) >= CLEARANCE_M - 1e-9
-    for thing in world.stage.house.objects:
-        asset = world.stage.house.assets[thing.asset_id]
-        if thing.object_id not in world.stage.object_ids:
+    for thing in world.model.house.objects:
+        asset = world.model.house.assets[thing.asset_id]
+        if thing.object_id not in world.model.object_ids:
             for polygon in footprint(asset, thing.pose):
                 assert shapely.Polygon(polygon).distance(axis) >= CLEARANCE_M - 1e-9
     for item in world.items:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from internav_data.geometry import centre_of_mass, multiply, rotation_matrix
 from internav_data.physics.engines.bullet_scene import RULES, STEP_S, Builder, pybullet
 from internav_data.physics.scene import PushSolution, SettleSolution
-from internav_data.physics.sweep import radius_m, trail_of
+from internav_data.physics.sweep import bounding_radius_m, sweep_recorder
 from internav_data.records import Pose
 
 if TYPE_CHECKING:
@@ -54,11 +54,11 @@ class Bullet:
     name: str = "bullet"
     build: str = field(default_factory=lambda: f"pybullet {version('pybullet')}, rules {RULES}")
 
-    def settle(self, setting: PhysicsScene) -> SettleSolution:
+    def settle(self, scene: PhysicsScene) -> SettleSolution:
         """Let the first body fall until at rest, one second at most."""
-        ids = self._builder.build(setting)
-        body = setting.bodies[0]
-        radius = radius_m(body.asset)
+        ids = self._builder.build(scene)
+        body = scene.bodies[0]
+        radius = bounding_radius_m(body.asset)
         start, start_turn = pybullet.getBasePositionAndOrientation(ids[0], self._builder.client)
         reach, calm, steps = 0.0, 0, 0
         limit = round(SETTLE_LIMIT_S / STEP_S)
@@ -79,42 +79,42 @@ class Bullet:
             reach_m=reach,
         )
 
-    def push(self, setting: PhysicsScene, shove: PushSpec) -> PushSolution:
+    def push(self, scene: PhysicsScene, spec: PushSpec) -> PushSolution:
         """Push the first body along +x, let it go, and wait until all that moves is at rest."""
-        ids = self._builder.build(setting)
+        ids = self._builder.build(scene)
         client = self._builder.client
-        moving = [k for k, body in enumerate(setting.bodies) if body.moves]
-        pushes_left = round(shove.seconds / STEP_S)
+        moving = [k for k, body in enumerate(scene.bodies) if body.moves]
+        pushes_left = round(spec.seconds / STEP_S)
         limit = pushes_left + round(PUSH_LIMIT_S / STEP_S)
-        trails = [trail_of(setting.bodies[k].asset, limit) for k in moving]
-        movers = [(ids[k], trail) for k, trail in zip(moving, trails, strict=True)]
+        recorders = [sweep_recorder(scene.bodies[k].asset, limit) for k in moving]
+        movers = [(ids[k], recorder) for k, recorder in zip(moving, recorders, strict=True)]
         for mover, _ in movers[1:]:
             # What is not touched neither trembles nor costs time; a touch wakes it.
             pybullet.changeDynamics(mover, -1, activationState=_ASLEEP, physicsClientId=client)
-        for mover, trail in movers:
-            trail.follow(*pybullet.getBasePositionAndOrientation(mover, client))
-        gain = shove.force_n / setting.bodies[0].asset.mass_kg * STEP_S
+        for mover, recorder in movers:
+            recorder.follow(*pybullet.getBasePositionAndOrientation(mover, client))
+        gain = spec.force_n / scene.bodies[0].asset.mass_kg * STEP_S
         calm, steps, rests = 0, 0, False
         while steps < limit and not rests:
             if pushes_left:
-                pushes_left = self._shove(ids[0], shove, gain, pushes_left)
+                pushes_left = self._apply_push(ids[0], spec, gain, pushes_left)
             pybullet.stepSimulation(client)
             steps += 1
             slow = not pushes_left
-            for mover, trail in movers:
-                shift = trail.follow(*pybullet.getBasePositionAndOrientation(mover, client))
+            for mover, recorder in movers:
+                shift = recorder.follow(*pybullet.getBasePositionAndOrientation(mover, client))
                 slow = slow and shift < SHIFT_M and self._slow(mover)
             calm = calm + 1 if slow else 0
             rests = calm >= REST_STEPS
             if steps % CREEP_STEPS == 0:
                 # What only trembles is at rest too; what has not yielded to a constant push
                 # by now never will.
-                crept = [trail.crept(CREEP_M, CREEP_RAD) for trail in trails]
+                crept = [recorder.crept(CREEP_M, CREEP_RAD) for recorder in recorders]
                 rests = rests or not any(crept)
         return PushSolution(
-            poses=tuple(self._pose(ids[k], setting.bodies[k].asset) for k in moving),
-            sweeps=tuple(trail.octagon for trail in trails),
-            paths=tuple(trail.path for trail in trails),
+            poses=tuple(self._pose(ids[k], scene.bodies[k].asset) for k in moving),
+            sweeps=tuple(recorder.dop8 for recorder in recorders),
+            paths=tuple(recorder.path for recorder in recorders),
             seconds=steps * STEP_S,
             at_rest=rests,
         )
@@ -124,16 +124,16 @@ class Bullet:
         speed, spin = pybullet.getBaseVelocity(identity, self._builder.client)
         return math.hypot(*speed) < REST_SPEED and math.hypot(*spin) < REST_SPIN
 
-    def _shove(self, identity: int, shove: PushSpec, gain: float, pushes_left: int) -> int:
+    def _apply_push(self, identity: int, spec: PushSpec, gain: float, pushes_left: int) -> int:
         """Push for one step; returns how many steps of pushing are left."""
         speed, spin = pybullet.getBaseVelocity(identity, self._builder.client)
-        if speed[0] + gain >= shove.speed_m_s:
+        if speed[0] + gain >= spec.speed_m_s:
             # The last impulse: just what is missing.
-            missing = (shove.speed_m_s, speed[1], speed[2])
+            missing = (spec.speed_m_s, speed[1], speed[2])
             pybullet.resetBaseVelocity(identity, missing, spin, self._builder.client)
             return 0
         middle, _ = pybullet.getBasePositionAndOrientation(identity, self._builder.client)
-        force = (shove.force_n, 0.0, 0.0)
+        force = (spec.force_n, 0.0, 0.0)
         pybullet.applyExternalForce(
             identity, -1, force, middle, pybullet.WORLD_FRAME, self._builder.client
         )

@@ -67,7 +67,7 @@ FLOOR_FRICTION = 1.0
 ROLLING_FRICTION = 0.01
 
 
-SCENES_A_WORLD = 512
+SCENES_PER_WORLD = 512
 
 
 @dataclass(slots=True, eq=False)
@@ -76,7 +76,7 @@ class Builder:
 
     client: int
     folder: Path
-    scenes_a_world: int = SCENES_A_WORLD
+    scenes_per_world: int = SCENES_PER_WORLD
     """1: an empty world for every scene, half as slow again and by definition without history."""
     _files: dict[Asset, str] = field(default_factory=dict)
     _shapes: dict[tuple[Asset, bool], int] = field(default_factory=dict)
@@ -85,7 +85,7 @@ class Builder:
     _slab: int = -1
     _scenes_left: int = 0
 
-    def build(self, setting: PhysicsScene) -> list[int]:
+    def build(self, scene: PhysicsScene) -> list[int]:
         """Take the last scene down, make another one and return the ids of its bodies, in order."""
         # Zero until the scene stands: what an interrupt left half done is swept away as a whole.
         left, self._scenes_left = self._scenes_left, 0
@@ -93,11 +93,11 @@ class Builder:
             self._empty()
         else:
             self._begin()
-            left = self.scenes_a_world
+            left = self.scenes_per_world
         self._set_parameters()
-        if setting.column is not None:
-            self._add_agent(setting.column)
-        ids = [self._add(body) for body in setting.bodies]
+        if scene.agent is not None:
+            self._add_agent(scene.agent)
+        ids = [self._add(body) for body in scene.bodies]
         self._scenes_left = left - 1
         return ids
 
@@ -151,14 +151,14 @@ class Builder:
         self._bodies.append(identity)
         return identity
 
-    def _add_agent(self, column: AgentCollider) -> None:
+    def _add_agent(self, collider: AgentCollider) -> None:
         shape = pybullet.createCollisionShape(
             pybullet.GEOM_CYLINDER,
-            radius=column.radius_m,
+            radius=collider.radius_m,
             height=AGENT_HEIGHT_M - AGENT_LOW_M,
             physicsClientId=self.client,
         )
-        middle = (column.x, column.y, (AGENT_LOW_M + AGENT_HEIGHT_M) / 2.0)
+        middle = (collider.x, collider.y, (AGENT_LOW_M + AGENT_HEIGHT_M) / 2.0)
         self._surface(self._place(0.0, int(shape), basePosition=middle), FLOOR_FRICTION)
 
     def _add(self, body: Body) -> int:

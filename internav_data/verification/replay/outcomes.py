@@ -71,7 +71,7 @@ class _Judge:
         if not item.asset.pushable:
             self._ends("not pushable", 0.0, 0.0)
             return
-        pushed = world.pushed(index, PUSH_OUTCOMES.index(outcome.action), agent=False)
+        pushed = world.simulate_push(index, PUSH_OUTCOMES.index(outcome.action), agent=False)
         far = pushed.displacement_m if pushed.success else 0.0
         if self._ends(pushed.reason, far, pushed.seconds) and pushed.success:
             ends: dict[int, Pose | None] = {index: pushed.pose, **dict(pushed.moved)}
