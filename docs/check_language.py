@@ -111,7 +111,7 @@ DIALECT_CLASSES = {
     "Scenery": "StaticScene or CheckedLayout",
     "Screen": "Occluders",
     "Setting": "PhysicsScene",
-    "Settings": "EvaluationConfig",
+    "Settings": "EvaluationConfig (evaluation), CheckedConfig (verification)",
     "Settled": "SettleResult",
     "Shelf": "RowGroupCache",
     "Shell": "OcclusionShape (half-spaces and visibility points)",

@@ -1,4 +1,4 @@
-"""A dataset proved right by independent, slower ways."""
+"""Validation of datasets by independent, slower means than the generator's."""
 
 from internav_data.verification.findings import LEVELS, Finding, Findings, Level
 from internav_data.verification.levels import validate

@@ -1,7 +1,7 @@
-"""Where the agent can stand, derived again: shapely distances, breadth-first search by scipy.
+"""The lattice derived again: distances by shapely, breadth-first search by scipy.
 
-Every node and every edge of the 0.25 m lattice is compared with every polygon near it. What a
-house alone blocks is worked out once; obstacles only take nodes and edges away.
+Every node and every edge of the 0.25 m lattice is compared with every polygon near it. The house
+alone is evaluated once; obstacles only remove nodes and edges.
 """
 
 from __future__ import annotations
@@ -25,22 +25,23 @@ if TYPE_CHECKING:
 
 SPACING_M = 0.25
 RADIUS_M = 0.2
+"""Radius of the agent's disc."""
 TOLERANCE_M = 1e-6
 """Exact ties (a node row 0.2 m from a wall) are free."""
 KEEP_M = RADIUS_M - TOLERANCE_M
-"""A disc stands free at this distance or more."""
+"""A disc is free at this distance from every polygon or more."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Free:
-    """Free nodes (n,) and edges (m,) of a ground, as masks."""
+class FreeSpace:
+    """Masks of the free nodes (n,) and edges (m,) of a lattice."""
 
     nodes: Bools
     edges: Bools
 
 
 class CheckedLattice:
-    """The lattice of one house: free nodes and edges without obstacles.
+    """Lattice of one house; `free` are its free nodes and edges without obstacles.
 
     Nodes are numbered i * columns + j; node (i, j) lies at (i, j) * 0.25 m.
     """
@@ -67,50 +68,50 @@ class CheckedLattice:
             list(shapely.get_parts(shapely.multilinestrings(self._xy[self._pairs])))
         )
         edges = ~self._near(self._edge_tree, blockers, len(self._pairs))
-        self.clear = Free(nodes, edges)
+        self.free = FreeSpace(nodes, edges)
         self._distances: dict[int, NDArray[np.float64]] = {}
 
     @staticmethod
     def _near(tree: shapely.STRtree, blockers: Sequence[Geometry], count: int) -> Bools:
-        """Which geometries of a tree come closer to a blocker than the disc allows."""
+        """Mask (count,) of a tree's geometries that are too close to a blocker for the disc."""
         near = np.zeros(count, dtype=np.bool_)
         if blockers and count:
             hit = tree.query(np.array(blockers, dtype=object), "dwithin", KEEP_M)
             near[hit[1]] = True
         return near
 
-    def with_obstacles(self, obstacles: Sequence[Geometry]) -> Free:
-        """Return what stays free when obstacles lie in the house."""
-        nodes = self.clear.nodes & ~self._near(self._point_tree, obstacles, len(self._xy))
-        edges = self.clear.edges & ~self._near(self._edge_tree, obstacles, len(self._pairs))
-        return Free(nodes, edges)
+    def with_obstacles(self, obstacles: Sequence[Geometry]) -> FreeSpace:
+        """Return the nodes and edges that stay free with footprints of obstacles."""
+        nodes = self.free.nodes & ~self._near(self._point_tree, obstacles, len(self._xy))
+        edges = self.free.edges & ~self._near(self._edge_tree, obstacles, len(self._pairs))
+        return FreeSpace(nodes, edges)
 
     def node(self, i: int, j: int) -> int:
         """Return the number of a node, -1 off the lattice."""
         inside = 0 <= i < self.shape[0] and 0 <= j < self.shape[1]
         return i * self.shape[1] + j if inside else -1
 
-    def _graph(self, free: Free) -> csr_array:
+    def _graph(self, free: FreeSpace) -> csr_array:
         pairs = self._pairs[free.edges]
         ones = np.ones(len(pairs), dtype=np.int8)
         count = len(self._xy)
         return csr_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(count, count))
 
-    def distances(self, goal: int, free: Free) -> NDArray[np.float64]:
-        """Return the steps from every node to a goal, inf where cut off, shape (n,)."""
-        if free is self.clear and goal in self._distances:
+    def distances(self, goal: int, free: FreeSpace) -> NDArray[np.float64]:
+        """Return the number of steps from every node to a goal, inf if none, shape (n,)."""
+        if free is self.free and goal in self._distances:
             return self._distances[goal]
         steps = dijkstra(self._graph(free), directed=False, indices=[goal], unweighted=True)[0]
         out = np.asarray(steps, dtype=np.float64)
-        if free is self.clear:
+        if free is self.free:
             self._distances[goal] = out
         return out
 
     def components(self) -> Ints:
-        """Component of every node of the clear ground, -1 where not free, shape (n,)."""
-        _, labels = connected_components(self._graph(self.clear), directed=False)
-        return np.where(self.clear.nodes, labels, -1)
+        """Return the component of every node without obstacles, -1 if not free, shape (n,)."""
+        _, labels = connected_components(self._graph(self.free), directed=False)
+        return np.where(self.free.nodes, labels, -1)
 
     def points(self) -> NDArray[np.float64]:
-        """Positions of all nodes, shape (n, 2), metres."""
+        """Return the positions of all nodes, shape (n, 2), metres."""
         return np.asarray(self._xy, dtype=np.float64)

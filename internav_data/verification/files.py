@@ -1,4 +1,4 @@
-"""Level `files`: every file is there, unchanged and readable, and nothing else is."""
+"""Level `files`: all listed files are present, unchanged and readable, and no others."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BLOCK_BYTES = 1 << 20
 
 
 def check_manifest(root: Path, report: FindingCollector) -> Manifest | None:
-    """Judge the manifest; None where it cannot be read.
+    """Check and return the manifest; None if it cannot be read.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def check_manifest(root: Path, report: FindingCollector) -> Manifest | None:
 
 
 def check_listing(root: Path, manifest: Manifest, report: FindingCollector) -> None:
-    """Judge what lies in `data/`: exactly the files that the manifest names, and its counts."""
+    """Check that `data/` holds exactly the files of the manifest, and the manifest's counts."""
     listed = [file.path for file in manifest.files]
     report.file = MANIFEST
     report.expect(
@@ -67,7 +67,7 @@ def check_listing(root: Path, manifest: Manifest, report: FindingCollector) -> N
 
 
 def check_file(root: Path, file: DataFile) -> FindingCollector:
-    """Judge one Parquet file: bytes, hashes, rows, page checksums."""
+    """Check one Parquet file: bytes, hashes, rows, page checksums."""
     report = FindingCollector(file.path)
     report.counts["files"] += 1
     path = root / file.path

@@ -1,4 +1,4 @@
-"""What a validation found: which predicate, where, what was expected and what the data says."""
+"""Findings of a validation: predicate, place, expected and stored value."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
 Level = Literal["files", "schema", "geometry", "physics"]
 LEVELS: tuple[Level, ...] = ("files", "schema", "geometry", "physics")
-"""In order: each level runs those before it."""
+"""Levels in order: each runs those before it."""
 
-KEPT = 1000
+MAX_FINDINGS = 1000
 """Findings kept in full; further ones are only counted, so that memory stays bounded."""
-SHOWN = 20
+MAX_SHOWN = 20
 """Findings written out in the summary."""
 
 
@@ -31,48 +31,49 @@ class Finding:
     scene: str
     episode: str
     predicate: str
-    """Dotted name of what does not hold, as `episode.steps`."""
+    """Dotted name of the predicate that does not hold, as `episode.obstructed-path-steps`."""
     expected: str
     got: str
 
     def __str__(self) -> str:
-        """One line: where, what, expected, got."""
-        place = self.episode or self.scene
-        where = ": ".join(part for part in (self.file, place) if part)
+        """Return one line: file and row, predicate, expected, got."""
+        name = self.episode or self.scene
+        where = ": ".join(part for part in (self.file, name) if part)
         return f"{where or 'dataset'}: {self.predicate}: expected {self.expected}, got {self.got}"
 
 
 @dataclass(frozen=True, slots=True)
 class Findings:
-    """Result of `validate`: what was looked at and what was found, in a fixed order."""
+    """Result of `validate`: counts and findings, in a fixed order."""
 
     level: Level
     checked: dict[str, int]
-    """How many files, rows, scenes and episodes were looked at, predicates judged."""
+    """Number of files, rows, scenes, episodes and predicates that were checked."""
     found: tuple[Finding, ...]
-    """At most `KEPT`, sorted."""
+    """Findings, sorted, at most `MAX_FINDINGS`."""
     total: int
-    """How many there were in all."""
+    """Number of all findings."""
     by_predicate: dict[str, int] = field(default_factory=dict)
+    """Number of findings of each predicate."""
     notes: dict[str, int] = field(default_factory=dict)
-    """What could not be judged and why, and in how many episodes. No fault of the data."""
+    """Reasons why something was not checked, with numbers of episodes; not faults of the data."""
 
     @property
     def ok(self) -> bool:
-        """Whether nothing was found."""
+        """Whether there are no findings."""
         return self.total == 0
 
     def summary(self) -> str:
-        """Return a text for a terminal: what was checked, then the first findings."""
+        """Return a text for a terminal: the counts, then the first findings."""
         looked = ", ".join(f"{count} {name}" for name, count in self.checked.items())
         notes = [f"note: {count} x {text}" for text, count in self.notes.items()]
         if self.ok:
             return "\n".join([f"valid at level {self.level}: {looked}", *notes])
         lines = [f"invalid at level {self.level}: {self.total} findings in {looked}"]
         lines += [f"  {name}: {count}" for name, count in self.by_predicate.items()]
-        lines += [str(finding) for finding in self.found[:SHOWN]]
-        if self.total > SHOWN:
-            lines.append(f"… and {self.total - SHOWN} more")
+        lines += [str(finding) for finding in self.found[:MAX_SHOWN]]
+        if self.total > MAX_SHOWN:
+            lines.append(f"… and {self.total - MAX_SHOWN} more")
         return "\n".join(lines + notes)
 
     def to_json(self) -> str:
@@ -80,14 +81,21 @@ class Findings:
         return json.dumps({"ok": self.ok, **asdict(self)}, indent=2)
 
     def raise_if_any(self) -> None:
-        """Raise a ValidationError that names the first finding, if there is one."""
+        """Raise an error that names the first finding, if there is one.
+
+        Raises
+        ------
+        ValidationError
+            There is at least one finding.
+
+        """
         if not self.ok:
             rest = f" (and {self.total - 1} more)" if self.total > 1 else ""
             raise ValidationError(f"{self.found[0]}{rest}; generate the dataset again")
 
 
 class FindingCollector:
-    """Judges predicates of one file or scene and keeps what fails."""
+    """Collector of the findings of one file or scene."""
 
     def __init__(self, file: str = "", scene: str = "") -> None:
         self.file = file
@@ -100,30 +108,30 @@ class FindingCollector:
     def expect(
         self, holds: object, predicate: str, expected: object, got: object, episode: str = ""
     ) -> bool:
-        """Judge one predicate; keep a finding where it does not hold. Return whether it holds."""
+        """Count one predicate, keep a finding if it does not hold, return whether it holds."""
         self.counts["predicates"] += 1
         if holds:
             return True
         self.by_predicate[predicate] += 1
-        if len(self.found) < KEPT:
+        if len(self.found) < MAX_FINDINGS:
             self.found.append(
                 Finding(self.file, self.scene, episode, predicate, str(expected), str(got))
             )
         return False
 
     def absorb(self, other: FindingCollector) -> None:
-        """Take over what another collector found and counted."""
-        self.found = sorted(self.found + other.found)[:KEPT]
+        """Add the findings and counts of another collector."""
+        self.found = sorted(self.found + other.found)[:MAX_FINDINGS]
         self.counts += other.counts
         self.by_predicate += other.by_predicate
         self.notes += other.notes
 
     def findings(self, level: Level) -> Findings:
-        """Return the result, in an order that no worker count changes."""
+        """Return the result, in an order that does not depend on the number of workers."""
         return Findings(
             level,
             dict(sorted(self.counts.items())),
-            tuple(sorted(self.found)[:KEPT]),
+            tuple(sorted(self.found)[:MAX_FINDINGS]),
             sum(self.by_predicate.values()),
             dict(sorted(self.by_predicate.items())),
             dict(sorted(self.notes.items())),
@@ -131,7 +139,7 @@ class FindingCollector:
 
 
 def join(collectors: Iterable[FindingCollector]) -> FindingCollector:
-    """Gather several collectors into one."""
+    """Combine several collectors into one."""
     whole = FindingCollector()
     for collector in collectors:
         whole.absorb(collector)

@@ -1,4 +1,4 @@
-"""Predicates of a house's shell: rooms, walls, doors and windows."""
+"""Predicates of a house without its objects: rooms, walls, doors and windows."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from internav_data.verification.findings import FindingCollector
 
 AREA_M2 = 1e-6
-"""Areas that should vanish stay below."""
+"""Upper bound of areas that should be zero."""
 STATED_AREA_M2 = 0.01
-"""Stated areas are rounded."""
+"""Tolerance of stated areas, which are rounded."""
 LENGTH_M = 1e-3
-"""Lengths that should vanish stay below."""
+"""Upper bound of lengths that should be zero."""
 HALF_WALL_M = 0.06
 CORNERS_OF_A_RING = 4
 
@@ -35,7 +35,7 @@ def _rectilinear(ring: Sequence[Vec2]) -> bool:
 
 
 def _proper(report: FindingCollector, name: str, ring: Sequence[Vec2], what: str) -> Polygon | None:
-    """Judge a stored polygon by itself; None where it is none."""
+    """Check and return a stored polygon; None if it is not a simple polygon."""
     predicate = f"house.{name}-polygon"
     if not report.expect(
         len(ring) >= CORNERS_OF_A_RING, predicate, "4 corners or more", f"{what}: {len(ring)}"
@@ -49,7 +49,7 @@ def _proper(report: FindingCollector, name: str, ring: Sequence[Vec2], what: str
 
 
 def check_rooms(house: House, report: FindingCollector) -> dict[int, Polygon]:
-    """Judge outline and rooms: proper polygons, stated areas, a tiling. Return the rooms."""
+    """Check outline and rooms (polygons, stated areas, tiling); return the rooms by id."""
     outline = _proper(report, "outline", house.outline, "outline")
     rooms: dict[int, Polygon] = {}
     for room in house.rooms:
@@ -102,7 +102,7 @@ def _outside_of(line: LineString, area: Geometry) -> float:
 
 
 def check_doors(house: House, rooms: dict[int, Polygon], report: FindingCollector) -> None:
-    """Judge doors, windows and the room graph against the rooms' borders."""
+    """Check doors, windows and the room graph against the rooms' borders."""
     if len(rooms) < len(house.rooms):
         return
     outer = Polygon(house.outline).exterior
@@ -139,7 +139,7 @@ def check_doors(house: House, rooms: dict[int, Polygon], report: FindingCollecto
 
 
 def check_walls(house: House, rooms: dict[int, Polygon], report: FindingCollector) -> None:
-    """Judge the walls at every height: solid along all borders, open exactly at openings."""
+    """Check the walls at every height: solid along all borders, open exactly at openings."""
     if len(rooms) < len(house.rooms) or not rooms:
         return
     lines = shapely.union_all([shape.exterior for shape in rooms.values()])

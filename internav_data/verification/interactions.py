@@ -1,4 +1,4 @@
-"""What outcomes and experts must be whatever physics says: order, counts, flags that follow."""
+"""Predicates of outcomes and experts that need no physics: order, counts, derived flags."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ OUTCOMES = (*PUSH_OUTCOMES, PICK_OUTCOME)
 PUSH_REASONS = ("", "not pushable", "too heavy", "something is in the way")
 PICK_REASONS = ("", "not pickable", "something rests on it")
 PUSHED_M = 0.05
-"""A push that moves a thing less has failed."""
+"""Minimum displacement of a successful push."""
 
 ACTIONS = 12
 MOVE, ROTATE_LEFT, ROTATE_RIGHT = 0, 1, 2
 PUSHES = (5, 6, 7, 8)
 PICK, DROP, DONE = 9, 10, 11
-MOST_ACTIONS = 500
+MAX_ACTIONS = 500
 SPACING_M = 0.25
 ROUNDED_M = 1e-4
 """Stored lengths are rounded to 0.1 mm."""
 
 
-class _Judge:
-    """One episode before its predicates."""
+class _InteractionCheck:
+    """Check of one episode's outcomes and expert."""
 
     def __init__(self, episode: Episode, report: FindingCollector) -> None:
         self._episode = episode
@@ -40,7 +40,7 @@ class _Judge:
         )
 
     def outcomes(self) -> None:
-        """Judge the outcomes: of all obstacles or of none."""
+        """Check the outcomes: of all obstacles or of none."""
         known = [o.outcomes is not None for o in self._episode.obstacles]
         self.expect(all(known) or not any(known), "outcomes.all", "all or none", known)
         for number, obstacle in enumerate(self._episode.obstacles):
@@ -93,16 +93,16 @@ class _Judge:
             self.expect(same, "outcomes.unchanged", f"{what}: {before}", (steps, obstructed_path_m))
             return
         straight = math.dist((episode.start.x, episode.start.y), (episode.goal.x, episode.goal.y))
-        least = max(straight, episode.shortest_path_m) if pick else straight
-        most = math.inf if steps is None else steps * SPACING_M
+        min_length = max(straight, episode.shortest_path_m) if pick else straight
+        max_length = math.inf if steps is None else steps * SPACING_M
         if pick and episode.obstructed_path_m is not None:
-            most = min(most, episode.obstructed_path_m)
-        # A way on the lattice is a way; less in it makes no way longer.
+            max_length = min(max_length, episode.obstructed_path_m)
+        # A lattice path bounds the Euclidean one; removing an obstacle makes no path longer.
         length = math.inf if obstructed_path_m is None else obstructed_path_m
         self.expect(
-            least - ROUNDED_M <= length <= most + ROUNDED_M,
+            min_length - ROUNDED_M <= length <= max_length + ROUNDED_M,
             "outcomes.path_m_after",
-            f"{what}: {least:.4f} … {most:.4f} m",
+            f"{what}: {min_length:.4f} … {max_length:.4f} m",
             obstructed_path_m,
         )
         if pick:
@@ -118,14 +118,14 @@ class _Judge:
             )
 
     def expert(self, expert: Expert) -> None:
-        """Judge what the expert's own actions say."""
+        """Check the statements about the expert that follow from its actions alone."""
         actions = expert.actions
         unknown = [a for a in actions if not 0 <= a < ACTIONS]
         self.expect(not unknown, "expert.actions", f"0 … {ACTIONS - 1}", unknown)
         self.expect(
-            0 < len(actions) <= MOST_ACTIONS,
+            0 < len(actions) <= MAX_ACTIONS,
             "expert.actions",
-            f"1 … {MOST_ACTIONS} actions",
+            f"1 … {MAX_ACTIONS} actions",
             len(actions),
         )
         ends = [k for k, action in enumerate(actions) if action == DONE]
@@ -145,19 +145,21 @@ class _Judge:
 
 
 def check_interactions(episode: Episode, report: FindingCollector, *, solvable: bool) -> None:
-    """Judge the outcomes and the expert of an episode, where it has them.
+    """Check the outcomes and the expert of an episode, if it has them.
 
     Parameters
     ----------
-    episode, report
-        What to judge, and where findings go.
+    episode
+        Episode to check.
+    report
+        Collector that receives the findings.
     solvable
-        Whether every episode of the dataset was promised to have an expert.
+        Whether every episode of the dataset must have an expert.
 
     """
-    judge = _Judge(episode, report)
-    judge.outcomes()
+    check = _InteractionCheck(episode, report)
+    check.outcomes()
     if episode.expert is not None:
-        judge.expert(episode.expert)
+        check.expert(episode.expert)
     elif solvable:
-        judge.expect(False, "expert.present", "an expert", None)  # noqa: FBT003 - counted
+        check.expect(False, "expert.present", "an expert", None)  # noqa: FBT003 - counted

@@ -1,4 +1,4 @@
-"""`validate`: the levels of checking, one after the other, over processes if asked."""
+"""`validate`: the levels of validation in order, optionally in several processes."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from internav_data.dataset import ASSETS, EPISODES, SCENES, from_table, read_tab
 from internav_data.dataset.parquet import open_parquet, read_group
 from internav_data.records import Purpose, generator
 from internav_data.records.errors import UsageError
+from internav_data.verification.checked_config import CheckedConfig, checked_config
 from internav_data.verification.files import check_file, check_listing, check_manifest
 from internav_data.verification.findings import LEVELS, FindingCollector, Findings, Level, join
 from internav_data.verification.scenes import check_scene
-from internav_data.verification.settings import Settings, settings_of
 from internav_data.verification.shapes import Shapes
 from internav_data.verification.tables import check_tables, number_of
 
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 
 UNTRUE = "schema not as stated: physics not checked"
 SCENES_A_UNIT = 10
-"""Scenes that a worker judges before it reports."""
+"""Number of scenes that a worker checks before it reports."""
 
 
 @dataclass(frozen=True, slots=True)
 class ShardRef:
-    """Where a scene's rows lie: files and row groups; no episodes where `episodes` is None."""
+    """Files and row groups that hold a scene's rows; `episodes` is None if it has none."""
 
     scene_id: str
     house: tuple[str, int]
@@ -43,13 +43,13 @@ class ShardRef:
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """Some scenes for one worker."""
+    """Scenes that one worker checks."""
 
     root: Path
     assets: DataFile
-    places: tuple[ShardRef, ...]
-    physics: Settings | None = None
-    """To play the episodes again; None to leave physics alone."""
+    shard_refs: tuple[ShardRef, ...]
+    physics: CheckedConfig | None = None
+    """Settings for the level `physics`; None to omit it."""
 
 
 def validate(
@@ -59,7 +59,7 @@ def validate(
     workers: int = 1,
     progress: Progress | None = None,
 ) -> Findings:
-    """Prove a dataset right, or say what in it is wrong.
+    """Check every statement of a dataset, up to a level.
 
     Parameters
     ----------
@@ -68,16 +68,16 @@ def validate(
     level
         `files`: hashes, page checksums, nothing unlisted. `schema`: columns, ranges, ids.
         `geometry`: every predicate of every house and episode, derived again by shapely, scipy
-        and networkx. `physics`: settling, outcomes and experts, played again. Each level runs
-        those before it; an episode whose geometry is untrue is not played.
+        and networkx. `physics`: settling, outcomes and experts, replayed. Each level runs
+        those before it; an episode whose geometry is untrue is not replayed.
     sample
-        Look at the geometry and physics of so many scenes only, drawn from the dataset's seed;
+        Number of scenes whose geometry and physics are checked, drawn from the dataset's seed;
         None for all.
     workers
         Processes for geometry and physics. With more than one, a script that calls this needs the
         usual `if __name__ == "__main__":`.
     progress
-        Called with a level, what is done of it and how much there is.
+        Called with the level, the number of units done and the total.
 
     Returns
     -------
@@ -93,7 +93,7 @@ def validate(
 
     """
     _check_arguments(level, sample, workers)
-    tell: Progress = progress or (lambda *_: None)
+    progress_callback: Progress = progress or (lambda *_: None)
     whole = FindingCollector()
     manifest = check_manifest(path, whole)
     if manifest is None:
@@ -105,21 +105,21 @@ def validate(
         if report.by_predicate:
             damaged |= {file.path}
         whole.absorb(report)
-        tell("files", done, len(manifest.files))
+        progress_callback("files", done, len(manifest.files))
     tables = FindingCollector()
     if level != "files":
-        tell("schema", 0, 1)
+        progress_callback("schema", 0, 1)
         tables = check_tables(path, manifest, damaged)
         whole.absorb(tables)
-        tell("schema", 1, 1)
+        progress_callback("schema", 1, 1)
         damaged |= {f.file for f in tables.found if f.predicate == "schema.columns"}
     if level in {"geometry", "physics"}:
-        physics = settings_of(manifest.config) if level == "physics" else None
+        physics = checked_config(manifest.config) if level == "physics" else None
         if physics is not None and tables.by_predicate:
-            # An engine is not asked about what may be no number at all.
+            # The engine must not receive values that may not be numbers at all.
             physics = None
             whole.notes[UNTRUE] += sum(counts.episodes for counts in manifest.counts.values())
-        _check_scenes(path, manifest, damaged, whole, sample, workers, tell, physics)
+        _check_scenes(path, manifest, damaged, whole, sample, workers, progress_callback, physics)
     return whole.findings(level)
 
 
@@ -139,30 +139,30 @@ def _check_scenes(
     whole: FindingCollector,
     sample: int | None,
     workers: int,
-    tell: Progress,
-    physics: Settings | None,
+    progress_callback: Progress,
+    physics: CheckedConfig | None,
 ) -> None:
     assets = [file for file in manifest.of("assets") if file.path not in damaged]
-    places = _places(root, manifest, damaged)
-    if not assets or not places:
+    shard_refs = _shard_refs(root, manifest, damaged)
+    if not assets or not shard_refs:
         return
-    if sample is not None and sample < len(places):
+    if sample is not None and sample < len(shard_refs):
         rng = generator(manifest.seed, Purpose.LOADER, draw=sample)
-        chosen = sorted(rng.permutation(len(places))[:sample].tolist())
-        places = [places[k] for k in chosen]
+        chosen = sorted(rng.permutation(len(shard_refs))[:sample].tolist())
+        shard_refs = [shard_refs[k] for k in chosen]
     units = [
-        Unit(root, assets[0], tuple(places[k : k + SCENES_A_UNIT]), physics)
-        for k in range(0, len(places), SCENES_A_UNIT)
+        Unit(root, assets[0], tuple(shard_refs[k : k + SCENES_A_UNIT]), physics)
+        for k in range(0, len(shard_refs), SCENES_A_UNIT)
     ]
     done = 0
-    for unit, report in zip(units, _judged(units, workers), strict=True):
+    for unit, report in zip(units, _check_units(units, workers), strict=True):
         whole.absorb(report)
-        done += len(unit.places)
-        tell("geometry" if physics is None else "physics", done, len(places))
+        done += len(unit.shard_refs)
+        progress_callback("geometry" if physics is None else "physics", done, len(shard_refs))
 
 
-def _judged(units: Sequence[Unit], workers: int) -> Iterator[FindingCollector]:
-    """Yield what is found in each unit, in order."""
+def _check_units(units: Sequence[Unit], workers: int) -> Iterator[FindingCollector]:
+    """Yield the findings of each unit, in order."""
     if workers == 1 or len(units) == 1:
         yield from map(check_unit, units)
         return
@@ -170,7 +170,7 @@ def _judged(units: Sequence[Unit], workers: int) -> Iterator[FindingCollector]:
         yield from pool.map(check_unit, units)
 
 
-def _places(root: Path, manifest: Manifest, damaged: frozenset[str]) -> list[ShardRef]:
+def _shard_refs(root: Path, manifest: Manifest, damaged: frozenset[str]) -> list[ShardRef]:
     """Find every scene's rows, in order of scenes."""
     found: dict[str, dict[str, tuple[str, int]]] = {"scenes": {}, "episodes": {}}
     for name, spec in (("scenes", SCENES), ("episodes", EPISODES)):
@@ -189,39 +189,39 @@ def _places(root: Path, manifest: Manifest, damaged: frozenset[str]) -> list[Sha
 
 
 class _Reader:
-    """Reads row groups as records; remembers the last one of each table."""
+    """Reader of row groups as records; it caches the last one of each table."""
 
     def __init__(self, root: Path) -> None:
         self._root = root
         self._last: dict[str, tuple[tuple[str, int], list[Any]]] = {}
 
-    def _group(self, name: str, place: tuple[str, int]) -> list[Any]:
-        if name not in self._last or self._last[name][0] != place:
-            file, group = place
+    def _group(self, name: str, row_group: tuple[str, int]) -> list[Any]:
+        if name not in self._last or self._last[name][0] != row_group:
+            file, group = row_group
             spec = SCENES if name == "scenes" else EPISODES
             with open_parquet(self._root / file, spec) as parquet:
                 table = read_group(self._root / file, parquet, group, spec)
             extra: dict[str, Any] | None = {"assets": {}} if name == "scenes" else None
-            self._last[name] = (place, from_table(table, spec, extra))
+            self._last[name] = (row_group, from_table(table, spec, extra))
         return self._last[name][1]
 
-    def house(self, place: ShardRef) -> House:
-        houses: list[House] = self._group("scenes", place.house)
-        return next(house for house in houses if house.scene_id == place.scene_id)
+    def house(self, shard_ref: ShardRef) -> House:
+        houses: list[House] = self._group("scenes", shard_ref.house)
+        return next(house for house in houses if house.scene_id == shard_ref.scene_id)
 
-    def episodes(self, place: ShardRef) -> list[Episode]:
-        if place.episodes is None:
+    def episodes(self, shard_ref: ShardRef) -> list[Episode]:
+        if shard_ref.episodes is None:
             return []
-        group = self._group("episodes", place.episodes)
-        return [episode for episode in group if episode.scene_id == place.scene_id]
+        group = self._group("episodes", shard_ref.episodes)
+        return [episode for episode in group if episode.scene_id == shard_ref.scene_id]
 
 
 _SHAPES: dict[str, Shapes] = {}
-"""Of this process, by sha256 of the assets' file: worked out once for all its units."""
+"""Shapes of this process, by sha256 of the assets' file, computed once for all its units."""
 
 
 def check_unit(unit: Unit) -> FindingCollector:
-    """Judge the geometry of some scenes, and the physics if asked."""
+    """Check the geometry of a unit's scenes, and the physics if the unit asks for it."""
     key = unit.assets.sha256
     if key not in _SHAPES:
         _SHAPES.clear()
@@ -229,8 +229,8 @@ def check_unit(unit: Unit) -> FindingCollector:
         _SHAPES[key] = Shapes({a.asset_id: a for a in from_table(table, ASSETS)})
     reader = _Reader(unit.root)
     reports = []
-    for place in unit.places:
-        file = place.episodes[0] if place.episodes else place.house[0]
-        house, episodes = reader.house(place), reader.episodes(place)
+    for shard_ref in unit.shard_refs:
+        file = shard_ref.episodes[0] if shard_ref.episodes else shard_ref.house[0]
+        house, episodes = reader.house(shard_ref), reader.episodes(shard_ref)
         reports.append(check_scene(house, episodes, _SHAPES[key], file, unit.physics))
     return join(reports)

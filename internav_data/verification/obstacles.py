@@ -1,4 +1,4 @@
-"""Predicates of the obstacles of an episode: what they are, where they lie, how they settled."""
+"""Predicates of the obstacles of an episode: assets, poses, certificates of settling."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ MAX_SETTLE_S = 1.0
 MAX_PENETRATION_M = 0.002
 MAX_TILT_DEG = 5.0
 FLOOR_M = (-0.0025, 0.005)
-"""Heights between which the lowest corner of a settled thing lies."""
+"""Bounds of the height of a settled object's lowest corner."""
 TILT_SLACK_DEG = 0.001
-"""Quaternions are rounded to 1e-6."""
+"""Tolerance of the tilt: quaternions are rounded to 1e-6."""
 
 
 class Expect(Protocol):
-    """Judges one predicate of an episode."""
+    """Function that checks one predicate of an episode."""
 
     def __call__(self, holds: object, predicate: str, expected: object, got: object) -> bool:
-        """Keep a finding where it does not hold; return whether it holds."""
+        """Keep a finding if the predicate does not hold; return whether it holds."""
 
 
 def check_obstacles(
-    site: CheckedLayout, episode: Episode, report: FindingCollector
+    layout: CheckedLayout, episode: Episode, report: FindingCollector
 ) -> list[Geometry] | None:
-    """Judge the obstacles; return their footprints, None where an asset is unknown."""
+    """Check the obstacles; return their footprints, or None if an asset is unknown."""
     name = episode.episode_id
 
     def expect(holds: object, predicate: str, expected: object, got: object) -> bool:
@@ -45,13 +45,13 @@ def check_obstacles(
     expect(episode.obstacle_count == count, "episode.obstacle-count", count, episode.obstacle_count)
     expect(count > 0, "episode.obstacle-count", "at least one obstacle", count)
     segments = max((len(path.points) - 1 for path in episode.node_paths), default=0)
-    prints: list[list[Geometry]] = []
+    footprints: list[list[Geometry]] = []
     for number, obstacle in enumerate(episode.obstacles):
         what = f"obstacle {number} ({obstacle.asset_id})"
-        known = obstacle.asset_id in site.shapes.assets
+        known = obstacle.asset_id in layout.shapes.assets
         if not expect(known, "obstacle.asset", f"{what} in assets.parquet", "no such asset"):
             return None
-        _check_asset(site, obstacle, what, expect)
+        _check_asset(layout, obstacle, what, expect)
         expect(
             0 <= obstacle.segment < segments,
             "obstacle.segment",
@@ -59,15 +59,15 @@ def check_obstacles(
             obstacle.segment,
         )
         _check_rest(obstacle, what, expect)
-        low = min(slab.low for slab in site.shapes.slabs(obstacle.asset_id, obstacle.pose))
+        low = min(slab.low for slab in layout.shapes.slabs(obstacle.asset_id, obstacle.pose))
         expect(
             FLOOR_M[0] <= low <= FLOOR_M[1],
             "obstacle.floor",
             f"{what}: lowest corner between {FLOOR_M[0]} and {FLOOR_M[1]} m",
             f"{low:.4f} m",
         )
-        prints.append(site.shapes.footprint(obstacle.asset_id, obstacle.pose))
-        _check_place(site, prints, number, what, expect)
+        footprints.append(layout.shapes.footprint(obstacle.asset_id, obstacle.pose))
+        _check_place(layout, footprints, number, what, expect)
     physics = episode.physics
     if episode.obstacles:
         slowest = max(o.settle_s for o in episode.obstacles)
@@ -80,11 +80,11 @@ def check_obstacles(
             physics.penetration_m,
         )
     expect(bool(physics.engine and physics.build), "physics.engine", "a name and a build", physics)
-    return [plan for plans in prints for plan in plans]
+    return [plan for plans in footprints for plan in plans]
 
 
-def _check_asset(site: CheckedLayout, obstacle: Obstacle, what: str, expect: Expect) -> None:
-    asset = site.shapes.assets[obstacle.asset_id]
+def _check_asset(layout: CheckedLayout, obstacle: Obstacle, what: str, expect: Expect) -> None:
+    asset = layout.shapes.assets[obstacle.asset_id]
     expect(asset.spawnable, "obstacle.spawnable", f"{what}: a spawnable asset", "another")
     for name in ("type", "mass_kg", "friction", "pushable", "pickable"):
         stated, true = getattr(obstacle, name), getattr(asset, name)
@@ -118,20 +118,20 @@ def _check_rest(obstacle: Obstacle, what: str, expect: Expect) -> None:
 
 
 def _check_place(
-    site: CheckedLayout, prints: list[list[Geometry]], number: int, what: str, expect: Expect
+    layout: CheckedLayout, footprints: list[list[Geometry]], number: int, what: str, expect: Expect
 ) -> None:
-    own = prints[number]
+    own = footprints[number]
     for plan in own:
-        beyond = shapely.area(shapely.difference(plan, site.outline))
+        beyond = shapely.area(shapely.difference(plan, layout.outline))
         expect(
             beyond < DEPTH_M**2, "obstacle.inside", f"{what} inside the house", f"{beyond:.6f} m²"
         )
-    hits = overlapping_plans(own, site.blockers)
+    hits = overlapping_plans(own, layout.blockers)
     expect(
         not hits, "obstacle.overlap-house", f"{what} clear of the house", f"{len(hits)} overlaps"
     )
     for other in range(number):
-        hits = overlapping_plans(own, prints[other])
+        hits = overlapping_plans(own, footprints[other])
         expect(
             not hits,
             "obstacle.overlap",

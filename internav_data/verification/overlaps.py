@@ -1,4 +1,4 @@
-"""Whether convex solids overlap in space: slabs first, a linear programme for what remains."""
+"""Overlap tests of convex solids: slabs first, a linear programme for the remaining pairs."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from internav_data.verification.shapes import Slab
 
 DEPTH_M = 0.001
-"""What overlaps by less is contact: poses are rounded to 0.1 mm."""
+"""Overlaps below this depth count as contact: poses are rounded to 0.1 mm."""
 
 
 def plans_overlap(first: Geometry, second: Geometry, depth_m: float = DEPTH_M) -> bool:
-    """Whether two plans share a disc of diameter `depth_m` (or more)."""
+    """Return whether two plans share a disc of diameter `depth_m` (or more)."""
     shared = shapely.intersection(first, second)
     if shapely.area(shared) < np.pi * (depth_m / 2.0) ** 2:
         return False
@@ -32,7 +32,7 @@ def plans_overlap(first: Geometry, second: Geometry, depth_m: float = DEPTH_M) -
 def overlapping_plans(
     first: Sequence[Geometry], second: Sequence[Geometry], depth_m: float = DEPTH_M
 ) -> list[tuple[int, int]]:
-    """Pairs (index in first, index in second) of plans that overlap deeper than `depth_m`."""
+    """Return pairs (index in first, index in second) of plans that overlap over `depth_m`."""
     if not first or not second:
         return []
     tree = shapely.STRtree(np.array(second, dtype=object))
@@ -45,7 +45,7 @@ def _half_spaces(corners: Floats) -> Floats:
 
 
 def hulls_overlap(first: Floats, second: Floats, depth_m: float = DEPTH_M) -> bool:
-    """Whether a ball of diameter `depth_m` fits into both hulls of corners (n, 3) at once."""
+    """Return whether a ball of diameter `depth_m` fits into both hulls of corners (n, 3)."""
     try:
         planes = np.vstack([_half_spaces(first), _half_spaces(second)])
     except (QhullError, ValueError):  # a flat part has no inside
@@ -67,7 +67,7 @@ def overlapping_slabs(
     may_interlock: Callable[[int, int], bool],
     depth_m: float = DEPTH_M,
 ) -> list[tuple[int, int]]:
-    """Pairs of owners (ascending) whose slabs overlap in space deeper than `depth_m`."""
+    """Return pairs of owners (ascending) whose slabs overlap in space over `depth_m`."""
     if not slabs:
         return []
     plans = np.array([slab.plan for slab in slabs], dtype=object)

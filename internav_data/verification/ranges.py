@@ -1,4 +1,4 @@
-"""Ranges of single values, column by column: what a JSON Schema says, vectorised."""
+"""Ranges of single values, column by column: the checks of a JSON Schema, vectorised."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ if TYPE_CHECKING:
     from internav_data.verification.findings import FindingCollector
 
 METRES = 4
-"""Positions and lengths are rounded to 0.1 mm."""
+"""Decimals of positions and lengths (0.1 mm)."""
 TURNS = 6
-"""Quaternions are rounded to 1e-6."""
-MOST_PUSH_S = 5.5
-"""Half a second of pushing, five until at rest."""
+"""Decimals of quaternions."""
+MAX_PUSH_S = 5.5
+"""Maximum duration of a push: half a second of force, five until at rest."""
 UNIT = 3e-6
-"""How far from 1 the length of a rounded quaternion may be."""
+"""Tolerance of the length of a rounded quaternion."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """What every value of one leaf column obeys (missing values are judged by the schema)."""
+    """Rule for every value of one leaf column (the schema checks missing values)."""
 
     low: float = -math.inf
     high: float = math.inf
     choices: tuple[Any, ...] = ()
     digits: int | None = None
-    """Decimals that a stored float has at most."""
+    """Maximum number of decimals of a stored float."""
     pattern: str = ""
 
 
@@ -57,7 +57,7 @@ OUTCOME_RULES: Mapping[str, Rule] = {
     "displacement_m": Rule(0.0, 1e4, digits=METRES),
     "path_steps_after": Rule(1),
     "path_m_after": Rule(0.0, 1e4, digits=METRES),
-    "seconds": Rule(0.0, MOST_PUSH_S),
+    "seconds": Rule(0.0, MAX_PUSH_S),
     "reason": Rule(choices=tuple(sorted({*PUSH_REASONS, *PICK_REASONS}))),
 }
 EPISODE_RULES: Mapping[str, Rule] = {
@@ -169,7 +169,7 @@ def _leaves(path: str, array: pa.Array) -> Iterator[tuple[str, pa.Array]]:
 
 
 def check_ranges(table: pa.Table, name: str, report: FindingCollector) -> None:
-    """Judge every value of a table by the rule of its column."""
+    """Check every value of a table by the rule of its column."""
     rules = RULES[name]
     turns: dict[str, list[np.ndarray[Any, Any]]] = {}
     for path, array in leaves(table):
@@ -206,7 +206,7 @@ def _check_leaf(array: pa.Array, rule: Rule, predicate: str, report: FindingColl
         wrong = values[~np.isin(values, rule.choices)]
         _none(report, predicate, f"one of {rule.choices}", wrong)
     if rule.digits is not None:
-        # What was rounded is the float nearest to its decimals.
+        # A rounded value is the float nearest to its decimals.
         wrong = values[np.abs(np.round(values, rule.digits) - values) > 1e-9]  # noqa: PLR2004
         _none(report, predicate, f"{rule.digits} decimals", wrong)
 

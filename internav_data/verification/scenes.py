@@ -1,4 +1,4 @@
-"""Judges one scene and its episodes at the geometry level, and at that of physics if asked."""
+"""Check of one scene and its episodes at the levels `geometry` and `physics`."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from internav_data.verification.checked_layout import CheckedLayout
 from internav_data.verification.episodes import check_episode
 from internav_data.verification.findings import FindingCollector
 from internav_data.verification.houses import check_doors, check_rooms, check_walls
-from internav_data.verification.things import check_things, check_ways_through
+from internav_data.verification.objects import check_objects, check_passages
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from internav_data.records import Episode, House
-    from internav_data.verification.settings import Settings
+    from internav_data.verification.checked_config import CheckedConfig
     from internav_data.verification.shapes import Shapes
 
 UNTRUE = "geometry not as stated: physics not checked"
@@ -25,66 +25,69 @@ def check_scene(
     episodes: Sequence[Episode],
     shapes: Shapes,
     file: str = "",
-    physics: Settings | None = None,
+    physics: CheckedConfig | None = None,
 ) -> FindingCollector:
-    """Judge a house and its episodes, sharing what they have in common.
+    """Check a house and its episodes.
 
     Parameters
     ----------
     house
-        The house; its own `assets` are not looked at.
+        The house; its own `assets` are ignored.
     episodes
         Episodes of that house. The finely cut visibility graph is built for the one in the
         middle of them.
     shapes
-        Of what `assets.parquet` says; worth keeping from scene to scene.
+        Shapes of the assets in `assets.parquet`; share them between scenes.
     file
         Path of the episodes' file, for findings.
     physics
-        How the episodes were made, to play them again; None to leave physics alone.
+        Generation settings for the level `physics`; None to omit it.
 
     """
     report = FindingCollector(file, house.scene_id)
     report.counts["scenes"] += 1
-    site = _check_house(house, shapes, report)
+    layout = _check_house(house, shapes, report)
     true: list[Episode] = []
-    if site is not None:
+    if layout is not None:
         sound = not report.by_predicate
         for number, episode in enumerate(episodes):
-            holds = check_episode(site, episode, report, exact=number == len(episodes) // 2)
+            holds = check_episode(layout, episode, report, exact=number == len(episodes) // 2)
             report.counts["episodes"] += 1
             if sound and holds:
                 true.append(episode)
     if physics is not None:
         if len(true) < len(episodes):
             report.notes[UNTRUE] += len(episodes) - len(true)
-        if site is not None and true:
-            _replay(site, true, physics, report)
+        if layout is not None and true:
+            _replay(layout, true, physics, report)
     return report
 
 
 def _check_house(house: House, shapes: Shapes, report: FindingCollector) -> CheckedLayout | None:
-    """Judge a house; None where nothing can be measured in it."""
+    """Check a house and return its layout; None if nothing can be measured in it."""
     unknown = sorted({t.asset_id for t in house.objects} - set(shapes.assets))
     rooms = check_rooms(house, report)
     check_doors(house, rooms, report)
     check_walls(house, rooms, report)
-    if not report.expect(not unknown, "thing.asset", "assets in assets.parquet", unknown):
+    if not report.expect(not unknown, "object.asset", "assets in assets.parquet", unknown):
         return None
     if len(rooms) < len(house.rooms) or "house.outline-polygon" in report.by_predicate:
         return None  # nothing can be measured in a house without proper rooms
-    site = CheckedLayout(house, shapes)
-    check_things(house, rooms, site.shapes, report)
-    check_ways_through(house, rooms, site.prints, site.ground, report)
-    return site
+    layout = CheckedLayout(house, shapes)
+    check_objects(house, rooms, layout.shapes, report)
+    check_passages(house, rooms, layout.footprints, layout.lattice, report)
+    return layout
 
 
 def _replay(
-    site: CheckedLayout, episodes: Sequence[Episode], settings: Settings, report: FindingCollector
+    layout: CheckedLayout,
+    episodes: Sequence[Episode],
+    config: CheckedConfig,
+    report: FindingCollector,
 ) -> None:
-    """Play episodes again. The engine is imported here: geometry does without."""
+    """Replay episodes. The engine is imported here: the level `geometry` needs none."""
     from internav_data.verification.replay import CheckedScene, replay_episode  # noqa: PLC0415
 
-    theatre = CheckedScene(site, settings)
+    scene = CheckedScene(layout, config)
     for episode in episodes:
-        replay_episode(theatre, episode, report)
+        replay_episode(scene, episode, report)

@@ -1,4 +1,4 @@
-"""What things cover, derived again: hull edges cut by planes, shapely hulls of what is left.
+"""Footprints derived again: hull edges cut by planes, shapely hulls of the remaining points.
 
 Shares no code with `internav_data.geometry`: corners, quaternions and clipping are written anew.
 """
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from internav_data.records import Asset, Part, Pose, Quaternion
 
 STEP_OVER_M = 0.02
-"""An agent steps over what is flatter."""
+"""Height below which the agent steps over an object."""
 AGENT_HEIGHT_M = 1.8
-"""An agent walks under what is higher."""
+"""Height above which the agent walks under an object."""
 SIDES = 16
-"""Cylinders are prisms of so many sides; so are the rings of spheres."""
+"""Number of sides of the prisms that stand for cylinders, and of the rings of spheres."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +40,7 @@ class Solid:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Slab:
-    """What one part covers of the floor, between which heights, and its corners (n, 3); metres."""
+    """One part at its pose: corners (n, 3), plan and interval of heights, metres."""
 
     corners: Floats
     plan: Geometry
@@ -48,8 +48,8 @@ class Slab:
     high: float
 
 
-def turned(points: Floats, quaternion: Quaternion) -> Floats:
-    """Turn points (n, 3) by a quaternion: v + 2 w (q x v) + 2 q x (q x v), q normalised."""
+def rotate(points: Floats, quaternion: Quaternion) -> Floats:
+    """Rotate points (n, 3) by a quaternion: v + 2 w (q x v) + 2 q x (q x v), q normalised."""
     x, y, z, w = np.asarray(quaternion, dtype=np.float64) / math.hypot(*quaternion)
 
     def crossed(v: Floats) -> Floats:
@@ -97,12 +97,12 @@ def _hull_edges(corners: Floats) -> Ints:
 
 def solid_of(part: Part) -> Solid:
     """Return the polyhedron of a part, in its asset's frame."""
-    corners = turned(_local_corners(part), part.rotation) + np.array(part.centre)
+    corners = rotate(_local_corners(part), part.rotation) + np.array(part.centre)
     return Solid(corners, _hull_edges(corners))
 
 
 def _hulls(groups: Sequence[Floats]) -> list[Geometry]:
-    """Convex hulls in the plane of groups of points (n, 2), in one call."""
+    """Return the convex hulls in the plane of groups of points (n, 2), in one call."""
     if not groups:
         return []
     owners = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
@@ -111,7 +111,10 @@ def _hulls(groups: Sequence[Floats]) -> list[Geometry]:
 
 
 def slice_of(corners: Floats, edges: Ints, low: float, high: float) -> Floats:
-    """Points (n, 2) whose hull is the plan of a polyhedron between two heights; none: no plan."""
+    """Return points (n, 2) whose hull is the plan of a polyhedron between two heights.
+
+    The polyhedron has corners (k, 3) and edges (m, 2). No points: nothing lies between them.
+    """
     z = corners[:, 2]
     if z.min() >= low and z.max() <= high:
         return corners[:, :2]
@@ -126,7 +129,7 @@ def slice_of(corners: Floats, edges: Ints, low: float, high: float) -> Floats:
 
 
 def _uncovered(plans: list[Geometry]) -> list[Geometry]:
-    """Leave out what the largest plan covers: the union stays the same, the work does not."""
+    """Leave out the plans that the largest one covers: same union, less work."""
     if not plans:
         return []
     largest = max(plans, key=shapely.area)
@@ -136,7 +139,7 @@ def _uncovered(plans: list[Geometry]) -> list[Geometry]:
 
 
 class Shapes:
-    """Footprints and slabs of assets at poses; hulls are worked out once for each asset."""
+    """Footprints and slabs of assets at poses; hulls are computed once for each asset."""
 
     def __init__(self, assets: Mapping[str, Asset]) -> None:
         self.assets = assets
@@ -151,12 +154,12 @@ class Shapes:
     def _placed(self, asset_id: str, pose: Pose) -> list[tuple[Floats, Ints]]:
         solids = self.solids(asset_id)
         ends = np.cumsum([0, *(len(s.corners) for s in solids)])
-        moved = turned(np.vstack([s.corners for s in solids]), pose.quaternion)
+        moved = rotate(np.vstack([s.corners for s in solids]), pose.quaternion)
         moved += (pose.x, pose.y, pose.z)
         return [(moved[ends[k] : ends[k + 1]], s.edges) for k, s in enumerate(solids)]
 
     def footprint(self, asset_id: str, pose: Pose) -> list[Geometry]:
-        """Return what an asset puts in the agent's way: one convex plan for each part."""
+        """Return the footprint of an asset at a pose: convex plans, one a part."""
         if not self.assets[asset_id].blocks:
             return []
         slices = [

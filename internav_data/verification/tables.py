@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 from internav_data.dataset import ASSETS, EPISODES, SCENES, TABLES, from_table, read_table
 from internav_data.records import OUTSIDE
 from internav_data.records.errors import InternavError
+from internav_data.verification.checked_config import checked_config
 from internav_data.verification.findings import FindingCollector
 from internav_data.verification.interactions import check_interactions
 from internav_data.verification.ranges import check_ranges
-from internav_data.verification.settings import settings_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     from internav_data.records import House
 
 SPLIT_PERIOD = 120
-"""Scenes by number: 0 of every 120 is val, 1 is test, the others train."""
+"""Period of the splits: of every 120 scenes number 0 is val, 1 is test, the others are train."""
 
 
 @dataclass(frozen=True, slots=True)
 class SceneKeys:
-    """What episodes of a scene may refer to."""
+    """Ids of a scene to which its episodes may refer."""
 
     split: str
     room_ids: frozenset[int]
@@ -37,8 +37,8 @@ class SceneKeys:
 
 
 @dataclass(slots=True)
-class Keys:
-    """What the tables of a dataset may refer to in each other, and what they hold."""
+class DatasetKeys:
+    """Ids to which tables may refer, gathered table by table."""
 
     assets: frozenset[str] = frozenset()
     scenes: dict[str, SceneKeys] = field(default_factory=dict)
@@ -46,20 +46,20 @@ class Keys:
 
 
 def split_of(scene: int) -> str:
-    """Return the split that a scene's number says."""
+    """Return the split of a scene's number."""
     return {0: "val", 1: "test"}.get(scene % SPLIT_PERIOD, "train")
 
 
 def number_of(scene_id: str) -> int:
-    """Return a scene's number, -1 where the id has none."""
+    """Return a scene's number, -1 if the id has none."""
     digits = scene_id.rpartition("-")[2]
     return int(digits) if digits.isdecimal() else -1
 
 
 def check_tables(root: Path, manifest: Manifest, damaged: frozenset[str]) -> FindingCollector:
-    """Judge all tables of a dataset; files that `files` found damaged are left out."""
+    """Check all tables of a dataset but for damaged files."""
     whole = FindingCollector()
-    keys = Keys()
+    keys = DatasetKeys()
     for name in ("assets", "scenes", "episodes"):
         for file in manifest.of(name):
             if file.path not in damaged:
@@ -69,7 +69,9 @@ def check_tables(root: Path, manifest: Manifest, damaged: frozenset[str]) -> Fin
     return whole
 
 
-def _check_table(root: Path, manifest: Manifest, file: DataFile, keys: Keys) -> FindingCollector:
+def _check_table(
+    root: Path, manifest: Manifest, file: DataFile, keys: DatasetKeys
+) -> FindingCollector:
     report = FindingCollector(file.path)
     spec = next(spec for spec in TABLES if spec.name == file.table)
     try:
@@ -88,7 +90,7 @@ def _check_table(root: Path, manifest: Manifest, file: DataFile, keys: Keys) -> 
     return report
 
 
-def _check_assets(table: pa.Table, keys: Keys, report: FindingCollector) -> None:
+def _check_assets(table: pa.Table, keys: DatasetKeys, report: FindingCollector) -> None:
     ids = table.column("asset_id").to_pylist()
     report.expect(ids == sorted(ids), "schema.assets.order", "rows by asset_id", "another order")
     report.expect(len(set(ids)) == len(ids), "schema.assets.unique", "each asset once", "one twice")
@@ -98,7 +100,7 @@ def _check_assets(table: pa.Table, keys: Keys, report: FindingCollector) -> None
 
 
 def _check_scenes(
-    table: pa.Table, manifest: Manifest, file: DataFile, keys: Keys, report: FindingCollector
+    table: pa.Table, manifest: Manifest, file: DataFile, keys: DatasetKeys, report: FindingCollector
 ) -> None:
     houses = from_table(table, SCENES, {"assets": {}})
     numbers = [house.scene for house in houses]
@@ -129,8 +131,8 @@ def _check_scenes(
     report.scene = ""
 
 
-def _check_links(house: House, keys: Keys, report: FindingCollector) -> None:
-    """Judge a house's ids: unique, and known where they refer to others."""
+def _check_links(house: House, keys: DatasetKeys, report: FindingCollector) -> None:
+    """Check that a house's ids are unique and refer to known ones."""
 
     def expect(name: str, wrong: Sequence[Any], expected: str) -> None:
         report.expect(not wrong, f"schema.scenes.{name}", expected, wrong)
@@ -145,7 +147,7 @@ def _check_links(house: House, keys: Keys, report: FindingCollector) -> None:
     for name, ids in (
         ("door-ids", [d.door_id for d in house.doors]),
         ("window-ids", [w.window_id for w in house.windows]),
-        ("thing-ids", [t.object_id for t in house.objects]),
+        ("object-ids", [t.object_id for t in house.objects]),
     ):
         expect(name, sorted(i for i, n in Counter(ids).items() if n > 1), "each id once")
     known = {*rooms, OUTSIDE}
@@ -156,15 +158,15 @@ def _check_links(house: House, keys: Keys, report: FindingCollector) -> None:
         "two room ids, ascending",
     )
     expect("window-room", [w.window_id for w in house.windows if w.room not in rooms], "a room")
-    expect("thing-room", [t.object_id for t in house.objects if t.room not in rooms], "a room")
+    expect("object-room", [t.object_id for t in house.objects if t.room not in rooms], "a room")
     things = {t.object_id for t in house.objects}
     expect(
-        "thing-support",
+        "object-support",
         [t.object_id for t in house.objects if t.support != -1 and t.support not in things],
-        "a thing or -1",
+        "an object or -1",
     )
     expect(
-        "thing-asset",
+        "object-asset",
         sorted({t.asset_id for t in house.objects} - keys.assets),
         "assets of assets.parquet",
     )
@@ -175,7 +177,7 @@ def _check_links(house: House, keys: Keys, report: FindingCollector) -> None:
 
 
 def _check_episodes(
-    table: pa.Table, manifest: Manifest, file: DataFile, keys: Keys, report: FindingCollector
+    table: pa.Table, manifest: Manifest, file: DataFile, keys: DatasetKeys, report: FindingCollector
 ) -> None:
     columns = ("scene_id", "index", "episode_id", "split", "seed", "room_count", "obstacle_count")
     rows = list(zip(*(table.column(name).to_pylist() for name in columns), strict=True))
@@ -205,7 +207,7 @@ def _check_episodes(
         ):
             expect("room_count", len(scene.room_ids) if scene else 0, room_count)
     report.scene = ""
-    solvable = settings_of(manifest.config).solvable
+    solvable = checked_config(manifest.config).solvable
     _check_references(table, keys, report, solvable=solvable)
 
 
@@ -214,9 +216,9 @@ def _lengths(table: pa.Table, name: str) -> list[int]:
 
 
 def _check_references(
-    table: pa.Table, keys: Keys, report: FindingCollector, *, solvable: bool
+    table: pa.Table, keys: DatasetKeys, report: FindingCollector, *, solvable: bool
 ) -> None:
-    """Judge the room, door and asset ids that episodes name, and what their interactions say."""
+    """Check the room, door and asset ids that episodes name, and their interactions."""
     for episode in from_table(table, EPISODES):
         scene = keys.scenes.get(episode.scene_id)
         if scene is None:
@@ -242,8 +244,8 @@ def _check_references(
     report.scene = ""
 
 
-def _check_counts(manifest: Manifest, keys: Keys, report: FindingCollector) -> None:
-    """Judge that every scene asked for is there, with as many episodes as the config says."""
+def _check_counts(manifest: Manifest, keys: DatasetKeys, report: FindingCollector) -> None:
+    """Check that every requested scene is present with the number of episodes of the config."""
     given_up = {q.scene_id for q in manifest.quarantined}
     wanted = {f"scene-{k:06d}" for k in range(manifest.scenes)} - given_up
     missing, surplus = sorted(wanted - set(keys.scenes)), sorted(set(keys.scenes) - wanted)
@@ -263,7 +265,7 @@ def _check_counts(manifest: Manifest, keys: Keys, report: FindingCollector) -> N
 
 
 def _episodes_by_split(config: Mapping[str, Any]) -> dict[str, int]:
-    """Read the episodes a scene of each split from the resolved config, {} where it says none."""
+    """Read the number of episodes a scene from the resolved config, by split; {} if missing."""
     usual, test = config.get("episodes_per_scene"), config.get("test_episodes_per_scene")
     if not isinstance(usual, int) or not isinstance(test, int):
         return {}

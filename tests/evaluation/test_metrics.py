@@ -14,7 +14,7 @@ from internav_data.evaluation.evaluate import EvaluationConfig, evaluate
 from internav_data.evaluation.metrics import GROUPS, MEASURES, RESULTS, result_of, summary
 from internav_data.evaluation.reference_policies import oracle
 from internav_data.verification.checked_layout import CheckedLayout
-from internav_data.verification.lengths import Between
+from internav_data.verification.checked_path import CheckedPath
 from internav_data.verification.shapes import Shapes
 from internav_data.world import Action, HouseModel, World
 
@@ -140,8 +140,8 @@ def played_again(stage, episode, assets, actions):
 @pytest.mark.parametrize("who", ["expert", "random", "planner"])
 def test_the_environment_says_what_the_definitions_say(played_data, who):
     """Every metric again: by networkx and the validator's visibility graph, from the actions."""
-    settings = EvaluationConfig(max_steps=60)
-    results = evaluate(oracle(who, played_data), played_data, settings)
+    config = EvaluationConfig(max_steps=60)
+    results = evaluate(oracle(who, played_data), played_data, config)
     assert len(results) == len(played_data)
     worked = moved = 0
     for result, episode in zip(results, played_data, strict=True):
@@ -150,7 +150,7 @@ def test_the_environment_says_what_the_definitions_say(played_data, who):
             HouseModel.of(house), episode, played_data.assets, result.actions
         )
         length, steps = episode.shortest_path_m, len(result.actions)
-        assert result.steps == steps <= settings.max_steps
+        assert result.steps == steps <= config.max_steps
         assert result.success == found["reached"]
         assert result.path_m == pytest.approx(0.25 * found["moves"])
         for kind in set(KINDS.values()):
@@ -162,7 +162,7 @@ def test_the_environment_says_what_the_definitions_say(played_data, who):
         sts = length / 0.25 / steps if found["reached"] else 0.0
         assert result.spl == pytest.approx(spl)
         assert result.sts == pytest.approx(sts)
-        between = Between(
+        between = CheckedPath(
             CheckedLayout(house, Shapes(played_data.assets)), world.position, world.goal_point
         )
         assert between.agrees(result.distance_m), "any-angle, no obstacle about"

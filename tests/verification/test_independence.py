@@ -18,11 +18,17 @@ from internav_data import geometry, navigation
 from internav_data.records import Part, Pose
 from internav_data.verification.checked_lattice import KEEP_M, CheckedLattice
 from internav_data.verification.checked_layout import CheckedLayout
-from internav_data.verification.findings import KEPT, FindingCollector, join
+from internav_data.verification.findings import MAX_FINDINGS, FindingCollector, join
 from internav_data.verification.overlaps import hulls_overlap, plans_overlap
 from internav_data.verification.portals import Portals
 from internav_data.verification.shapes import Shapes, slice_of, solid_of
-from internav_data.verification.ways import FINE, Sight, ellipse, grown, joined
+from internav_data.verification.visibility_graph import (
+    FINE,
+    VisibilityGraph,
+    connected,
+    inflate,
+    path_ellipse,
+)
 
 HERE = Path(internav_data.verification.__file__).parent
 FORBIDDEN = (
@@ -122,12 +128,12 @@ def test_steps_are_those_of_a_brute_force():
     house = furnished(
         thing(0, "Table_1", 0, 1.5, 2.5, yaw_deg=30.0), thing(1, "Drum_1", 1, 6.0, 2.0)
     )
-    site = CheckedLayout(house, Shapes(ASSETS))
+    layout = CheckedLayout(house, Shapes(ASSETS))
     for x, y, yaw in ((2.5, 2.0, 90.0), (3.3, 2.2, 75.0), (5.0, 1.5, 15.0)):
         bar = obstacle("Bar_1", x, y, yaw_deg=yaw)
-        free = site.ground.with_obstacles(site.shapes.footprint("Bar_1", bar.pose))
-        goal = site.ground.node(28, 6)
-        found = site.ground.distances(goal, free)[site.ground.node(4, 6)]
+        free = layout.lattice.with_obstacles(layout.shapes.footprint("Bar_1", bar.pose))
+        goal = layout.lattice.node(28, 6)
+        found = layout.lattice.distances(goal, free)[layout.lattice.node(4, 6)]
         brute = brute_steps(house, (4, 6), (28, 6), [bar])
         assert found == (math.inf if brute is None else brute)
 
@@ -136,9 +142,9 @@ def test_exact_ties_are_free():
     # Walls 0.2 m from the node row y = 1: the row is free, 1 µm more and it is not.
     outline = box(0.0, 0.0, 5.0, 2.0)
     walls = [box(0.0, 0.0, 5.0, 0.8), box(0.0, 1.2, 5.0, 2.0)]
-    assert CheckedLattice(walls, outline).clear.nodes.sum() == 21
+    assert CheckedLattice(walls, outline).free.nodes.sum() == 21
     tight = [box(0.0, 0.0, 5.0, 0.800002), walls[1]]
-    assert CheckedLattice(tight, outline).clear.nodes.sum() == 0
+    assert CheckedLattice(tight, outline).free.nodes.sum() == 0
 
 
 @settings(deadline=None, max_examples=25)
@@ -152,13 +158,13 @@ def test_lattice_is_that_of_the_generator(spots):
             for k, (x, y, turn) in enumerate(spots)
         )
     )
-    mine = CheckedLayout(house, Shapes(ASSETS)).ground
+    mine = CheckedLayout(house, Shapes(ASSETS)).lattice
     theirs = navigation.Lattice.of(house)
     assert mine.shape == theirs.shape
-    assert (mine.clear.nodes.reshape(mine.shape) == theirs.free).all()
+    assert (mine.free.nodes.reshape(mine.shape) == theirs.free).all()
     goals = np.argwhere(theirs.free)
     i, j = goals[len(goals) // 2]
-    steps = mine.distances(mine.node(int(i), int(j)), mine.clear).reshape(mine.shape)
+    steps = mine.distances(mine.node(int(i), int(j)), mine.free).reshape(mine.shape)
     assert (np.where(np.isfinite(steps), steps, -1) == theirs.distances(int(i), int(j))).all()
 
 
@@ -166,30 +172,30 @@ def test_lattice_is_that_of_the_generator(spots):
 
 
 def test_way_round_a_box_is_a_taut_string():
-    sight = Sight(grown([box(1.0, -1.0, 2.0, 0.3)], FINE))
+    graph = VisibilityGraph(inflate([box(1.0, -1.0, 2.0, 0.3)], FINE))
     exact = taut((0.0, 0.0), [((1.0, 0.3), -1), ((2.0, 0.3), -1)], (3.0, 0.0), KEEP_M)
-    assert sight.length((0.0, 0.0), (3.0, 0.0), 9.0) == pytest.approx(exact, abs=1e-4)
-    assert sight.length((0.0, 0.0), (3.0, 0.0), 3.0) == math.inf
-    assert sight.length((0.0, 2.0), (3.0, 2.0), 9.0) == 3.0
+    assert graph.length((0.0, 0.0), (3.0, 0.0), 9.0) == pytest.approx(exact, abs=1e-4)
+    assert graph.length((0.0, 0.0), (3.0, 0.0), 3.0) == math.inf
+    assert graph.length((0.0, 2.0), (3.0, 2.0), 9.0) == 3.0
 
 
 def test_way_between_two_boxes_bends_both_ways():
     boxes = [box(1.0, -5.0, 1.5, 1.0), box(2.5, 0.0, 3.0, 5.0)]
     chain = [((1.0, 1.0), -1), ((1.5, 1.0), -1), ((2.5, 0.0), 1), ((3.0, 0.0), 1)]
     exact = taut((0.0, 0.0), chain, (4.0, 1.0), KEEP_M)
-    assert Sight(grown(boxes, FINE)).length((0.0, 0.0), (4.0, 1.0), 20.0) == pytest.approx(
-        exact, abs=4e-4
-    )
+    assert VisibilityGraph(inflate(boxes, FINE)).length(
+        (0.0, 0.0), (4.0, 1.0), 20.0
+    ) == pytest.approx(exact, abs=4e-4)
 
 
 def test_gap_as_wide_as_the_disc_is_open():
     outline = box(-1.0, -1.0, 3.0, 3.0)
     for gap, opened in ((0.4, True), (0.3999, False), (0.41, True)):
         boxes = [box(1.0, -3.0, 1.5, 1.0), box(1.0, 1.0 + gap, 1.5, 5.0)]
-        length = Sight(grown(boxes)).length((0.0, 1.2), (2.5, 1.2), 5.0)
+        length = VisibilityGraph(inflate(boxes)).length((0.0, 1.2), (2.5, 1.2), 5.0)
         assert math.isfinite(length) == opened
-        taken = shapely.union_all(shapely.buffer(np.array(boxes), KEEP_M, quad_segs=FINE))
-        assert joined((0.0, 1.2), (2.5, 1.2), outline, taken) == opened
+        footprints = shapely.union_all(shapely.buffer(np.array(boxes), KEEP_M, quad_segs=FINE))
+        assert connected((0.0, 1.2), (2.5, 1.2), outline, footprints) == opened
 
 
 @settings(deadline=None, max_examples=30)
@@ -202,20 +208,22 @@ def test_gap_as_wide_as_the_disc_is_open():
 )
 def test_ways_are_those_of_the_generator(spots):
     house = furnished(thing(0, "Table_1", 0, 1.5, 2.5, yaw_deg=30.0))
-    site = CheckedLayout(house, Shapes(ASSETS))
+    layout = CheckedLayout(house, Shapes(ASSETS))
     placed = [
         obstacle("Bar_1", round(x, 4), round(y, 4), yaw_deg=15.0 * turn) for x, y, turn in spots
     ]
-    taken = [p for o in placed for p in site.shapes.footprint(o.asset_id, o.pose)]
+    footprints = [p for o in placed for p in layout.shapes.footprint(o.asset_id, o.pose)]
     there = geometry.Polygons.joined(geometry.footprint(ASSETS["Bar_1"], o.pose) for o in placed)
     start, goal = (0.5, 0.5), (7.25, 3.25)
     theirs = navigation.TangentGraph.of(house).distance(start, goal, there)
-    sight = Sight(site.sight.base, grown(taken), site.sight)
-    mine = sight.length(start, goal, 100.0)
-    near = [o for o in taken if shapely.dwithin(o, shapely.points([start, goal]), 0.21).any()]
+    graph = VisibilityGraph(
+        layout.visibility_graph.base, inflate(footprints), layout.visibility_graph
+    )
+    mine = graph.length(start, goal, 100.0)
+    near = [o for o in footprints if shapely.dwithin(o, shapely.points([start, goal]), 0.21).any()]
     if theirs is None or near:
-        cut = shapely.union_all(shapely.buffer(np.array(taken), KEEP_M, quad_segs=FINE))
-        assert theirs is not None or near or not joined(start, goal, site.free, cut)
+        cut = shapely.union_all(shapely.buffer(np.array(footprints), KEEP_M, quad_segs=FINE))
+        assert theirs is not None or near or not connected(start, goal, layout.free_area, cut)
     else:
         assert mine == pytest.approx(theirs, rel=0.001, abs=0.001)
 
@@ -224,19 +232,21 @@ def test_ways_are_those_of_the_generator(spots):
 @given(st.tuples(st.integers(1, 31), st.integers(1, 31), st.integers(1, 31), st.integers(1, 31)))
 def test_portals_bound_from_below(nodes):
     house = Grid(2, 2).house(3, (thing(0, "Table_1", 0, 1.5, 2.5), thing(1, "Bar_1", 3, 6.0, 6.0)))
-    site = CheckedLayout(house, Shapes(ASSETS))
+    layout = CheckedLayout(house, Shapes(ASSETS))
     a, b = (0.25 * nodes[0], 0.25 * nodes[1]), (0.25 * nodes[2], 0.25 * nodes[3])
-    if not (site.free.covers(shapely.Point(a)) and site.free.covers(shapely.Point(b))):
+    if not (
+        layout.free_area.covers(shapely.Point(a)) and layout.free_area.covers(shapely.Point(b))
+    ):
         return
-    plain = Sight(grown(site.blockers)).length(a, b, 100.0)
+    plain = VisibilityGraph(inflate(layout.blockers)).length(a, b, 100.0)
     portals = Portals(house)
-    least = portals.least(portals.spots(np.array([a])), np.array(b))[0]
-    assert least <= plain + 1e-9
-    assert site.sight.length(a, b, 100.0) == pytest.approx(plain, abs=1e-9)
+    lower = portals.lower_bound(portals.located(np.array([a])), np.array(b))[0]
+    assert lower <= plain + 1e-9
+    assert layout.visibility_graph.length(a, b, 100.0) == pytest.approx(plain, abs=1e-9)
 
 
 def test_ellipse_holds_its_points():
-    shape = ellipse((1.0, 1.0), (3.0, 2.0), 4.0)
+    shape = path_ellipse((1.0, 1.0), (3.0, 2.0), 4.0)
     rng = np.random.default_rng(0)
     for p in rng.uniform(-2.0, 6.0, (500, 2)):
         if math.dist(p, (1.0, 1.0)) + math.dist(p, (3.0, 2.0)) <= 4.0:
@@ -274,13 +284,13 @@ def test_findings_are_counted_beyond_what_is_kept():
     reports = []
     for number in range(3):
         report = FindingCollector("file", f"scene-{number}")
-        for k in range(KEPT):
+        for k in range(MAX_FINDINGS):
             report.expect(False, "some.predicate", 0, k)
         reports.append(report)
     findings = join(reports[::-1]).findings("geometry")
-    assert findings.total == 3 * KEPT
-    assert len(findings.found) == KEPT
-    assert findings.by_predicate == {"some.predicate": 3 * KEPT}
+    assert findings.total == 3 * MAX_FINDINGS
+    assert len(findings.found) == MAX_FINDINGS
+    assert findings.by_predicate == {"some.predicate": 3 * MAX_FINDINGS}
     assert findings.found == tuple(sorted(findings.found))
     assert not findings.ok
     assert "3000 findings" in findings.summary()

@@ -22,10 +22,10 @@ def judged(episode, *, solvable=False):
     return {name.removeprefix("schema.episodes.") for name in report.by_predicate}
 
 
-def with_outcome(episode, place, number=0, /, **changes):
+def with_outcome(episode, shard_ref, number=0, /, **changes):
     obstacles = list(episode.obstacles)
     five = list(obstacles[number].outcomes)
-    five[place] = replace(five[place], **changes)
+    five[shard_ref] = replace(five[shard_ref], **changes)
     obstacles[number] = replace(obstacles[number], outcomes=tuple(five))
     return replace(episode, obstacles=tuple(obstacles))
 
@@ -74,8 +74,8 @@ OUTCOMES = {
 
 @pytest.mark.parametrize("case", OUTCOMES)
 def test_outcome_cannot_be(scenes, case):
-    (scene, index, place, number, changes), predicate = OUTCOMES[case]
-    episode = with_outcome(scenes[scene][1][index], place, number, **changes)
+    (scene, index, shard_ref, number, changes), predicate = OUTCOMES[case]
+    episode = with_outcome(scenes[scene][1][index], shard_ref, number, **changes)
     assert predicate in judged(episode)
 
 

@@ -89,9 +89,9 @@ def test_one_byte_changed(dataset):
 def test_every_byte_of_a_shard_is_watched(dataset):
     path = shard(dataset)
     good = path.read_bytes()
-    for place in range(0, len(good), max(1, len(good) // 25)):
+    for shard_ref in range(0, len(good), max(1, len(good) // 25)):
         data = bytearray(good)
-        data[place] ^= 0x10
+        data[shard_ref] ^= 0x10
         path.write_bytes(data)
         assert "files.sha256" in predicates(validate(dataset, "files"))
 
@@ -192,21 +192,21 @@ def judged(tmp_path, scenes, assets=None):
 
 
 EPISODE_CHANGES = {
-    "steps": ({"obstructed_path_steps": 29}, "episode.steps"),
-    "clear steps": ({"shortest_path_steps": 25}, "episode.clear-steps"),
-    "cut off": ({"obstructed_path_steps": None}, "episode.steps"),
-    "sealed": ({"sealed": True}, "episode.sealed-way"),
+    "steps": ({"obstructed_path_steps": 29}, "episode.obstructed-path-steps"),
+    "clear steps": ({"shortest_path_steps": 25}, "episode.shortest-path-steps"),
+    "cut off": ({"obstructed_path_steps": None}, "episode.obstructed-path-steps"),
+    "sealed": ({"sealed": True}, "episode.sealed-flag"),
     "sealed and no way": ({"sealed": True, "obstructed_path_m": None}, "episode.sealed"),
-    "clear length": ({"shortest_path_m": 6.2}, "episode.clear-m"),
-    "clear length too short": ({"shortest_path_m": 5.9}, "episode.clear-m-bounds"),
-    "way length": ({"obstructed_path_m": 6.3}, "episode.way-m"),
-    "way length too short": ({"obstructed_path_m": 6.01}, "episode.way-m"),
+    "clear length": ({"shortest_path_m": 6.2}, "episode.shortest-path-m"),
+    "clear length too short": ({"shortest_path_m": 5.9}, "episode.shortest-path-m-bounds"),
+    "way length": ({"obstructed_path_m": 6.3}, "episode.obstructed-path-m"),
+    "way length too short": ({"obstructed_path_m": 6.01}, "episode.obstructed-path-m"),
     "mode": ({"mode": "blocked"}, "episode.mode"),
-    "rooms on the way": ({"rooms_on_path": 1}, "episode.rooms-on-way"),
+    "rooms on the way": ({"rooms_on_path": 1}, "episode.rooms-on-path"),
     "room paths": ({"room_paths": ()}, "episode.room-paths"),
-    "room paths cut": ({"room_paths_truncated": True}, "episode.room-paths-cut"),
+    "room paths cut": ({"room_paths_truncated": True}, "episode.room-paths-truncated"),
     "node paths": ({"node_paths": ()}, "episode.node-paths"),
-    "node paths cut": ({"node_paths_truncated": True}, "episode.node-paths-cut"),
+    "node paths cut": ({"node_paths_truncated": True}, "episode.node-paths-truncated"),
     "room count": ({"room_count": 3}, "schema.episodes.room_count"),
     "obstacle count": ({"obstacle_count": 2}, "schema.episodes.obstacle_count"),
     "split": ({"split": "train"}, "schema.episodes.split"),
@@ -236,7 +236,10 @@ END_CHANGES = {
     "no such room": ({"room": 7}, "schema.episodes.room"),
     "another yaw": ({"yaw_deg": 45}, "episode.start-yaw"),
     "under the obstacle": ({"i": 10, "j": 8, "x": 2.5, "y": 2.0}, "episode.start-uncovered"),
-    "near the goal": ({"i": 27, "j": 8, "x": 6.75, "y": 2.0, "room": 1}, "episode.clear-least"),
+    "near the goal": (
+        {"i": 27, "j": 8, "x": 6.75, "y": 2.0, "room": 1},
+        "episode.shortest-path-min",
+    ),
 }
 
 
@@ -250,7 +253,7 @@ def test_start_moved(tmp_path, scenes, case):
 
 
 OBSTACLE_CHANGES = {
-    "aside": ({"y": 2.25}, "episode.way-m"),
+    "aside": ({"y": 2.25}, "episode.obstructed-path-m"),
     "into the wall": ({"x": 3.7, "y": 1.5}, "obstacle.overlap-house"),
     "out of the house": ({"x": -3.0}, "obstacle.inside"),
     "into the air": ({"z": 0.05}, "obstacle.floor"),
@@ -288,7 +291,7 @@ def test_obstacle_changed(tmp_path, scenes, case):
 
 def test_obstacle_moved_10_cm_out_of_the_gap(tmp_path, scenes):
     findings = judged(tmp_path, change_obstacle(scenes, 2, 0, y=1.72))
-    assert predicates(findings) == {"episode.way-m"}
+    assert predicates(findings) == {"episode.obstructed-path-m"}
 
 
 def test_gap_shut_by_2_cm(tmp_path, scenes):
@@ -324,7 +327,7 @@ def test_asset_of_another_mass(tmp_path, scenes):
 
 def test_asset_of_another_shape(tmp_path, scenes):
     assets = {**ASSETS, "Box_2": scenery.asset("Box_2", (0.3, 0.3, 0.6))}
-    assert "episode.way-m" in predicates(judged(tmp_path, scenes, assets))
+    assert "episode.obstructed-path-m" in predicates(judged(tmp_path, scenes, assets))
 
 
 def test_scene_missing(dataset):
@@ -379,14 +382,14 @@ def house_cases(house):
             {"outline": ((0.0, 0.0), (8.0, 0.0), (8.0, 4.0), (0.0, 4.0))},
             "house.rooms-tile",
         ),
-        "thing in a wall": ({"objects": (moved(things[0], y=0.3), *things[1:])}, "thing.overlap"),
+        "thing in a wall": ({"objects": (moved(things[0], y=0.3), *things[1:])}, "object.overlap"),
         "thing in a thing": (
             {"objects": (*things[:2], moved(things[2], x=6.0, y=3.3))},
-            "thing.overlap",
+            "object.overlap",
         ),
         "thing in another room": (
             {"objects": (moved(things[0], room=1), *things[1:])},
-            "thing.room",
+            "object.room",
         ),
         "thing before the door": (
             {"objects": (*things[:2], moved(things[2], x=4.4, y=2.0))},
@@ -394,27 +397,27 @@ def house_cases(house):
         ),
         "thing in the air": (
             {"objects": (*things[:2], moved(things[2], support=0))},
-            "thing.support",
+            "object.support",
         ),
         "thing hanging free": (
             {"objects": (*things[:2], moved(things[2], x=6.0, y=1.5, z=1.2))},
-            "thing.support",
+            "object.support",
         ),
         "thing below the floor": (
             {"objects": (*things[:2], moved(things[2], z=-0.1))},
-            "thing.support",
+            "object.support",
         ),
         "thing of another type": (
             {"objects": (*things[:2], moved(things[2], type="Table"))},
-            "thing.type",
+            "object.type",
         ),
         "unknown thing": (
             {"objects": (*things[:2], moved(things[2], asset_id="Ghost_1"))},
-            "schema.scenes.thing-asset",
+            "schema.scenes.object-asset",
         ),
         "thing twice": (
             {"objects": (*things[:2], moved(things[2], object_id=1))},
-            "schema.scenes.thing-ids",
+            "schema.scenes.object-ids",
         ),
         "scene split": ({"split": "train"}, "schema.scenes.split"),
         "scene seed": ({"seed": 3}, "schema.scenes.seed"),

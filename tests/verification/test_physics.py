@@ -17,17 +17,17 @@ from internav_data.physics.result_cache import ResultCache
 from internav_data.records import Pose
 from internav_data.records.errors import CorruptDataError
 from internav_data.verification import validate
+from internav_data.verification.checked_config import CheckedConfig
 from internav_data.verification.checked_layout import CheckedLayout
+from internav_data.verification.checked_path import CheckedPath
 from internav_data.verification.interactions import check_interactions
-from internav_data.verification.lengths import Between
 from internav_data.verification.replay import CheckedScene
-from internav_data.verification.replay.outcomes import _Judge
+from internav_data.verification.replay.outcomes import OutcomeCheck
 from internav_data.verification.scenes import check_scene
-from internav_data.verification.settings import Settings
 from internav_data.verification.shapes import Shapes
 from internav_data.world import MovableObject, World
 
-FORCE = Settings()
+FORCE = CheckedConfig()
 
 
 @pytest.fixture(scope="module")
@@ -208,31 +208,37 @@ OUTCOMES = {
     ),
     "farther": ((0, 0, "push_west", 0, {"displacement_m": 0.7}), "physics.outcome-displacement"),
     "longer": ((0, 0, "push_west", 0, {"seconds": 1.0}), "physics.outcome-seconds"),
-    "more steps": ((0, 1, "push_north", 0, {"path_steps_after": 28}), "physics.outcome-steps"),
+    "more steps": (
+        (0, 1, "push_north", 0, {"path_steps_after": 28}),
+        "physics.outcome-path-steps-after",
+    ),
     "still shut": (
         (0, 0, "push_west", 0, {"path_steps_after": None, "opened": False}),
-        "physics.outcome-steps",
+        "physics.outcome-path-steps-after",
     ),
     "more steps round moved furniture": (
         (2, 0, "push_north", 1, {"path_steps_after": 28, "opened": True}),
-        "physics.outcome-steps",
+        "physics.outcome-path-steps-after",
     ),
-    "a longer way": ((0, 1, "push_north", 0, {"path_m_after": 6.03}), "physics.outcome-way-m"),
+    "a longer way": (
+        (0, 1, "push_north", 0, {"path_m_after": 6.03}),
+        "physics.outcome-path-m-after",
+    ),
     "a longer way round moved furniture": (
         (2, 0, "push_north", 1, {"path_m_after": 6.03}),
-        "physics.outcome-way-m",
+        "physics.outcome-path-m-after",
     ),
     "a way where none is": (
         (0, 0, "push_south", 0, {"path_m_after": 6.5}),
-        "physics.outcome-way-m",
+        "physics.outcome-path-m-after",
     ),
     "no way where one is": (
         (0, 0, "push_north", 0, {"path_m_after": None}),
-        "physics.outcome-way-m",
+        "physics.outcome-path-m-after",
     ),
     "more steps once picked": (
         (2, 0, "pick", 1, {"path_steps_after": 26}),
-        "physics.outcome-steps",
+        "physics.outcome-path-steps-after",
     ),
 }
 
@@ -320,10 +326,10 @@ def test_what_leans_through_a_window_is_not_in_the_wall(scenes):
     )
     assets = {**ASSETS, "Board": board}
     for through, sills in ((house, 0), (replace(house, walls=(*walls, sill, lintel)), 1)):
-        theatre = CheckedScene(CheckedLayout(through, Shapes(assets)), FORCE)
+        scene = CheckedScene(CheckedLayout(through, Shapes(assets)), FORCE)
         for z, inside in ((0.5, True), (0.925, False), (1.5, False), (2.2, True)):
             pose = Pose(x, y, z, (0.0, 0.0, 0.0, 1.0))
-            assert theatre.in_walls("Board", pose, 0.01) == (inside or not sills)
+            assert scene.overlaps_walls("Board", pose, 0.01) == (inside or not sills)
 
 
 def test_what_carries_something_is_not_picked_up(scenes):
@@ -335,19 +341,19 @@ def test_what_carries_something_is_not_picked_up(scenes):
         return MovableObject.at(assets[asset_id], Pose(x, 2.0, 0.0, (0.0, 0.0, 0.0, 1.0)))
 
     outcome = episodes[0].obstacles[0].outcomes[4]
-    theatre = CheckedScene(CheckedLayout(house, Shapes(assets)), FORCE)
-    judge = _Judge(theatre, episodes[0], outcome, "", lambda *_: True)
+    scene = CheckedScene(CheckedLayout(house, Shapes(assets)), FORCE)
+    check = OutcomeCheck(scene, episodes[0], outcome, "", lambda *_: True)
     under, over = at("Pot_1", 3.0), at("Bar_1", 3.1)
-    assert judge._carries([under, over], 0)
-    assert not judge._carries([under, over], 1)
-    assert not judge._carries([under, at("Bar_1", 3.6)], 0)
+    assert check._carries([under, over], 0)
+    assert not check._carries([under, over], 1)
+    assert not check._carries([under, at("Bar_1", 3.6)], 0)
 
 
 def test_furniture_that_was_moved_is_no_longer_where_it_stood():
     bar = thing(0, "Bar_1", 0, 3.5, 1.94, yaw_deg=90.0)
     house = Grid(2, 1).house(2, (bar, thing(1, "Table_1", 0, 1.0, 0.6)))
-    theatre = CheckedScene(CheckedLayout(house, Shapes(ASSETS)), FORCE)
-    items = theatre.stage.items
+    scene = CheckedScene(CheckedLayout(house, Shapes(ASSETS)), FORCE)
+    items = scene.model.items
     assert [item.asset.asset_id for item in items] == ["Bar_1"]
     there = scenery.obstacle("Bar_1", 2.0, 2.0, yaw_deg=90.0)
     for changes, things, obstacles in (
@@ -355,14 +361,14 @@ def test_furniture_that_was_moved_is_no_longer_where_it_stood():
         ({0: there.pose}, house.objects[1:], [there]),
         ({0: None}, house.objects[1:], []),
     ):
-        found = theatre.scenery(items, changes)
-        ground = found.site.ground
-        free = ground.with_obstacles(found.taken)
-        steps = ground.distances(ground.node(28, 8), free)[ground.node(4, 8)]
+        found = scene.rearranged(items, changes)
+        lattice = found.layout.lattice
+        free = lattice.with_obstacles(found.obstacles)
+        steps = lattice.distances(lattice.node(28, 8), free)[lattice.node(4, 8)]
         wanted = brute_steps(replace(house, objects=things), (4, 8), (28, 8), obstacles)
         assert steps == (math.inf if wanted is None else wanted)
-        way = Between(found.site, (1.0, 2.0), (7.0, 2.0), found.taken)
-        assert way.connected(stated=True) == (changes != {})
+        path = CheckedPath(found.layout, (1.0, 2.0), (7.0, 2.0), found.obstacles)
+        assert path.connected(stated=True) == (changes != {})
 
 
 # what cannot be judged is said
@@ -395,7 +401,7 @@ def test_another_build_is_noted(tmp_path, scenes):
 
 def test_untrue_geometry_is_not_played(tmp_path, scenes):
     findings = judged(tmp_path, changed(scenes, 0, 1, shortest_path_steps=26))
-    assert "episode.clear-steps" in findings.by_predicate
+    assert "episode.shortest-path-steps" in findings.by_predicate
     assert findings.notes == {"geometry not as stated: physics not checked": 1}
     assert findings.checked["replayed"] == 5
 

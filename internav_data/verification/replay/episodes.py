@@ -1,11 +1,11 @@
-"""Plays one episode again: settling, outcomes, expert."""
+"""Replay of one episode: settling, outcomes, expert."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from internav_data.physics import cache_disabled, engine_of_this_process
-from internav_data.verification.replay.experts import check_expert
+from internav_data.verification.replay.expert_replay import check_expert
 from internav_data.verification.replay.outcomes import check_outcomes
 from internav_data.verification.replay.settling import check_settling
 
@@ -15,16 +15,16 @@ if TYPE_CHECKING:
     from internav_data.verification.replay.checked_scene import CheckedScene
 
 
-def replay_episode(theatre: CheckedScene, episode: Episode, report: FindingCollector) -> None:
-    """Judge the physics of an episode whose geometry is true: every scene solved anew.
+def replay_episode(scene: CheckedScene, episode: Episode, report: FindingCollector) -> None:
+    """Check the physics of an episode whose geometry is true, without the result cache.
 
-    What cannot be judged is counted among the report's notes.
+    Skipped checks are counted in the report's notes.
     """
     with cache_disabled():
-        _replay(theatre, episode, report)
+        _replay(scene, episode, report)
 
 
-def _replay(theatre: CheckedScene, episode: Episode, report: FindingCollector) -> None:
+def _replay(scene: CheckedScene, episode: Episode, report: FindingCollector) -> None:
     name = episode.episode_id
 
     def expect(holds: object, predicate: str, expected: object, got: object) -> bool:
@@ -35,11 +35,11 @@ def _replay(theatre: CheckedScene, episode: Episode, report: FindingCollector) -
     here = f"{engine.name} of {engine.build}"
     if made != here:
         report.notes[f"made by {made}, checked by {here}: results may differ"] += 1
-    check_settling(theatre, episode, expect)
+    check_settling(scene, episode, expect)
     if any(obstacle.outcomes is None for obstacle in episode.obstacles):
         report.notes["no outcomes stored: not checked"] += 1
-    check_outcomes(theatre, episode, expect)
+    check_outcomes(scene, episode, expect)
     if episode.expert is None:
         report.notes["no expert stored: not checked"] += 1
-    check_expert(theatre, episode, expect)
+    check_expert(scene, episode, expect)
     report.counts["replayed"] += 1

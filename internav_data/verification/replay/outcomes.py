@@ -1,7 +1,7 @@
-"""Outcomes, again: every push and pick of every obstacle, distances by the validator's own means.
+"""Replay of outcomes: every push and pick of every obstacle.
 
-Where a push leads is asked of the shared physics; who can be pushed or picked up, what that does to
-the lattice and to the any-angle way, is judged here.
+The end poses of a push come from the shared physics. Whether an object can be pushed or picked
+up, and the changes of the lattice and Euclidean distances, are derived here.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import shapely
 
+from internav_data.verification.checked_path import CheckedPath
 from internav_data.verification.interactions import PICK_OUTCOME, PUSH_OUTCOMES
-from internav_data.verification.lengths import Between
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,38 +21,38 @@ if TYPE_CHECKING:
 
     from internav_data.records import Episode, Outcome, Pose
     from internav_data.verification.obstacles import Expect
-    from internav_data.verification.replay.checked_scene import CheckedScene, Scenery
+    from internav_data.verification.replay.checked_scene import Arrangement, CheckedScene
     from internav_data.world import MovableObject, World
 
 REST_M = 0.01
-"""What begins this much above another thing's lowest point, and not above its top, rests on it."""
+"""A rests on B if A's bottom is more than this above B's bottom and not above B's top."""
 TOUCH_M = 0.005
-"""Things this near touch."""
+"""Maximum distance of touching objects."""
 SUNK_M = 0.01
-"""What comes to rest deeper in the floor or a wall is not where a push could lead."""
+"""Maximum depth in the floor or a wall of a pushed object's end pose."""
 
 
-def check_outcomes(theatre: CheckedScene, episode: Episode, expect: Expect) -> None:
-    """Judge the outcomes of all obstacles that have any."""
-    world = theatre.world(episode)
-    first = len(theatre.stage.items)
+def check_outcomes(scene: CheckedScene, episode: Episode, expect: Expect) -> None:
+    """Check the outcomes of all obstacles that have any."""
+    world = scene.world(episode)
+    first = len(scene.model.items)
     for number, obstacle in enumerate(episode.obstacles):
         for outcome in obstacle.outcomes or ():
             what = f"obstacle {number} ({obstacle.asset_id}), {outcome.action}"
-            judge = _Judge(theatre, episode, outcome, what, expect)
+            check = OutcomeCheck(scene, episode, outcome, what, expect)
             if outcome.action == PICK_OUTCOME:
-                judge.pick(world, first + number)
+                check.pick(world, first + number)
             elif outcome.action in PUSH_OUTCOMES:
-                judge.push(world, first + number)
+                check.push(world, first + number)
 
 
-class _Judge:
-    """One outcome before its predicates."""
+class OutcomeCheck:
+    """Check of one outcome."""
 
     def __init__(
-        self, theatre: CheckedScene, episode: Episode, outcome: Outcome, what: str, expect: Expect
+        self, scene: CheckedScene, episode: Episode, outcome: Outcome, what: str, expect: Expect
     ) -> None:
-        self.theatre = theatre
+        self.scene = scene
         self.episode = episode
         self.outcome = outcome
         self.what = what
@@ -61,7 +61,7 @@ class _Judge:
     def expect(
         self, name: str, expected: object, got: object, *, holds: bool | None = None
     ) -> bool:
-        """Judge one predicate: whether two values are equal, unless `holds` is given."""
+        """Check one predicate: that two values are equal, unless `holds` is given."""
         true = expected == got if holds is None else holds
         return self._expect(true, f"physics.outcome-{name}", f"{self.what}: {expected}", got)
 
@@ -75,11 +75,11 @@ class _Judge:
         far = pushed.displacement_m if pushed.success else 0.0
         if self._ends(pushed.reason, far, pushed.seconds) and pushed.success:
             ends: dict[int, Pose | None] = {index: pushed.pose, **dict(pushed.moved)}
-            self._above_ground(world, ends)
+            self._not_sunk(world, ends)
             self._distances(world, ends)
 
     def pick(self, world: World, index: int) -> None:
-        """Take an obstacle away and compare."""
+        """Remove an obstacle and compare."""
         if not world.items[index].asset.pickable:
             reason = "not pickable"
         else:
@@ -88,7 +88,7 @@ class _Judge:
             self._distances(world, {index: None})
 
     def _ends(self, reason: str, displacement_m: float, seconds: float) -> bool:
-        """Judge what does not depend on distances; return whether success is as stated."""
+        """Check reason, displacement and time; return whether success is as stated."""
         outcome = self.outcome
         self.expect("reason", repr(reason), repr(outcome.reason))
         self.expect("displacement", displacement_m, outcome.displacement_m)
@@ -96,57 +96,61 @@ class _Judge:
         return self.expect("success", not reason, outcome.success)
 
     def _carries(self, items: Sequence[MovableObject], index: int) -> bool:
-        """Whether another movable thing rests on a thing."""
+        """Return whether another movable object rests on an item."""
         placed = {
             k: (item.asset.asset_id, item.pose)
             for k, item in enumerate(items)
             if item.pose is not None
         }
         below = placed[index]
-        low, high = self.theatre.span(*below)
+        low, high = self.scene.span(*below)
         on = [
             self._plan(*other)
             for other in placed.values()
-            if low + REST_M < self.theatre.span(*other)[0] <= high + TOUCH_M
+            if low + REST_M < self.scene.span(*other)[0] <= high + TOUCH_M
         ]
         return any(shapely.dwithin(self._plan(*below), plan, TOUCH_M) for plan in on)
 
     def _plan(self, asset_id: str, pose: Pose) -> Geometry:
-        return shapely.union_all(list(self.theatre.footprint(asset_id, pose)))
+        return shapely.union_all(list(self.scene.footprint(asset_id, pose)))
 
-    def _above_ground(self, world: World, ends: dict[int, Pose | None]) -> None:
-        """Judge that nothing was pushed into the floor or a wall."""
-        theatre = self.theatre
+    def _not_sunk(self, world: World, ends: dict[int, Pose | None]) -> None:
+        """Check that nothing was pushed into the floor or a wall."""
+        scene = self.scene
         for k, pose in ends.items():
             asset_id = world.items[k].asset.asset_id
             if pose is None:
                 continue
-            low, _ = theatre.span(asset_id, pose)
+            low, _ = scene.span(asset_id, pose)
             name = f"{asset_id} ends above the floor"
             self.expect("sunk", name, f"{low:.4f} m", holds=low >= -SUNK_M)
-            inside = theatre.in_walls(asset_id, pose, SUNK_M)
+            inside = scene.overlaps_walls(asset_id, pose, SUNK_M)
             self.expect("sunk", f"{asset_id} ends clear of walls", "in one", holds=not inside)
 
     def _distances(self, world: World, changes: dict[int, Pose | None]) -> None:
-        """Judge both distances with things where they came to rest."""
-        theatre, episode, outcome = self.theatre, self.episode, self.outcome
-        scenery = theatre.scenery(world.items, changes)
-        ground = scenery.site.ground
-        start = ground.node(episode.start.i, episode.start.j)
-        goal = ground.node(episode.goal.i, episode.goal.j)
-        free = ground.with_obstacles(scenery.taken)
-        found = ground.distances(goal, free)[start]
-        self.expect("steps", int(found) if math.isfinite(found) else None, outcome.path_steps_after)
-        self._way(scenery)
+        """Check both distances with objects where they came to rest."""
+        scene, episode, outcome = self.scene, self.episode, self.outcome
+        arrangement = scene.rearranged(world.items, changes)
+        lattice = arrangement.layout.lattice
+        start = lattice.node(episode.start.i, episode.start.j)
+        goal = lattice.node(episode.goal.i, episode.goal.j)
+        free = lattice.with_obstacles(arrangement.obstacles)
+        found = lattice.distances(goal, free)[start]
+        self.expect(
+            "path-steps-after",
+            int(found) if math.isfinite(found) else None,
+            outcome.path_steps_after,
+        )
+        self._path(arrangement)
 
-    def _way(self, scenery: Scenery) -> None:
+    def _path(self, arrangement: Arrangement) -> None:
         episode, stated = self.episode, self.outcome.path_m_after
-        here, there = (episode.start.x, episode.start.y), (episode.goal.x, episode.goal.y)
-        way = Between(scenery.site, here, there, scenery.taken)
+        start_xy, goal_xy = (episode.start.x, episode.start.y), (episode.goal.x, episode.goal.y)
+        path = CheckedPath(arrangement.layout, start_xy, goal_xy, arrangement.obstacles)
         if stated is None:
-            shut = not way.connected(stated=False)
-            self.expect("way-m", "a way for the disc", "none", holds=shut)
-        elif way.agrees(stated):
-            self.expect("way-m", stated, stated)
+            shut = not path.connected(stated=False)
+            self.expect("path-m-after", "a way for the disc", "none", holds=shut)
+        elif path.agrees(stated):
+            self.expect("path-m-after", stated, stated)
         else:
-            self.expect("way-m", f"{way.length():.4f} m", stated, holds=False)
+            self.expect("path-m-after", f"{path.length():.4f} m", stated, holds=False)

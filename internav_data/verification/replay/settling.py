@@ -1,8 +1,8 @@
-"""Settling, again: every obstacle must come to rest as its certificate says.
+"""Replay of settling: every obstacle must come to rest as its certificate says.
 
-Stored is where an obstacle lies, not where it was let go: 1 cm above the floor, upright, turned by
-a multiple of 15 degrees. Its spot is worked out from the stored pose; falling from there once more
-must end at the stored pose, after the stored time and as deep as stored.
+The data hold the pose at rest, not the spawn pose: 1 cm above the floor, upright, turned by a
+multiple of 15 degrees. The spawn pose is derived from the stored one; a fall from there must end
+at the stored pose, after the stored time and with the stored penetration.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ if TYPE_CHECKING:
 
 YAW_STEP_DEG = 15
 NEAR_M = 0.5
-"""What is farther away than this cannot be touched while a thing settles."""
+"""Distance beyond which an object cannot be touched while another one settles."""
 ROUNDED_M = 1.5e-4
-"""Where the spot is worked out from the rest, each axis may be a rounding and a half off …"""
+"""Tolerance along each axis of a pose that falls from a derived spawn pose: 1.5 roundings."""
 ROUNDED = 2e-6
-"""… and so may a quaternion."""
+"""Tolerance of its quaternion."""
 TRIES = 3
-"""A spot is known better with each fall: what falls among others may be turned aside."""
+"""Number of falls: each improves the spawn pose, as a neighbour may deflect the fall."""
 
 
-def check_settling(theatre: CheckedScene, episode: Episode, expect: Expect) -> None:
+def check_settling(scene: CheckedScene, episode: Episode, expect: Expect) -> None:
     """Let every obstacle of an episode fall again, in order."""
     for number, obstacle in enumerate(episode.obstacles):
         what = f"obstacle {number} ({obstacle.asset_id})"
-        settled = _fall(theatre, episode, number)
+        settled = _fall(scene, episode, number)
         if not expect(
             not settled.refusal, "physics.settle-refused", f"{what} may stay", settled.refusal
         ):
@@ -59,18 +59,18 @@ def check_settling(theatre: CheckedScene, episode: Episode, expect: Expect) -> N
             expect(found == stored, f"physics.settle-{name}", f"{what}: {found}", stored)
 
 
-def _fall(theatre: CheckedScene, episode: Episode, number: int) -> SettleResult:
-    """Let an obstacle fall from the spot from which it would come to lie where it is stored."""
+def _fall(scene: CheckedScene, episode: Episode, number: int) -> SettleResult:
+    """Let an obstacle fall from the spawn pose that leads to its stored pose."""
     obstacle = episode.obstacles[number]
-    asset = theatre.assets[obstacle.asset_id]
+    asset = scene.assets[obstacle.asset_id]
     x, y, turn = obstacle.x, obstacle.y, _upright(obstacle)
     for _ in range(TRIES):
         spot = Pose(round(x, 4), round(y, 4), 0.0, turn)
         settled = settle(
             asset,
             spot,
-            theatre.settings.gap_m,
-            lambda: _near(theatre, episode, number, spot),  # noqa: B023 - asked at once
+            scene.config.gap_m,
+            lambda: _near(scene, episode, number, spot),  # noqa: B023 - asked at once
         )
         if _apart(settled.pose, obstacle.pose)[0] <= ROUNDED_M:
             break
@@ -80,7 +80,7 @@ def _fall(theatre: CheckedScene, episode: Episode, number: int) -> SettleResult:
 
 
 def _upright(obstacle: Obstacle) -> tuple[float, float, float, float]:
-    """Orientation before the fall: the nearest of those that obstacles are let go at."""
+    """Return the nearest orientation at which obstacles are spawned."""
     _, _, z, w = obstacle.quaternion
     step = math.radians(YAW_STEP_DEG)
     half = round(2.0 * math.atan2(z, w) / step) * step / 2.0
@@ -89,30 +89,30 @@ def _upright(obstacle: Obstacle) -> tuple[float, float, float, float]:
 
 
 def _apart(first: Pose, second: Pose) -> tuple[float, float]:
-    """Largest difference of two poses along an axis, metres, and of their quaternions."""
+    """Return the largest difference of two poses along an axis, metres, and of quaternions."""
     off = max(abs(first.x - second.x), abs(first.y - second.y), abs(first.z - second.z))
     p, q = np.array(first.quaternion), np.array(second.quaternion)
     return off, float(min(np.abs(p - q).max(), np.abs(p + q).max()))
 
 
-def _near(theatre: CheckedScene, episode: Episode, number: int, spot: Pose) -> list[Body]:
-    """Gather what could be touched: things, earlier obstacles, walls, in this order."""
+def _near(scene: CheckedScene, episode: Episode, number: int, spot: Pose) -> list[Body]:
+    """List the bodies that could be touched: objects, earlier obstacles, walls."""
     asset_id = episode.obstacles[number].asset_id
-    here = shapely.union_all(list(theatre.footprint(asset_id, spot)))
+    here = shapely.union_all(list(scene.footprint(asset_id, spot)))
 
     def near(plans: list[Geometry] | tuple[Geometry, ...]) -> bool:
         return bool(shapely.dwithin(here, np.array(plans, dtype=object), NEAR_M).any())
 
-    placed = [(thing.asset_id, thing.pose) for thing in theatre.site.house.objects]
+    placed = [(thing.asset_id, thing.pose) for thing in scene.layout.house.objects]
     placed += [(o.asset_id, o.pose) for o in episode.obstacles[:number]]
     bodies = [
-        Body(theatre.assets[other], pose, moves=False)
+        Body(scene.assets[other], pose, moves=False)
         for other, pose in placed
-        if near(theatre.footprint(other, pose))
+        if near(scene.footprint(other, pose))
     ]
     walls = [
         wall
-        for wall in theatre.site.house.walls
+        for wall in scene.layout.house.walls
         if wall.z_min < AGENT_HEIGHT_M and wall.z_max > STEP_OVER_M
     ]
     plans = [shapely.box(w.x_min, w.y_min, w.x_max, w.y_max) for w in walls]

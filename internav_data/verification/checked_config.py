@@ -1,4 +1,4 @@
-"""What of a dataset's config the validator has to know."""
+"""Settings of a dataset's generation that the validator needs."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ GAP_M = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
-    """How the episodes were made, as far as it changes what is true of them."""
+class CheckedConfig:
+    """Generation settings that decide which predicates hold."""
 
     push_model: Literal["force", "kick"] = "force"
     gap_m: float = GAP_M
-    """Least distance of a spawned obstacle from everything else, metres."""
+    """Minimum distance of a spawned obstacle from everything else, metres."""
     solvable: bool = False
-    """Every episode was promised to have an expert."""
+    """Whether every episode must have an expert."""
 
 
-def settings_of(config: Mapping[str, Any]) -> Settings:
-    """Read them from a manifest's config; what it does not say is the default.
+def checked_config(config: Mapping[str, Any]) -> CheckedConfig:
+    """Read the settings from a manifest's config; missing ones have their defaults.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def settings_of(config: Mapping[str, Any]) -> Settings:
             f"manifest.json: config.episodes.push_model: expected force or kick, got {model!r}; "
             "generate the dataset again"
         )
-    return Settings(
+    return CheckedConfig(
         push_model=model,
         gap_m=float(gap) if isinstance(gap, int | float) else GAP_M,
         solvable=values.get("keep_unsolvable") is False,

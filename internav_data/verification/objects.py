@@ -1,4 +1,4 @@
-"""Predicates of what stands in a house: furniture, supports, clear doors, reachable rooms."""
+"""Predicates of a house's objects: rooms, supports, clear doors, reachable rooms."""
 
 from __future__ import annotations
 
@@ -25,10 +25,11 @@ DOOR_CLEAR_M = 0.65
 """Free depth before a door, from the wall's face."""
 HALF_WALL_M = 0.06
 HANGS_M = 0.05
-"""What hangs is this close to its wall or ceiling."""
+"""Maximum distance of a hanging object from its wall or ceiling."""
 WALL_ID = -1
+"""Owner of the slabs of walls."""
 REACHED = 0.5
-"""Share of a room's free nodes that more than must be joined to the house's largest component."""
+"""Share of a room's free nodes that the house's largest component must exceed."""
 
 
 def wall_slabs(house: House) -> list[Slab]:
@@ -42,10 +43,10 @@ def wall_slabs(house: House) -> list[Slab]:
     return slabs
 
 
-def check_things(
+def check_objects(
     house: House, rooms: dict[int, Polygon], shapes: Shapes, report: FindingCollector
 ) -> None:
-    """Judge furniture: inside its room, nothing through walls or other things, held up."""
+    """Check objects: inside their rooms, clear of walls and each other, supported."""
     slabs: list[Slab] = []
     owners: list[int] = []
     for slab in wall_slabs(house):
@@ -56,24 +57,24 @@ def check_things(
     groups = {thing.object_id: thing.group for thing in house.objects}
     own = {t.object_id: shapes.slabs(t.asset_id, t.pose) for t in house.objects}
     for thing in house.objects:
-        name = f"thing {thing.object_id} ({thing.asset_id})"
+        name = f"object {thing.object_id} ({thing.asset_id})"
         asset = shapes.assets[thing.asset_id]
-        report.expect(thing.type == asset.type, "thing.type", f"{name}: {asset.type}", thing.type)
+        report.expect(thing.type == asset.type, "object.type", f"{name}: {asset.type}", thing.type)
         slabs += own[thing.object_id]
         owners += [thing.object_id] * len(own[thing.object_id])
         room = within.get(thing.room)
         if room is not None:
             inside = shapely.covers(room, _plans(own[thing.object_id])).all()
-            report.expect(inside, "thing.room", f"{name} in room {thing.room}", "beyond it")
+            report.expect(inside, "object.room", f"{name} in room {thing.room}", "beyond it")
         _check_support(house, thing, own, report)
 
     def may_interlock(a: int, b: int) -> bool:
-        """Things of one group may, as a chair does under its table."""
+        """Return whether two owners are of one group, as a chair under its table."""
         return a != WALL_ID and groups[a] >= 0 and groups[a] == groups[b]
 
     for a, b in overlapping_slabs(slabs, owners, may_interlock):
-        what = "a wall" if a == WALL_ID else f"thing {a}"
-        report.expect(False, "thing.overlap", f"thing {b} clear of {what}", "an overlap")  # noqa: FBT003
+        what = "a wall" if a == WALL_ID else f"object {a}"
+        report.expect(False, "object.overlap", f"object {b} clear of {what}", "an overlap")  # noqa: FBT003
     report.counts["predicates"] += len(house.objects)
 
 
@@ -84,8 +85,8 @@ def _plans(slabs: list[Slab]) -> NDArray[np.object_]:
 def _check_support(
     house: House, thing: SceneObject, own: dict[int, list[Slab]], report: FindingCollector
 ) -> None:
-    """Judge that a thing stands on the floor or on its support, or hangs on a wall or ceiling."""
-    name = f"thing {thing.object_id}"
+    """Check that an object stands on the floor or its support, or hangs on a wall or ceiling."""
+    name = f"object {thing.object_id}"
     slabs = own[thing.object_id]
     low, high = min(slab.low for slab in slabs), max(slab.high for slab in slabs)
     if thing.support >= 0:
@@ -94,11 +95,11 @@ def _check_support(
             for slab in own.get(thing.support, [])
         )
         report.expect(
-            held, "thing.support", f"{name} standing on thing {thing.support}", "in the air"
+            held, "object.support", f"{name} standing on object {thing.support}", "in the air"
         )
         return
     if abs(low) <= DEPTH_M:
-        report.expect(True, "thing.support", "", "")  # noqa: FBT003 - counted
+        report.expect(True, "object.support", "", "")  # noqa: FBT003 - counted
         return
     ceiling = min((r.ceiling_m for r in house.rooms if r.room_id == thing.room), default=math.inf)
     walls = [
@@ -111,11 +112,11 @@ def _check_support(
         or shapely.dwithin(_plans(slabs)[:, None], np.array(walls)[None, :], HANGS_M).any()
     )
     where = f"{name} on the floor, a wall or the ceiling"
-    report.expect(hangs, "thing.support", where, f"{low:.3f} m above the floor")
+    report.expect(hangs, "object.support", where, f"{low:.3f} m above the floor")
 
 
 def _before(door: Door) -> Polygon:
-    """Rectangle that must stay free on both sides of a door."""
+    """Return the rectangle that must stay free on both sides of a door."""
     turn = math.radians(door.yaw_deg)
     ux, uy = math.cos(turn), math.sin(turn)
     half, deep = door.width_m / 2.0, HALF_WALL_M + DOOR_CLEAR_M
@@ -127,20 +128,20 @@ def _before(door: Door) -> Polygon:
     )
 
 
-def check_ways_through(
+def check_passages(
     house: House,
     rooms: dict[int, Polygon],
-    prints: dict[int, list[Geometry]],
-    ground: CheckedLattice,
+    footprints: dict[int, list[Geometry]],
+    lattice: CheckedLattice,
     report: FindingCollector,
 ) -> None:
-    """Judge that doors are clear of furniture and every room can be walked to."""
+    """Check that doors are clear of furniture and every room can be reached."""
     for door in house.doors:
         if not door.open:
             continue
         before = _before(door)
         shapely.prepare(before)
-        for object_id, plans in prints.items():
+        for object_id, plans in footprints.items():
             if any(
                 shapely.intersects(before, plan) and plans_overlap(before, plan) for plan in plans
             ):
@@ -148,19 +149,19 @@ def check_ways_through(
                     False,  # noqa: FBT003 - reached only where it fails
                     "house.door-clear",
                     f"0.65 m free before door {door.door_id}",
-                    f"thing {object_id}",
+                    f"object {object_id}",
                 )
         report.counts["predicates"] += 1
-    labels = ground.components()
-    points = ground.points()
+    labels = lattice.components()
+    points = lattice.points()
     main = np.bincount(labels[labels >= 0]).argmax() if (labels >= 0).any() else -1
     for room_id, room in rooms.items():
         shapely.prepare(room)
         inside = shapely.intersects_xy(room, points[:, 0], points[:, 1]) & (labels >= 0)
-        joined = int((inside & (labels == main)).sum())
+        connected = int((inside & (labels == main)).sum())
         report.expect(
-            joined > REACHED * int(inside.sum()),
+            connected > REACHED * int(inside.sum()),
             "house.reachable",
             f"room {room_id}: more than half of {int(inside.sum())} free nodes joined to the rest",
-            joined,
+            connected,
         )

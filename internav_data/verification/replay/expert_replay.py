@@ -1,4 +1,4 @@
-"""Experts, again: their actions played in a fresh world, and every step measured by shapely."""
+"""Replay of experts: their actions in a fresh world, every step measured by shapely."""
 
 from __future__ import annotations
 
@@ -30,43 +30,43 @@ if TYPE_CHECKING:
     from internav_data.world import MovableObject, World
 
 GOAL_M = 0.2
-"""Done succeeds within this of the goal."""
+"""Maximum distance from the goal at which Done succeeds."""
 REACH_M = 1.25
-"""What is pushed or picked up lies at least in part within this of the agent's axis."""
+"""Maximum distance of the target of an interaction from the agent's axis."""
 TURNS = {ROTATE_LEFT: 1, ROTATE_RIGHT: 3}
 AHEAD = ((1, 0), (0, 1), (-1, 0), (0, -1))
 
 
-def check_expert(theatre: CheckedScene, episode: Episode, expect: Expect) -> None:
-    """Judge the expert of an episode, where it has one."""
+def check_expert(scene: CheckedScene, episode: Episode, expect: Expect) -> None:
+    """Check the expert of an episode, if it has one."""
     if episode.expert is None:
         return
-    player = _Player(theatre, episode, expect)
+    replay = ExpertReplay(scene, episode, expect)
     for number, action in enumerate(episode.expert.actions):
-        if not player.act(number, action):
+        if not replay.act(number, action):
             return
-    player.arrive(episode.expert.actions)
+    replay.check_goal(episode.expert.actions)
 
 
-class _Player:
-    """An expert on its way: the shared world, and where the agent must be by the validator."""
+class ExpertReplay:
+    """Replay of one expert: the shared world beside the validator's own agent pose."""
 
-    def __init__(self, theatre: CheckedScene, episode: Episode, expect: Expect) -> None:
-        self._theatre = theatre
+    def __init__(self, scene: CheckedScene, episode: Episode, expect: Expect) -> None:
+        self._theatre = scene
         self._expect = expect
         self._goal = (episode.goal.x, episode.goal.y)
-        self._world: World = theatre.world(episode)
+        self._world: World = scene.world(episode)
         self._node = (episode.start.i, episode.start.j)
         self._quarter = episode.start.yaw_deg // 90
         self._trail = [self._node]
-        """Nodes since things last moved."""
+        """Nodes visited since objects last moved."""
 
     @property
-    def _here(self) -> tuple[float, float]:
+    def _position(self) -> tuple[float, float]:
         return SPACING_M * self._node[0], SPACING_M * self._node[1]
 
     def act(self, number: int, action: int) -> bool:
-        """Play one action; return whether it succeeded."""
+        """Execute one action; return whether it succeeded."""
         what = f"action {number} ({action})"
         if not self._expect(
             0 <= action < ACTIONS, "physics.expert-action", f"{what}: 0 … {ACTIONS - 1}", action
@@ -85,15 +85,15 @@ class _Player:
             self._node = (self._node[0] + di, self._node[1] + dj)
             self._trail.append(self._node)
         elif action in {*PUSHES, PICK, DROP}:
-            self._walked(before, what)
+            self._check_clear(before, what)
             if action != DROP:
-                self._reached(before[result.target], what)
+                self._check_reach(before[result.target], what)
         return True
 
-    def arrive(self, actions: Sequence[int]) -> None:
-        """Judge the end: Done, at the goal."""
-        self._walked(self._world.items, "the last steps")
-        left = math.dist(self._here, self._goal)
+    def check_goal(self, actions: Sequence[int]) -> None:
+        """Check the end: Done, at the goal."""
+        self._check_clear(self._world.items, "the last steps")
+        left = math.dist(self._position, self._goal)
         self._expect(
             left <= GOAL_M and actions[-1:] == (DONE,),
             "physics.expert-goal",
@@ -101,21 +101,21 @@ class _Player:
             f"{left:.3f} m from it after {actions[-1:]}",
         )
 
-    def _walked(self, items: Sequence[MovableObject], what: str) -> None:
-        """Judge that the disc kept off all things as they lay since they last moved."""
-        scenery = self._theatre.scenery(items, {})
+    def _check_clear(self, items: Sequence[MovableObject], what: str) -> None:
+        """Check that the disc kept clear of all objects since they last moved."""
+        arrangement = self._theatre.rearranged(items, {})
         points = [(SPACING_M * i, SPACING_M * j) for i, j in self._trail]
         line = LineString(points) if len(points) > 1 else Point(points[0])
-        things = np.array([*scenery.site.blockers, *scenery.taken], dtype=object)
-        near = int(shapely.dwithin(things, line, KEEP_M).sum())
+        blockers = np.array([*arrangement.layout.blockers, *arrangement.obstacles], dtype=object)
+        near = int(shapely.dwithin(blockers, line, KEEP_M).sum())
         self._expect(
             not near, "physics.expert-clear", f"nothing within {KEEP_M} m until {what}", near
         )
         self._trail = [self._node]
 
-    def _reached(self, item: MovableObject, what: str) -> None:
-        """Judge that what was acted on lay within reach."""
+    def _check_reach(self, item: MovableObject, what: str) -> None:
+        """Check that the target of an interaction lay within reach."""
         gap = math.inf
         if item.pose is not None:
-            gap = self._theatre.gap(item.asset.asset_id, item.pose, self._here)
+            gap = self._theatre.gap(item.asset.asset_id, item.pose, self._position)
         self._expect(gap <= REACH_M, "physics.expert-reach", f"{what}: at most {REACH_M} m", gap)
