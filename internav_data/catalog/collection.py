@@ -44,8 +44,8 @@ class Catalogue:
 def _own() -> tuple[Asset, ...]:
     return tuple(
         asset
-        for place, sheet in enumerate(SHEETS.values())
-        for asset in draw_type(sheet, place, spawnable=place < len(OBSTACLES))
+        for number, sheet in enumerate(SHEETS.values())
+        for asset in draw_type(sheet, number, spawnable=number < len(OBSTACLES))
     )
 
 

@@ -14,15 +14,15 @@ if TYPE_CHECKING:
 
     from internav_data.core.typing import Floats, Ints
 
-MOST_CORNERS = 32
+MAX_CORNERS = 32
 """Corners of a piece: footprints and Bullet slow down beyond."""
 _CONVEX_SHARE = 0.97
 """A mesh that fills that much of its hull is taken for convex, and not cut."""
 _THRESHOLD = 0.08
 """coacd's concavity at which it stops cutting."""
-_SMALLEST_SHARE = 1e-3
+_MIN_SHARE = 1e-3
 """Pieces that are smaller than this share of the whole are crumbs."""
-_THINNEST_M = 1e-3
+_MIN_THICKNESS_M = 1e-3
 _SEED = 0
 
 
@@ -34,8 +34,8 @@ class Piece:
     volume: float
 
 
-def convex_pieces(path: Path, vertices: Floats, faces: Ints, most: int) -> list[Piece]:
-    """Cut a mesh into at most `most` convex pieces, largest first.
+def convex_pieces(path: Path, vertices: Floats, faces: Ints, max_parts: int) -> list[Piece]:
+    """Cut a mesh into at most `max_parts` convex pieces, largest first.
 
     The same mesh gives the same pieces: coacd's seed is fixed and pieces are ordered by volume.
 
@@ -46,7 +46,7 @@ def convex_pieces(path: Path, vertices: Floats, faces: Ints, most: int) -> list[
     """
     whole = _piece(vertices)
     extent = np.ptp(vertices, axis=0)
-    if whole is None or extent.min() < _THINNEST_M:
+    if whole is None or extent.min() < _MIN_THICKNESS_M:
         raise UsageError(
             f"{path}: encloses no volume (it is flat: {' x '.join(f'{e:.4g}' for e in extent)} m); "
             "give it at least 1 mm of thickness"
@@ -55,18 +55,20 @@ def convex_pieces(path: Path, vertices: Floats, faces: Ints, most: int) -> list[
 
     mesh = trimesh.Trimesh(vertices, faces, process=True)
     solid = bool(mesh.is_watertight) and abs(float(mesh.volume)) >= _CONVEX_SHARE * whole.volume
-    if solid or most == 1:
+    if solid or max_parts == 1:
         return [whole]
-    pieces = [piece for points in _cut(path, mesh, most) if (piece := _piece(points)) is not None]
+    pieces = [
+        piece for points in _cut(path, mesh, max_parts) if (piece := _piece(points)) is not None
+    ]
     total = sum(piece.volume for piece in pieces)
     if total <= 0.0:
         raise UsageError(f"{path}: encloses no volume; close its surface or give it thickness")
-    kept = [piece for piece in pieces if piece.volume >= _SMALLEST_SHARE * total]
+    kept = [piece for piece in pieces if piece.volume >= _MIN_SHARE * total]
     kept.sort(key=lambda piece: (-piece.volume, piece.corners.min(axis=0).tolist()))
-    return kept[:most]
+    return kept[:max_parts]
 
 
-def _cut(path: Path, mesh: Any, most: int) -> list[Floats]:  # noqa: ANN401 - trimesh
+def _cut(path: Path, mesh: Any, max_parts: int) -> list[Floats]:  # noqa: ANN401 - trimesh
     try:
         import coacd  # noqa: PLC0415 - only for users with meshes
     except ImportError as error:
@@ -79,7 +81,7 @@ def _cut(path: Path, mesh: Any, most: int) -> list[Floats]:  # noqa: ANN401 - tr
         parts = coacd.run_coacd(
             coacd.Mesh(np.asarray(mesh.vertices), np.asarray(mesh.faces)),
             threshold=_THRESHOLD,
-            max_convex_hull=most,
+            max_convex_hull=max_parts,
             preprocess_resolution=20,
             resolution=300,
             mcts_nodes=6,
@@ -114,13 +116,13 @@ def _fewer(corners: Floats) -> Floats:
     The extremes of the axes come first, so that the bounding box stays, then always the corner
     that lies farthest from those chosen.
     """
-    if len(corners) <= MOST_CORNERS:
+    if len(corners) <= MAX_CORNERS:
         return corners
     chosen = list(dict.fromkeys(int(k) for k in (*corners.argmin(axis=0), *corners.argmax(axis=0))))
     distance = np.full(len(corners), np.inf)
     for k in chosen:
         distance = np.minimum(distance, ((corners - corners[k]) ** 2).sum(axis=1))
-    while len(chosen) < MOST_CORNERS:
+    while len(chosen) < MAX_CORNERS:
         k = int(distance.argmax())
         chosen.append(k)
         distance = np.minimum(distance, ((corners - corners[k]) ** 2).sum(axis=1))

@@ -74,19 +74,19 @@ def _mass(sheet: TypeSheet, size: Vec3) -> float:
     return float(f"{mass:.3g}")
 
 
-def draw_type(sheet: TypeSheet, place: int, *, spawnable: bool) -> tuple[Asset, ...]:
+def draw_type(sheet: TypeSheet, number: int, *, spawnable: bool) -> tuple[Asset, ...]:
     """Draw all assets of one type.
 
     Parameters
     ----------
     sheet
         Counts, sizes and mass of the type.
-    place
-        The type's place among all types: its key of random numbers.
+    number
+        Number of the type: its key of random numbers.
     spawnable
         Whether it is one of the obstacle types.
     """
-    rng = generator(SEED, Purpose.CATALOG, scene=place)
+    rng = generator(SEED, Purpose.CATALOG, scene=number)
     sizes = _sizes(sheet, rng)
     count = sheet.assets
     frictions = [from_share(_FRICTION, share) for share in shares(rng.permutation(count))]
@@ -95,8 +95,8 @@ def draw_type(sheet: TypeSheet, place: int, *, spawnable: bool) -> tuple[Asset, 
     assets = []
     for k, size in enumerate(sizes):
         sketch = Sketch()
-        dice = UniformSampler(generator(SEED, Purpose.CATALOG, scene=place, episode=k + 1))
-        design(sketch, *size, dice)
+        sampler = UniformSampler(generator(SEED, Purpose.CATALOG, scene=number, episode=k + 1))
+        design(sketch, *size, sampler)
         assets.append(
             Asset(
                 asset_id=f"{sheet.type}_{k + 1:02d}",

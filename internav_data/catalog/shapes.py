@@ -125,12 +125,12 @@ class Sketch:
 
     def prism(self, axis: Axis, outline: Sequence[Vec2], span: Span, paint: Paint) -> None:
         """Extrude a convex outline along an axis; it lies in the other two axes, in order."""
-        place: dict[Axis, Callable[[float, float, float], Vec3]] = {
+        axes: dict[Axis, Callable[[float, float, float], Vec3]] = {
             "x": lambda a, b, t: (t, a, b),
             "y": lambda a, b, t: (a, t, b),
             "z": lambda a, b, t: (a, b, t),
         }
-        put = place[axis]
+        put = axes[axis]
         self.hull([put(a, b, t) for t in span for a, b in outline], paint)
 
     def slab(self, x: Span, foot: Span, top: Span, z: Span, paint: Paint) -> None:

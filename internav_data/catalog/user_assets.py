@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from internav_data.core.typing import Floats
     from internav_data.records import RGB, Vec3
 
-MOST_BYTES = 64_000_000
-MOST_FACES = 400_000
-MOST_FILES = 5_000
-LARGEST_M, SMALLEST_M = 5.0, 0.01
+MAX_BYTES = 64_000_000
+MAX_FACES = 400_000
+MAX_FILES = 5_000
+MAX_SIZE_M, MIN_SIZE_M = 5.0, 0.01
 _DENSITY_KG_M3 = 200.0
 _GREY: RGB = (168, 164, 156)
 _GRID_M = 2e-4
@@ -60,8 +60,8 @@ def load_user_assets(directory: Path) -> tuple[Asset, ...]:
     paths = sorted(p for p in directory.iterdir() if p.suffix.lower() in MESH_SUFFIXES)
     if not paths:
         raise UsageError(f"{directory}: holds no mesh; put {', '.join(MESH_SUFFIXES)} files there")
-    if len(paths) > MOST_FILES:
-        raise UsageError(f"{directory}: {len(paths)} meshes, at most {MOST_FILES}; split it")
+    if len(paths) > MAX_FILES:
+        raise UsageError(f"{directory}: {len(paths)} meshes, at most {MAX_FILES}; split it")
     notes = read_notes(directory, tuple(path.name for path in paths))
     assets: dict[str, tuple[Asset, Path]] = {}
     for path in paths:
@@ -85,11 +85,12 @@ def _asset(path: Path, note: MeshNote) -> Asset:
         points = np.column_stack([points[:, 0], -points[:, 2], points[:, 1]])
     extent = np.ptp(points, axis=0)
     largest = float(extent.max())
-    if not SMALLEST_M <= largest <= LARGEST_M:
+    if not MIN_SIZE_M <= largest <= MAX_SIZE_M:
         guess = 10.0 ** round(math.log10(0.5 / largest)) if largest > 0.0 else 1.0
         raise UsageError(
-            f"{path}: its longest side is {largest:.4g} m, expected {SMALLEST_M} to {LARGEST_M} m; "
-            f"set scale in assets.toml (perhaps {note.scale * guess:g}: are its units millimetres?)"
+            f"{path}: its longest side is {largest:.4g} m, expected {MIN_SIZE_M} to {MAX_SIZE_M} "
+            f"m; set scale in assets.toml (perhaps {note.scale * guess:g}: "
+            "are its units millimetres?)"
         )
     pieces = convex_pieces(path, points, faces, note.max_parts)
     if note.lay_flat:
@@ -132,10 +133,8 @@ def _read(path: Path) -> tuple[Floats, NDArray[np.int64], RGB]:
     if path.is_symlink() or not path.is_file():
         raise UsageError(f"{path}: not a plain file; copy the mesh itself into the folder")
     size = path.stat().st_size
-    if not 0 < size <= MOST_BYTES:
-        raise UsageError(
-            f"{path}: {size} bytes, expected 1 to {MOST_BYTES}; export fewer triangles"
-        )
+    if not 0 < size <= MAX_BYTES:
+        raise UsageError(f"{path}: {size} bytes, expected 1 to {MAX_BYTES}; export fewer triangles")
     import trimesh  # noqa: PLC0415 - only for users with meshes
 
     try:
@@ -154,8 +153,8 @@ def _read(path: Path) -> tuple[Floats, NDArray[np.int64], RGB]:
         ) from error
     if len(faces) == 0 or len(vertices) == 0:
         raise UsageError(f"{path}: holds no triangles; export a mesh, not points or curves")
-    if len(faces) > MOST_FACES:
-        raise UsageError(f"{path}: {len(faces)} triangles, at most {MOST_FACES}; simplify it")
+    if len(faces) > MAX_FACES:
+        raise UsageError(f"{path}: {len(faces)} triangles, at most {MAX_FACES}; simplify it")
     if not np.isfinite(vertices).all():
         raise UsageError(f"{path}: has corners that are not numbers; export it again")
     return vertices, faces, _mean_colour(mesh)

@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 
 MANIFEST = "assets.toml"
 MESH_SUFFIXES = (".glb", ".obj", ".stl", ".ply", ".off")
-_LARGEST_MANIFEST = 1_000_000
-_MOST_PARTS = 32
-_LARGEST_FRICTION = 2.0
-_HEAVIEST_KG = 1e5
+_MAX_MANIFEST_BYTES = 1_000_000
+_MAX_PARTS = 32
+_MAX_FRICTION = 2.0
+_MAX_MASS_KG = 1e5
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +88,7 @@ def read_notes(directory: Path, names: tuple[str, ...]) -> dict[str, MeshNote]:
 
 def _parsed(path: Path) -> dict[str, Any]:
     try:
-        if path.is_symlink() or path.stat().st_size > _LARGEST_MANIFEST:
+        if path.is_symlink() or path.stat().st_size > _MAX_MANIFEST_BYTES:
             raise UsageError(f"{path}: must be a plain file of less than 1 MB")
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
@@ -127,11 +127,11 @@ def _check(path: Path, name: str, note: MeshNote) -> None:
             raise UsageError(f"{path}: {text} in [{name!r}]")
 
     mass = note.mass_kg
-    must(mass is None or 0.0 < mass < _HEAVIEST_KG, f"mass_kg must lie above 0, not {mass}")
-    must(0.0 <= note.friction <= _LARGEST_FRICTION, f"friction must be 0 to 2, not {note.friction}")
+    must(mass is None or 0.0 < mass < _MAX_MASS_KG, f"mass_kg must lie above 0, not {mass}")
+    must(0.0 <= note.friction <= _MAX_FRICTION, f"friction must be 0 to 2, not {note.friction}")
     must(0.0 < note.scale < 1e6, f"scale must lie above 0, not {note.scale}")  # noqa: PLR2004
     must(note.up in {None, "y", "z"}, f'up must be "y" or "z", not {note.up!r}')
-    must(1 <= note.max_parts <= _MOST_PARTS, f"max_parts must be 1 to 32, not {note.max_parts}")
+    must(1 <= note.max_parts <= _MAX_PARTS, f"max_parts must be 1 to 32, not {note.max_parts}")
     must(not (note.pushable and note.pickable), "pushable and pickable exclude each other: choose")
     must(
         note.type is None or (note.type.isascii() and note.type.isalnum()),

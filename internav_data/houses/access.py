@@ -10,7 +10,7 @@ from internav_data.houses.standards import (
     HALF_WALL_CM,
     PRIVATE,
     PUBLIC,
-    pair,
+    type_pair,
 )
 from internav_data.records import OUTSIDE
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.random import Generator
 
-    from internav_data.houses.plan import FloorGrid, Segment
+    from internav_data.houses.plan import FloorGrid, WallSegment
 
 JAMB_CM = 10
 """Least distance of an opening from the centre line of a wall that meets its own."""
@@ -58,7 +58,7 @@ _UNKNOWN_PUBLIC, _UNKNOWN_MIXED, _UNKNOWN_PRIVATE = 1.2, 4.0, 14.0
 
 
 @dataclass(frozen=True, slots=True)
-class Span:
+class WallSpan:
     """A stretch of wall in which an opening may lie; centimetres."""
 
     along_x: bool
@@ -74,23 +74,23 @@ class Span:
 
 def door_cost(first: str, second: str) -> float:
     """Return how unusual a door between two types of room is."""
-    key = pair(first, second)
+    key = type_pair(first, second)
     if key in _COST:
         return _COST[key]
     private = (first in PRIVATE) + (second in PRIVATE)
     return (_UNKNOWN_PUBLIC, _UNKNOWN_MIXED, _UNKNOWN_PRIVATE)[private]
 
 
-def _deep_enough(plan: FloorGrid, segment: Segment, m: int, side: int) -> bool:
+def _deep_enough(grid: FloorGrid, segment: WallSegment, m: int, side: int) -> bool:
     """Whether the room on one side of a wall is deep enough for a door beside grid cell m."""
-    lines = plan.ys if segment.along_x else plan.xs
+    lines = grid.ys if segment.along_x else grid.xs
     room = segment.before if side < 0 else segment.after
     if room == OUTSIDE:
         return True
     k = lines.index(segment.at)
     step = -1 if side < 0 else 0
     while 0 <= k + step < len(lines) - 1:
-        owner = plan.at(m, k + step) if segment.along_x else plan.at(k + step, m)
+        owner = grid.at(m, k + step) if segment.along_x else grid.at(k + step, m)
         if owner != room:
             return False
         far = lines[k + step] if side < 0 else lines[k + step + 1]
@@ -100,33 +100,33 @@ def _deep_enough(plan: FloorGrid, segment: Segment, m: int, side: int) -> bool:
     return False
 
 
-def spans(plan: FloorGrid, segment: Segment) -> list[Span]:
+def spans(grid: FloorGrid, segment: WallSegment) -> list[WallSpan]:
     """Stretches of a wall where doors have their clear depth on both sides."""
-    stops = plan.xs if segment.along_x else plan.ys
-    out: list[Span] = []
+    stops = grid.xs if segment.along_x else grid.ys
+    out: list[WallSpan] = []
     start: int | None = None
     for m in range(len(stops) - 1):
         if stops[m] < segment.low or stops[m] >= segment.high:
             continue
-        good = _deep_enough(plan, segment, m, -1) and _deep_enough(plan, segment, m, 1)
+        good = _deep_enough(grid, segment, m, -1) and _deep_enough(grid, segment, m, 1)
         if good and start is None:
             start = stops[m]
         if start is not None and (not good or stops[m + 1] >= segment.high):
             end = stops[m + 1] if good else stops[m]
             if end - start > 2 * JAMB_CM:
-                out.append(Span(segment.along_x, segment.at, start + JAMB_CM, end - JAMB_CM))
+                out.append(WallSpan(segment.along_x, segment.at, start + JAMB_CM, end - JAMB_CM))
             start = None
     return out
 
 
-def possible_doors(plan: FloorGrid, width_cm: int) -> dict[tuple[int, int], list[Span]]:
+def possible_doors(grid: FloorGrid, width_cm: int) -> dict[tuple[int, int], list[WallSpan]]:
     """Where doors of at least a width can be, by pair of rooms (ascending), longest span first."""
-    out: dict[tuple[int, int], list[Span]] = {}
-    for segment in plan.segments:
+    out: dict[tuple[int, int], list[WallSpan]] = {}
+    for segment in grid.segments:
         if OUTSIDE in {segment.before, segment.after} or segment.length < width_cm:
             continue
         rooms = (min(segment.before, segment.after), max(segment.before, segment.after))
-        for span in spans(plan, segment):
+        for span in spans(grid, segment):
             if span.length >= width_cm:
                 out.setdefault(rooms, []).append(span)
     for found in out.values():
@@ -153,16 +153,16 @@ def door_tree(
     types: Sequence[str],
     edges: Sequence[tuple[int, int]],
     rng: Generator,
-    whim: float = 0.6,
+    jitter: float = 0.6,
 ) -> tuple[list[tuple[int, int]], float] | None:
     """Join all rooms by the least unusual doors (Kruskal); None where they cannot be joined.
 
-    `whim` is how much of a door's cost is chance. Returns the doors and their summed cost.
+    `jitter` is how much of a door's cost is chance. Returns the doors and their summed cost.
     """
     ensuite = _ensuite(types, edges, rng)
     weighted = []
     for a, b in edges:
-        cost = door_cost(types[a], types[b]) + whim * float(rng.random())
+        cost = door_cost(types[a], types[b]) + jitter * float(rng.random())
         if ensuite is not None and ensuite[0] in {a, b} and set(ensuite) != {a, b}:
             cost += 40.0
         weighted.append((cost, a, b))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from internav_data.geometry import round_m
-from internav_data.houses.choice import FloorPlan, choose_floor_plan
+from internav_data.houses.choice import choose_floor_plan
 from internav_data.houses.furniture import furnish
 from internav_data.houses.materials import draw_materials
 from internav_data.houses.openings import draw_doors, draw_windows
@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
     from internav_data.catalog import Catalogue
     from internav_data.houses.config import HouseConfig
-    from internav_data.houses.openings import Opening
-    from internav_data.houses.plan import Corner
+    from internav_data.houses.plan import Corner, FloorPlan, Opening
     from internav_data.records import Vec2
 
 
@@ -74,8 +73,8 @@ def _rooms(
         Room(
             room_id=room,
             type=name,
-            polygon=_metres(floor_plan.plan.polygon(frozenset({room}))),
-            area_m2=round_m(floor_plan.plan.area_cm2(room) / 1e4),
+            polygon=_metres(floor_plan.grid.polygon(frozenset({room}))),
+            area_m2=round_m(floor_plan.grid.area_cm2(room) / 1e4),
             ceiling_m=round_m(ceiling_cm / 100.0),
             floor_material=surfaces[room][0],
             wall_material=surfaces[room][1],
@@ -131,11 +130,11 @@ def _assembled(
     catalogue: Catalogue,
 ) -> House:
     seed, scene, attempt = key
-    plan, types = floor_plan.plan, floor_plan.types
+    grid, types = floor_plan.grid, floor_plan.types
     openings = [*doors, *windows]
     surfaces, materials = draw_materials(types, seed, scene, attempt)
     things = furnish(
-        plan,
+        grid,
         types,
         openings,
         ceiling_cm / 100.0,
@@ -152,14 +151,14 @@ def _assembled(
         seed=seed,
         split=split_of_scene(scene),
         preset=config.preset,
-        outline=_metres(plan.polygon(frozenset(range(len(types))))),
+        outline=_metres(grid.polygon(frozenset(range(len(types))))),
         rooms=_rooms(floor_plan, surfaces, ceiling_cm),
         doors=tuple(_door(k, o) for k, o in enumerate(doors)),
         windows=tuple(_window(k, o) for k, o in enumerate(windows)),
-        walls=build_walls(plan, openings, ceiling_cm),
+        walls=build_walls(grid, openings, ceiling_cm),
         objects=things,
         materials=materials,
         room_graph=tuple(sorted({o.rooms for o in doors if o.open})),
-        area_m2=round_m(sum(plan.area_cm2(room) for room in range(len(types))) / 1e4),
+        area_m2=round_m(sum(grid.area_cm2(room) for room in range(len(types))) / 1e4),
         assets={asset_id: catalogue.assets[asset_id] for asset_id in used},
     )

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from internav_data.houses.access import door_tree, possible_doors
-from internav_data.houses.layouts import draw_layout, row
-from internav_data.houses.plan import FloorGrid, clear_size_m
+from internav_data.houses.layouts import draw_layout, row_layout
+from internav_data.houses.plan import FloorGrid, FloorPlan, clear_size_m
 from internav_data.houses.standards import (
     HABITABLE,
     HALF_WALL_CM,
+    MIN_DOOR_CM,
     PRIVATE,
     PUBLIC,
     WALL_CM,
     WANTED,
-    pair,
+    type_pair,
 )
 from internav_data.records import OUTSIDE, Purpose, generator
 from internav_data.records.errors import QuarantineError
@@ -27,14 +27,11 @@ if TYPE_CHECKING:
     from numpy.random import Generator
 
     from internav_data.houses.config import HouseConfig
-    from internav_data.houses.openings import Opening
     from internav_data.houses.programme import RoomSpec
 
-LEAST_DOOR_CM = {"paper": 100, "realistic": 80}
-"""A wall between two rooms counts as shared when a door of this width fits."""
-PATIENCE = 8
+MAX_TRIES = 8
 """How many times `candidates` may be drawn while none of them keeps the standards."""
-WHIMS = (0.6, 2.0, 4.0, 4.0, 4.0)
+JITTERS = (0.6, 2.0, 4.0, 4.0, 4.0)
 """How much chance there is in each of the door trees that a plan is tried with."""
 DEPTH_WEIGHT = 10.0
 """What one room more or less on the way than asked for costs."""
@@ -42,58 +39,37 @@ THROUGH_BATHROOM = 12.0
 """What each room that is reached only through a bathroom costs."""
 SLIVER = 2.9
 """Rooms that are longer than this times their width are corridors."""
-LEAST_JOG_CM = 50
+MIN_JOG_CM = 50
 """Parallel walls nearer than this, side by side or end to end, are no architecture."""
 DAYLIGHT_CM = 130
 """Outer wall that a habitable room wants."""
 
 
-@dataclass(frozen=True, slots=True)
-class FloorPlan:
-    """Rooms on the grid and the doors that are certain.
-
-    A user's plan brings its own doors and windows (see `internav_data.houses.plan_file`).
-    """
-
-    types: tuple[str, ...]
-    plan: FloorGrid
-    tree: tuple[tuple[int, int], ...]
-    """Pairs of rooms to be joined by a door, so that all rooms can be reached."""
-    score: float
-    """Lower is more like a home."""
-    doors: tuple[Opening, ...] = ()
-    """A user's own doors; empty where they are to be drawn."""
-    windows: tuple[Opening, ...] | None = None
-    """A user's own windows; None where they are to be drawn."""
-    ceiling_cm: int | None = None
-    """A user's own height."""
-
-
-def clear_area_m2(plan: FloorGrid, room: int) -> float:
+def clear_area_m2(grid: FloorGrid, room: int) -> float:
     """Area between the wall faces of a room, m²."""
-    around = sum(s.length for s in plan.segments if room in {s.before, s.after})
-    return (plan.area_cm2(room) - HALF_WALL_CM * around + 4 * HALF_WALL_CM**2) / 1e4
+    around = sum(s.length for s in grid.segments if room in {s.before, s.after})
+    return (grid.area_cm2(room) - HALF_WALL_CM * around + 4 * HALF_WALL_CM**2) / 1e4
 
 
-def _room_score(plan: FloorGrid, room: int, spec: RoomSpec, *, lenient: bool) -> float | None:
+def _room_score(grid: FloorGrid, room: int, spec: RoomSpec, *, lenient: bool) -> float | None:
     """How far one room is from what it should be; None where it breaks its standard."""
-    main = plan.main_rectangle(room)
+    main = grid.main_rectangle(room)
     short, long = clear_size_m(main)
-    clear = clear_area_m2(plan, room)
+    clear = clear_area_m2(grid, room)
     standard = spec.standard
     if short < standard.width_m or clear < standard.low_m2:
         return None
     odd = clear > standard.high_m2 * 1.3 or (long / short > SLIVER and spec.type != "hall")
     if odd and not lenient:
         return None
-    area = plan.area_cm2(room) / 1e4
+    area = grid.area_cm2(room) / 1e4
     score = 3.0 * math.log(area / spec.area_m2) ** 2
     score += 2.0 * max(0.0, long / short - standard.aspect) ** 2
     score += 1.5 * max(0.0, clear / standard.high_m2 - 1.0)
     # Nooks that are neither room nor corridor look wrong.
     score += 1.5 * max(0.0, 0.62 - (main[2] - main[0]) * (main[3] - main[1]) / 1e4 / area)
     if spec.type in HABITABLE:
-        outside = [s.length for s in plan.segments if _between(s.before, s.after, room, OUTSIDE)]
+        outside = [s.length for s in grid.segments if _between(s.before, s.after, room, OUTSIDE)]
         score += 0.0 if outside and max(outside) >= DAYLIGHT_CM else 3.0
     return score
 
@@ -120,14 +96,14 @@ def _through_private(types: Sequence[str], tree: Sequence[tuple[int, int]]) -> f
     return score
 
 
-def _rooms_on_way(plan: FloorGrid, tree: Sequence[tuple[int, int]]) -> float:
+def _mean_rooms_on_path(grid: FloorGrid, tree: Sequence[tuple[int, int]]) -> float:
     """Mean number of rooms between points in two different rooms, by area, along the tree."""
     count = len(tree) + 1
     joined: list[list[int]] = [[] for _ in range(count)]
     for a, b in tree:
         joined[a].append(b)
         joined[b].append(a)
-    areas = [float(plan.area_cm2(room)) for room in range(count)]
+    areas = [float(grid.area_cm2(room)) for room in range(count)]
     total = weights = 0.0
     for start in range(count):
         seen, ring, steps = {start}, [start], 1
@@ -142,7 +118,7 @@ def _rooms_on_way(plan: FloorGrid, tree: Sequence[tuple[int, int]]) -> float:
 
 
 def _best_tree(
-    plan: FloorGrid,
+    grid: FloorGrid,
     types: Sequence[str],
     edges: Sequence[tuple[int, int]],
     rng: Generator,
@@ -150,23 +126,23 @@ def _best_tree(
 ) -> tuple[list[tuple[int, int]], float] | None:
     """Choose doors that reach all rooms: as usual as can be, and as deep as was asked for."""
     best: tuple[list[tuple[int, int]], float] | None = None
-    for whim in (0.6,) if rooms_on_path is None else WHIMS:
-        found = door_tree(types, edges, rng, whim)
+    for jitter in (0.6,) if rooms_on_path is None else JITTERS:
+        found = door_tree(types, edges, rng, jitter)
         if found is None:
             return None
         tree, cost = found
         score = 0.25 * cost + _through_private(types, tree)
         if rooms_on_path is not None:
-            score += DEPTH_WEIGHT * abs(_rooms_on_way(plan, tree) - rooms_on_path)
+            score += DEPTH_WEIGHT * abs(_mean_rooms_on_path(grid, tree) - rooms_on_path)
         if best is None or score < best[1]:
             best = (tree, score)
     return best
 
 
-def judged(
-    plan: FloorGrid,
+def score_floor_plan(
+    grid: FloorGrid,
     specs: Sequence[RoomSpec],
-    least_door_cm: int,
+    min_door_cm: int,
     rng: Generator,
     rooms_on_path: float | None = None,
     *,
@@ -177,25 +153,25 @@ def judged(
     The lenient judge, who sees last resorts, keeps to least areas and widths alone.
     """
     types = tuple(spec.type for spec in specs)
-    if len(plan.cells) != len(specs):
+    if len(grid.cells) != len(specs):
         return None
     score = 0.0
     for room, spec in enumerate(specs):
-        room_score = _room_score(plan, room, spec, lenient=lenient)
+        room_score = _room_score(grid, room, spec, lenient=lenient)
         if room_score is None:
             return None
         score += room_score
-    edges = sorted(possible_doors(plan, least_door_cm))
-    if _jogs(plan) or not _drawable(plan, len(specs)):
+    edges = sorted(possible_doors(grid, min_door_cm))
+    if _jogs(grid) or not _drawable(grid, len(specs)):
         return None
-    found = _best_tree(plan, types, edges, rng, rooms_on_path)
+    found = _best_tree(grid, types, edges, rng, rooms_on_path)
     if found is None:
         return None
     tree, tree_score = found
     score += tree_score
-    width, depth = plan.xs[-1] - plan.xs[0], plan.ys[-1] - plan.ys[0]
+    width, depth = grid.xs[-1] - grid.xs[0], grid.ys[-1] - grid.ys[0]
     score += 2.0 * max(0.0, max(width, depth) / min(width, depth) - 1.8)
-    present = {pair(types[a], types[b]) for a, b in edges}
+    present = {type_pair(types[a], types[b]) for a, b in edges}
     score += sum(
         weight
         for names, weight in WANTED.items()
@@ -203,20 +179,20 @@ def judged(
     )
     halls = [k for k, name in enumerate(types) if name == "hall"]
     for hall in halls:
-        share = plan.area_cm2(hall) / sum(plan.area_cm2(k) for k in range(len(types)))
+        share = grid.area_cm2(hall) / sum(grid.area_cm2(k) for k in range(len(types)))
         score += 12.0 * max(0.0, share - 0.14)
         score += max(0, 3 - sum(1 for door in tree if hall in door))
-    return FloorPlan(types, plan, tuple(tree), score)
+    return FloorPlan(types, grid, tuple(tree), score)
 
 
-def _jogs(plan: FloorGrid) -> bool:
+def _jogs(grid: FloorGrid) -> bool:
     """Whether two walls run beside each other so closely that it looks like a mistake."""
-    segments = plan.segments
+    segments = grid.segments
     for k, one in enumerate(segments):
         for other in segments[k + 1 :]:
             if (
                 one.along_x == other.along_x
-                and 0 < abs(one.at - other.at) < LEAST_JOG_CM
+                and 0 < abs(one.at - other.at) < MIN_JOG_CM
                 and one.low - WALL_CM < other.high
                 and other.low - WALL_CM < one.high
             ):
@@ -224,10 +200,10 @@ def _jogs(plan: FloorGrid) -> bool:
     return False
 
 
-def _drawable(plan: FloorGrid, rooms: int) -> bool:
+def _drawable(grid: FloorGrid, rooms: int) -> bool:
     """Whether the outline and every room are simple polygons."""
-    return bool(plan.polygon(frozenset(range(rooms)))) and all(
-        plan.polygon(frozenset({room})) for room in range(rooms)
+    return bool(grid.polygon(frozenset(range(rooms)))) and all(
+        grid.polygon(frozenset({room})) for room in range(rooms)
     )
 
 
@@ -243,21 +219,21 @@ def choose_floor_plan(
 
     """
     rng = generator(seed, Purpose.FLOOR_PLAN, scene, attempt)
-    least = LEAST_DOOR_CM[config.preset]
+    min_door_cm = MIN_DOOR_CM[config.preset]
     best: FloorPlan | None = None
     # Tight programmes get more draws, but only until the first plan that holds.
-    for k in range(config.candidates * PATIENCE):
+    for k in range(config.candidates * MAX_TRIES):
         if best is not None and k >= config.candidates:
             break
         layout = draw_layout(specs, rng, config.wings)
-        plan = FloorGrid.of([layout[k] for k in range(len(specs))])
-        found = judged(plan, specs, least, rng, config.rooms_on_path(len(specs)))
+        grid = FloorGrid.of([layout[k] for k in range(len(specs))])
+        found = score_floor_plan(grid, specs, min_door_cm, rng, config.rooms_on_path(len(specs)))
         if found is not None and (best is None or found.score < best.score):
             best = found
     if best is None:
-        layout = row(specs)
-        plan = FloorGrid.of([layout[k] for k in range(len(specs))])
-        best = judged(plan, specs, least, rng, lenient=True)
+        layout = row_layout(specs)
+        grid = FloorGrid.of([layout[k] for k in range(len(specs))])
+        best = score_floor_plan(grid, specs, min_door_cm, rng, lenient=True)
     if best is None:
         raise QuarantineError(
             f"scene {scene}: no floor plan keeps the {config.preset} standards for "

@@ -77,7 +77,7 @@ class HouseConfig:
             raise UsageError("rooms and floor_plan exclude each other: leave one of them out")
         return parse_rooms(self.rooms)
 
-    def halls_from(self) -> int:
+    def min_hall_rooms(self) -> int:
         """Return the number of rooms from which houses have a hall."""
         return self.hall_from or (7 if self.preset == "paper" else 5)
 

@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from internav_data.core.typing import Floats
-    from internav_data.houses.openings import Opening
+    from internav_data.houses.plan import Opening
 
 
 @dataclass(frozen=True, slots=True)
-class Edge:
+class WallFace:
     """A wall face seen from inside a room: it runs along local x, the room lies at local y > 0."""
 
     x: float
@@ -29,7 +29,7 @@ class Edge:
     windows: int
 
 
-def on_edge(edge: Edge, along: Floats) -> Floats:
+def poses_along(edge: WallFace, along: Floats) -> Floats:
     """Return spots (n, 3) at distances along a wall face: x, y, quarter turns."""
     dx, dy = ((1, 0), (0, 1), (-1, 0), (0, -1))[edge.turn]
     out = np.empty((len(along), 3))
@@ -38,7 +38,9 @@ def on_edge(edge: Edge, along: Floats) -> Floats:
     return out
 
 
-def edges_of(corners: Sequence[tuple[int, int]], openings: Sequence[Opening]) -> tuple[Edge, ...]:
+def wall_faces(
+    corners: Sequence[tuple[int, int]], openings: Sequence[Opening]
+) -> tuple[WallFace, ...]:
     """Wall faces of a room: its polygon moved inwards by half a wall."""
     count = len(corners)
     directions = []
@@ -50,7 +52,7 @@ def edges_of(corners: Sequence[tuple[int, int]], openings: Sequence[Opening]) ->
         (ux, uy), (vx, vy) = directions[k - 1], directions[k]
         x, y = corners[k]
         inner.append((x + HALF_WALL_CM * (-uy - vy), y + HALF_WALL_CM * (ux + vx)))
-    out: list[Edge] = []
+    out: list[WallFace] = []
     for k in range(count):
         (ax, ay), (bx, by) = inner[k], inner[(k + 1) % count]
         (dx, dy), line = directions[k], corners[k]
@@ -66,5 +68,5 @@ def edges_of(corners: Sequence[tuple[int, int]], openings: Sequence[Opening]) ->
         turn = ((1, 0), (0, 1), (-1, 0), (0, -1)).index((dx, dy))
         length = (abs(bx - ax) + abs(by - ay)) / 100.0
         if length > 0.0:
-            out.append(Edge(ax / 100.0, ay / 100.0, turn, length, windows))
+            out.append(WallFace(ax / 100.0, ay / 100.0, turn, length, windows))
     return tuple(out)

@@ -27,7 +27,7 @@ LOWEST_M = 0.02
 
 
 @njit(cache=True)
-def turned(box: Floats, x: float, y: float, turn: int, out: Floats) -> None:
+def turn_box(box: Floats, x: float, y: float, turn: int, out: Floats) -> None:
     """Write a box (x0, y0, x1, y1, z0, z1), turned by quarter turns and moved to (x, y)."""
     if turn == 0:
         out[0], out[1], out[2], out[3] = box[0], box[1], box[2], box[3]
@@ -89,7 +89,7 @@ def _within(box: Floats, inner: Floats, gap: float) -> bool:
 
 
 @njit(cache=True)
-def block(free: Bools, origin: Ints, box: Floats) -> None:
+def mark_blocked(free: Bools, origin: Ints, box: Floats) -> None:
     """Mark the nodes that a box takes from the agent."""
     if box[4] >= HIGHEST_M or box[5] <= LOWEST_M:
         return
@@ -104,7 +104,7 @@ def block(free: Bools, origin: Ints, box: Floats) -> None:
 
 
 @njit(cache=True)
-def reached(free: Bools, start_i: int, start_j: int) -> Bools:
+def flood_fill(free: Bools, start_i: int, start_j: int) -> Bools:
     """Nodes joined to a start, over four neighbours."""
     seen = np.zeros_like(free)
     if not free[start_i, start_j]:
@@ -127,79 +127,79 @@ def reached(free: Bools, start_i: int, start_j: int) -> Bools:
 
 
 @njit(cache=True)
-def ways_open(free: Bools, anchors: Ints, least: int, share: float) -> bool:
+def doors_connected(free: Bools, door_cells: Ints, min_free: int, share: float) -> bool:
     """Whether all doors are joined and enough of the free nodes with them."""
     total = 0
     for i in range(free.shape[0]):
         for j in range(free.shape[1]):
             total += free[i, j]
-    if total < least:
+    if total < min_free:
         return False
-    if len(anchors) == 0:
+    if len(door_cells) == 0:
         return True
-    seen = reached(free, anchors[0, 0], anchors[0, 1])
-    for k in range(len(anchors)):
-        if not seen[anchors[k, 0], anchors[k, 1]]:
+    seen = flood_fill(free, door_cells[0, 0], door_cells[0, 1])
+    for k in range(len(door_cells)):
+        if not seen[door_cells[k, 0], door_cells[k, 1]]:
             return False
     count = 0
     for i in range(free.shape[0]):
         for j in range(free.shape[1]):
             count += seen[i, j]
-    return count >= least and count >= share * total
+    return count >= min_free and count >= share * total
 
 
 @njit(cache=True)
-def _stands(
+def _is_free(
     moved: Floats,
     inner: Floats,
     solids: Floats,
     solid_count: int,
-    keeps: Floats,
-    keep_count: int,
+    keep_out_boxes: Floats,
+    keep_out_count: int,
 ) -> bool:
     """Whether boxes lie in the room, apart from what stands there and what must stay clear."""
     for k in range(len(moved)):
         if (
             not _within(moved[k], inner, FROM_WALL_M)
             or hits(moved[k], solids, solid_count, GAP_M)
-            or hits(moved[k], keeps, keep_count, 0.0)
+            or hits(moved[k], keep_out_boxes, keep_out_count, 0.0)
         ):
             return False
     return True
 
 
 @njit(cache=True)
-def _leaves_ways(
+def _stays_connected(
     moved: Floats,
     blocking: Bools,
     free: Bools,
     origin: Ints,
-    anchors: Ints,
-    least: int,
+    door_cells: Ints,
+    min_free: int,
     share: float,
 ) -> bool:
     trial = free.copy()
     for k in range(len(moved)):
         if blocking[k]:
-            block(trial, origin, moved[k])
-    return ways_open(trial, anchors, least, share)
+            mark_blocked(trial, origin, moved[k])
+    return doors_connected(trial, door_cells, min_free, share)
 
 
 @njit(cache=True)
 def first_fit(
-    spots: Floats,
+    poses: Floats,
     items: Floats,
     blocking: Bools,
     fronts: Floats,
     inner: Floats,
     solids: Floats,
     solid_count: int,
-    keeps: Floats,
-    keep_count: int,
+    keep_out_boxes: Floats,
+    keep_out_count: int,
     free: Bools,
     origin: Ints,
-    anchors: Ints,
-    least: int,
+    door_cells: Ints,
+    min_free: int,
     share: float,
 ) -> int:
     """Index of the first spot where a group fits, -1 for none.
@@ -210,18 +210,18 @@ def first_fit(
     """
     box = np.empty(6)
     moved = np.empty_like(items)
-    for m in range(len(spots)):
-        x, y, turn = spots[m, 0], spots[m, 1], int(spots[m, 2])
+    for m in range(len(poses)):
+        x, y, turn = poses[m, 0], poses[m, 1], int(poses[m, 2])
         for k in range(len(items)):
-            turned(items[k], x, y, turn, moved[k])
-        if not _stands(moved, inner, solids, solid_count, keeps, keep_count):
+            turn_box(items[k], x, y, turn, moved[k])
+        if not _is_free(moved, inner, solids, solid_count, keep_out_boxes, keep_out_count):
             continue
         good = True
         for k in range(len(fronts)):
-            turned(fronts[k], x, y, turn, box)
+            turn_box(fronts[k], x, y, turn, box)
             if not _within(box, inner, 0.0) or hits(box, solids, solid_count, 0.0):
                 good = False
                 break
-        if good and _leaves_ways(moved, blocking, free, origin, anchors, least, share):
+        if good and _stays_connected(moved, blocking, free, origin, door_cells, min_free, share):
             return m
     return -1

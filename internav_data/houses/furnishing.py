@@ -9,14 +9,14 @@ import numpy as np
 
 from internav_data.geometry import yaw_quaternion
 from internav_data.houses.choice import clear_area_m2
-from internav_data.houses.faces import Edge, edges_of, on_edge
+from internav_data.houses.faces import WallFace, poses_along, wall_faces
 from internav_data.houses.fitting import (
     RADIUS_M,
     SPACING_M,
     TOLERANCE_M,
-    block,
     first_fit,
-    turned,
+    mark_blocked,
+    turn_box,
 )
 from internav_data.houses.pieces import BACK_GAP_M
 from internav_data.houses.plan import clear_size_m
@@ -29,19 +29,18 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.core.typing import Floats
-    from internav_data.houses.openings import Opening
     from internav_data.houses.pieces import Group
-    from internav_data.houses.plan import FloorGrid
+    from internav_data.houses.plan import FloorGrid, Opening
 
 CAPACITY = 160
 """Most boxes in one room."""
-LEAST_FREE = 0.45
+MIN_FREE = 0.45
 """Share of an empty room's nodes that furniture leaves to the agent."""
 JOINED = 0.93
 """Share of the free nodes that are joined to the doors: pockets are small."""
 SMALL_NODES = 60
 """Rooms with fewer nodes than this are small: bathrooms, storage."""
-LEAST_FREE_SMALL, JOINED_SMALL = 0.25, 0.84
+MIN_FREE_SMALL, JOINED_SMALL = 0.25, 0.84
 WINDOW_DEPTH_M = 0.45
 """What stands nearer to a window than this must be lower than its sill."""
 
@@ -57,16 +56,16 @@ class RoomState:
     """Between the wall faces."""
     short_m: float
     """Shorter side of the largest rectangle in the room, between wall faces."""
-    edges: tuple[Edge, ...]
+    wall_faces: tuple[WallFace, ...]
     solids: Floats
-    keeps: Floats
+    keep_out_boxes: Floats
     free: NDArray[np.bool_]
     origin: NDArray[np.int64]
-    anchors: NDArray[np.int64]
-    least: int
+    door_cells: NDArray[np.int64]
+    min_free: int
     joined: float
     solid_count: int = 0
-    keep_count: int = 0
+    keep_out_count: int = 0
     placed: list[tuple[Group, float, float, int]] = field(default_factory=list)
 
     def add_solid(self, box: Floats) -> None:
@@ -74,45 +73,45 @@ class RoomState:
         self.solids[self.solid_count] = box
         self.solid_count += 1
 
-    def add_keep(self, box: Floats) -> None:
+    def add_keep_out(self, box: Floats) -> None:
         """Keep a box clear of things."""
-        self.keeps[self.keep_count] = box
-        self.keep_count += 1
+        self.keep_out_boxes[self.keep_out_count] = box
+        self.keep_out_count += 1
 
-    def place(self, group: Group, spots: Floats) -> bool:
+    def place(self, group: Group, poses: Floats) -> bool:
         """Put a group at the first spot (x, y, quarter turns) where it fits, if there is one."""
         full = CAPACITY - 24
-        if len(spots) == 0 or self.solid_count > full or self.keep_count > full:
+        if len(poses) == 0 or self.solid_count > full or self.keep_out_count > full:
             return False
         items, blocking = group.boxes, group.blocking
         m = first_fit(
-            spots,
+            poses,
             items,
             blocking,
             group.fronts,
             self.inner,
             self.solids,
             self.solid_count,
-            self.keeps,
-            self.keep_count,
+            self.keep_out_boxes,
+            self.keep_out_count,
             self.free,
             self.origin,
-            self.anchors,
-            self.least,
+            self.door_cells,
+            self.min_free,
             self.joined,
         )
         if m < 0:
             return False
-        x, y, turn = float(spots[m, 0]), float(spots[m, 1]), int(spots[m, 2])
+        x, y, turn = float(poses[m, 0]), float(poses[m, 1]), int(poses[m, 2])
         box = np.empty(6)
         for k in range(len(items)):
-            turned(items[k], x, y, turn, box)
+            turn_box(items[k], x, y, turn, box)
             self.add_solid(box)
             if blocking[k]:
-                block(self.free, self.origin, box)
+                mark_blocked(self.free, self.origin, box)
         for front in group.fronts:
-            turned(front, x, y, turn, box)
-            self.add_keep(box)
+            turn_box(front, x, y, turn, box)
+            self.add_keep_out(box)
         self.placed.append((group, x, y, turn))
         return True
 
@@ -123,11 +122,11 @@ class RoomState:
 
         `prefer` is "corner", "centre", "far" (from doors), "sun" (near windows) or "any".
         """
-        spots: list[Floats] = []
+        poses: list[Floats] = []
         likes: list[Floats] = []
         # A finger's breadth to the walls on either side, as to the one behind.
         left, right = group.left - BACK_GAP_M, group.right + BACK_GAP_M
-        for edge in self.edges:
+        for edge in self.wall_faces:
             spare = edge.length - (right - left)
             if spare < 0.0:
                 continue
@@ -143,12 +142,12 @@ class RoomState:
             elif prefer == "sun":
                 like += 0.3 * ends - 0.8 * min(edge.windows, 1)
             like += 0.8 * float(rng.random())
-            spots.append(on_edge(edge, along))
+            poses.append(poses_along(edge, along))
             likes.append(like)
-        if not spots:
+        if not poses:
             return np.empty((0, 3))
         order = np.argsort(np.concatenate(likes), kind="stable")
-        found: Floats = np.concatenate(spots)[order]
+        found: Floats = np.concatenate(poses)[order]
         return found
 
     def in_the_open(self, group: Group, rng: Generator) -> Floats:
@@ -170,7 +169,7 @@ class RoomState:
         return np.ascontiguousarray(found)
 
 
-def _sided(opening: Opening, side: int, depth_cm: float, bottom: float, top: float) -> Floats:
+def _box_beside(opening: Opening, side: int, depth_cm: float, bottom: float, top: float) -> Floats:
     """Box beside an opening, on the side of lower (-1) or higher (+1) coordinates."""
     face = opening.at + side * HALF_WALL_CM
     near, far = sorted((face, face + side * depth_cm))
@@ -182,16 +181,16 @@ def _sided(opening: Opening, side: int, depth_cm: float, bottom: float, top: flo
     return np.array([*(v / 100.0 for v in flat), bottom, top])
 
 
-def _side_of(plan: FloorGrid, room: int, opening: Opening) -> int:
+def _side_of(grid: FloorGrid, room: int, opening: Opening) -> int:
     """On which side of an opening a room lies."""
-    stops, lines = (plan.xs, plan.ys) if opening.along_x else (plan.ys, plan.xs)
+    stops, lines = (grid.xs, grid.ys) if opening.along_x else (grid.ys, grid.xs)
     m = next(k for k in range(len(stops) - 1) if stops[k + 1] > opening.low)
     k = lines.index(opening.at)
-    above = plan.at(m, k) if opening.along_x else plan.at(k, m)
+    above = grid.at(m, k) if opening.along_x else grid.at(k, m)
     return 1 if above == room else -1
 
 
-def _anchor(opening: Opening, side: int, origin: NDArray[np.int64]) -> tuple[int, int]:
+def _door_cell(opening: Opening, side: int, origin: NDArray[np.int64]) -> tuple[int, int]:
     """Return the node of a door's channel that lies furthest in the room."""
     along = round((opening.low + opening.high) / 2 / 25)
     if not opening.low + 20 <= along * 25 <= opening.high - 20:
@@ -203,19 +202,19 @@ def _anchor(opening: Opening, side: int, origin: NDArray[np.int64]) -> tuple[int
 
 
 def room_state(
-    plan: FloorGrid, room: int, name: str, openings: Sequence[Opening], ceiling_m: float
+    grid: FloorGrid, room: int, name: str, openings: Sequence[Opening], ceiling_m: float
 ) -> RoomState:
     """Return an empty room with its doors' and windows' clear boxes."""
-    cells = plan.cells[room]
+    cells = grid.cells[room]
     i0, i1 = min(i for i, _ in cells), max(i for i, _ in cells) + 1
     j0, j1 = min(j for _, j in cells), max(j for _, j in cells) + 1
     half = HALF_WALL_CM / 100.0
     inner = np.array(
         [
-            plan.xs[i0] / 100.0 + half,
-            plan.ys[j0] / 100.0 + half,
-            plan.xs[i1] / 100.0 - half,
-            plan.ys[j1] / 100.0 - half,
+            grid.xs[i0] / 100.0 + half,
+            grid.ys[j0] / 100.0 + half,
+            grid.xs[i1] / 100.0 - half,
+            grid.ys[j1] / 100.0 - half,
         ]
     )
     origin = np.floor(inner[:2] / SPACING_M).astype(np.int64)
@@ -228,41 +227,41 @@ def room_state(
     )[None, :]
     mine = [o for o in openings if room in o.rooms]
     doors = [o for o in mine if o.kind is not None]
-    sides = [_side_of(plan, room, o) for o in doors]
-    anchors = [_anchor(o, side, origin) for o, side in zip(doors, sides, strict=True)]
+    sides = [_side_of(grid, room, o) for o in doors]
+    door_cells = [_door_cell(o, side, origin) for o, side in zip(doors, sides, strict=True)]
     state = RoomState(
         room,
         name,
         inner,
-        clear_area_m2(plan, room),
-        clear_size_m(plan.main_rectangle(room))[0],
-        edges_of(plan.polygon(frozenset({room})), mine),
+        clear_area_m2(grid, room),
+        clear_size_m(grid.main_rectangle(room))[0],
+        wall_faces(grid.polygon(frozenset({room})), mine),
         np.zeros((CAPACITY, 6)),
         np.zeros((CAPACITY, 6)),
         np.ascontiguousarray(free),
         origin,
-        np.array(anchors, dtype=np.int64).reshape(-1, 2),
+        np.array(door_cells, dtype=np.int64).reshape(-1, 2),
         0,
         JOINED,
     )
     for i in range(i0, i1):
         for j in range(j0, j1):
-            if plan.owner[i][j] != room:
-                x0, x1 = plan.xs[i] / 100.0 - half, plan.xs[i + 1] / 100.0 + half
-                y0, y1 = plan.ys[j] / 100.0 - half, plan.ys[j + 1] / 100.0 + half
+            if grid.owner[i][j] != room:
+                x0, x1 = grid.xs[i] / 100.0 - half, grid.xs[i + 1] / 100.0 + half
+                y0, y1 = grid.ys[j] / 100.0 - half, grid.ys[j + 1] / 100.0 + half
                 box = np.array([x0, y0, x1, y1, 0.0, ceiling_m])
                 state.add_solid(box)
-                block(state.free, origin, box)
+                mark_blocked(state.free, origin, box)
     for o, side in zip(doors, sides, strict=True):
-        state.add_keep(_sided(o, side, DOOR_CLEAR_CM, 0.0, o.top / 100.0))
+        state.add_keep_out(_box_beside(o, side, DOOR_CLEAR_CM, 0.0, o.top / 100.0))
     for o in mine:
         if o.kind is None:
             depth = WINDOW_DEPTH_M * 100.0
-            side = _side_of(plan, room, o)
-            state.add_keep(_sided(o, side, depth, o.bottom / 100.0, o.top / 100.0))
+            side = _side_of(grid, room, o)
+            state.add_keep_out(_box_beside(o, side, depth, o.bottom / 100.0, o.top / 100.0))
     nodes = int(state.free.sum())
     small = nodes < SMALL_NODES
-    state.least = int((LEAST_FREE_SMALL if small else LEAST_FREE) * nodes)
+    state.min_free = int((MIN_FREE_SMALL if small else MIN_FREE) * nodes)
     state.joined = JOINED_SMALL if small else JOINED
     return state
 

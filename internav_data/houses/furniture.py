@@ -15,18 +15,17 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from internav_data.catalog import Catalogue
-    from internav_data.houses.openings import Opening
-    from internav_data.houses.plan import FloorGrid
-    from internav_data.houses.rules import Rule
+    from internav_data.houses.plan import FloorGrid, Opening
+    from internav_data.houses.rules import FurnitureRule
 
 CERTAIN = 1.0
 """Rules of this share are what a room cannot do without."""
-MOST = 4
+MAX_GROUPS = 4
 """Most groups that one rule puts into one room."""
 
 
 def furnish(
-    plan: FloorGrid,
+    grid: FloorGrid,
     types: Sequence[str],
     openings: Sequence[Opening],
     ceiling_m: float,
@@ -37,24 +36,24 @@ def furnish(
     attempt: int,
 ) -> tuple[SceneObject, ...]:
     """Return the things of a house, by room and group."""
-    things: list[SceneObject] = []
+    objects: list[SceneObject] = []
     for room, name in enumerate(types):
-        state = room_state(plan, room, name, openings, ceiling_m)
+        state = room_state(grid, room, name, openings, ceiling_m)
         # Each room has numbers of its own: another room's luck does not change it.
         rng = generator(seed, Purpose.FURNITURE, scene, attempt, draw=room)
         _furnish_room(state, frozenset(types), Picker(catalogue, rng), density)
-        things += _things(state, len(things), _groups(things))
-    return tuple(things)
+        objects += _scene_objects(state, len(objects), _groups(objects))
+    return tuple(objects)
 
 
-def _groups(things: Sequence[SceneObject]) -> int:
-    return 1 + max((thing.group for thing in things), default=-1)
+def _groups(objects: Sequence[SceneObject]) -> int:
+    return 1 + max((item.group for item in objects), default=-1)
 
 
-def _times(rule: Rule, picker: Picker, area_m2: float, density: float) -> int:
+def _times(rule: FurnitureRule, picker: Picker, area_m2: float, density: float) -> int:
     """How many groups of a rule to try."""
     draw = float(picker.rng.random())
-    if area_m2 < rule.least_m2:
+    if area_m2 < rule.min_m2:
         return 0
     if rule.share >= CERTAIN and rule.per_m2 == 0.0:
         return 1
@@ -62,37 +61,37 @@ def _times(rule: Rule, picker: Picker, area_m2: float, density: float) -> int:
     if rule.share >= CERTAIN:
         expected = max(1.0, expected)
     whole = int(expected)
-    return min(MOST, whole + (draw < expected - whole))
+    return min(MAX_GROUPS, whole + (draw < expected - whole))
 
 
 def _furnish_room(state: RoomState, types: frozenset[str], picker: Picker, density: float) -> None:
     width, depth = float(state.inner[2] - state.inner[0]), float(state.inner[3] - state.inner[1])
-    place = RoomContext(state.area_m2, state.short_m, max(width, depth), types)
+    room = RoomContext(state.area_m2, state.short_m, max(width, depth), types)
     for rule in RULES[state.type]:
         times = _times(rule, picker, state.area_m2, density)
         present = {item.asset.type for group, *_ in state.placed for item in group.items}
         if rule.without in types or rule.lacking in present:
             continue
         for _ in range(times):
-            if not _try_rule(state, rule, place, picker):
+            if not _try_rule(state, rule, room, picker):
                 break
 
 
-def _try_rule(state: RoomState, rule: Rule, place: RoomContext, picker: Picker) -> bool:
-    for group in rule.make(picker, place):
+def _try_rule(state: RoomState, rule: FurnitureRule, room: RoomContext, picker: Picker) -> bool:
+    for group in rule.make(picker, room):
         if not consistent(picker, group):
             continue
-        spots = (
+        poses = (
             state.in_the_open(group, picker.rng)
             if rule.prefer == "open"
             else state.along_walls(group, picker.rng, rule.prefer)
         )
-        if state.place(group, spots):
+        if state.place(group, poses):
             return True
     return False
 
 
-def _things(state: RoomState, first: int, first_group: int) -> list[SceneObject]:
+def _scene_objects(state: RoomState, first: int, first_group: int) -> list[SceneObject]:
     """Turn a room's groups into things with ids, in the order they were placed."""
     out: list[SceneObject] = []
     for number, (group, x, y, turn) in enumerate(state.placed):

@@ -58,9 +58,9 @@ def _beside(item: PlacedAsset, asset: Asset, side: int) -> PlacedAsset:
     return against(asset, x)
 
 
-def bed(p: Picker, place: RoomContext) -> list[Group]:
+def bed(p: Picker, room: RoomContext) -> list[Group]:
     """Make a bed with its head to the wall and a nightstand on either side."""
-    double = place.area_m2 >= 11.5 and place.short_m >= 2.75  # noqa: PLR2004 - the stated minima
+    double = room.area_m2 >= 11.5 and room.short_m >= 2.75  # noqa: PLR2004 - the stated minima
     asset = p.one("Bed", lambda a: (a.size[0] >= DOUBLE_BED_M) == double)
     if asset is None:
         asset = p.smallest("Bed")
@@ -100,8 +100,8 @@ def _plain(
 ) -> Callable[[Picker, RoomContext], list[Group]]:
     """One piece against a wall: any of some types."""
 
-    def make(p: Picker, place: RoomContext) -> list[Group]:
-        del place
+    def make(p: Picker, room: RoomContext) -> list[Group]:
+        del room
         out: list[Group] = []
         start = int(float(p.rng.random()) * len(kinds))
         for kind in kinds[start:] + kinds[:start]:
@@ -117,7 +117,7 @@ def _plain(
 
 wardrobe = _plain("Wardrobe", front=0.55)
 dresser = _plain("Dresser", front=0.5)
-shelf = _plain("Bookcase", "ShelvingUnit", front=0.4)
+bookshelf = _plain("Bookcase", "ShelvingUnit", front=0.4)
 storage_rack = _plain("StorageRack", "ShelvingUnit", front=0.4)
 plant = _plain("HousePlant", front=0.0)
 floor_lamp = _plain("FloorLamp", front=0.0)
@@ -139,9 +139,9 @@ shower = _plain("Shower", front=0.4, share=0.5)
 fridge = _plain("Fridge", front=0.6)
 
 
-def vanity(p: Picker, place: RoomContext) -> list[Group]:
+def vanity(p: Picker, room: RoomContext) -> list[Group]:
     """Make a dressing table with a stool before it."""
-    del place
+    del room
     asset, seat = p.one("VanityTable"), p.one("Stool")
     if asset is None:
         return []
@@ -150,31 +150,31 @@ def vanity(p: Picker, place: RoomContext) -> list[Group]:
     return [plain] if seat is None else [plain.with_items(p.tucked(top, seat, 0, 0.0)), plain]
 
 
-def side_table(p: Picker, place: RoomContext) -> list[Group]:
+def side_table(p: Picker, room: RoomContext) -> list[Group]:
     """Make a small table against a wall, with something on it."""
-    del place
+    del room
     asset = p.one("SideTable")
     if asset is None:
         return []
     group = Group((against(asset),), ())
     for kind in ("AlarmClock", "Laptop", "Box"):
-        thing = p.one(kind) if p.chance(0.3) else None
-        resting = p.resting(group.items[0], 0, thing, 0.0, 0.0) if thing else None
+        small = p.one(kind) if p.chance(0.3) else None
+        resting = p.resting(group.items[0], 0, small, 0.0, 0.0) if small else None
         if resting is not None:
             return [group.with_items(resting), group]
     return [group]
 
 
-def painting(p: Picker, place: RoomContext) -> list[Group]:
+def painting(p: Picker, room: RoomContext) -> list[Group]:
     """Make a picture on the wall."""
-    del place
+    del room
     asset = p.one("Painting", narrow(1.3), any_size=True)
     return [Group((against(asset, z=EYE_LEVEL_M + 0.1),))] if asset else []
 
 
-def wall_mirror(p: Picker, place: RoomContext) -> list[Group]:
+def wall_mirror(p: Picker, room: RoomContext) -> list[Group]:
     """Make a mirror on the wall."""
-    del place
+    del room
     asset = p.one("Mirror")
     if asset is None:
         return []
@@ -182,17 +182,15 @@ def wall_mirror(p: Picker, place: RoomContext) -> list[Group]:
     return [Group((against(asset, z=round(hung, 2)),))]
 
 
-def rug(p: Picker, place: RoomContext) -> list[Group]:
+def rug(p: Picker, room: RoomContext) -> list[Group]:
     """Make a rug on free floor."""
-    asset = p.one(
-        "Rug", lambda a: a.size[0] < 0.6 * place.long_m and a.size[1] < 0.6 * place.short_m
-    )
+    asset = p.one("Rug", lambda a: a.size[0] < 0.6 * room.long_m and a.size[1] < 0.6 * room.short_m)
     return [Group((PlacedAsset(asset, 0.0, 0.0, 0),))] if asset else []
 
 
-def desk(p: Picker, place: RoomContext) -> list[Group]:
+def desk(p: Picker, room: RoomContext) -> list[Group]:
     """Make a desk against the wall with its chair before it."""
-    asset = p.one("Desk", narrow(max(1.2, 0.5 * place.long_m)), any_size=True)
+    asset = p.one("Desk", narrow(max(1.2, 0.5 * room.long_m)), any_size=True)
     seat = p.one("OfficeChair") if p.chance(0.7) else p.one("Chair")
     if asset is None:
         return []
@@ -202,16 +200,16 @@ def desk(p: Picker, place: RoomContext) -> list[Group]:
         chair = p.tucked(top, seat, 0, 0.0)
         group = Group((top, chair), (in_front(chair, 0.4),))
     for kind, dx in (("Laptop", 0.0), ("AlarmClock", 0.35)):
-        thing = p.one(kind) if p.chance(0.6) else None
-        resting = p.resting(top, 0, thing, dx, 0.0) if thing else None
+        small = p.one(kind) if p.chance(0.6) else None
+        resting = p.resting(top, 0, small, dx, 0.0) if small else None
         if resting is not None:
             group = group.with_items(resting)
     return [group]
 
 
-def washbasin(p: Picker, place: RoomContext) -> list[Group]:
+def washbasin(p: Picker, room: RoomContext) -> list[Group]:
     """Make a basin with a mirror over it."""
-    del place
+    del room
     glass = p.one("Mirror", narrow(0.9))
     out: list[Group] = []
     for asset in (p.one("Sink"), p.smallest("Sink")):
@@ -226,9 +224,9 @@ def washbasin(p: Picker, place: RoomContext) -> list[Group]:
     return out
 
 
-def laundry(p: Picker, place: RoomContext) -> list[Group]:
+def laundry(p: Picker, room: RoomContext) -> list[Group]:
     """Make washing machine and dryer side by side."""
-    del place
+    del room
     washer, dryer = p.one("WashingMachine"), p.one("ClothesDryer")
     if washer is None:
         return []
@@ -237,4 +235,4 @@ def laundry(p: Picker, place: RoomContext) -> list[Group]:
     if dryer is None:
         return [one]
     second = _beside(first, dryer, 1)
-    return [one.with_items(second).keeping(in_front(second, 0.6)), one]
+    return [one.with_items(second).with_clearance(in_front(second, 0.6)), one]

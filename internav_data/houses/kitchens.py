@@ -52,8 +52,8 @@ def _laid(p: Picker, group: Group) -> Group:
         half = item.half[0]
         for dx in (-half + 0.4, half - 0.4) if half > 0.8 else (0.0,):  # noqa: PLR2004 - room for two
             kind = _FOODS[int(float(p.rng.random()) * len(_FOODS))]
-            thing = p.one(kind) if p.chance(0.65) else None
-            resting = p.resting(item, k, thing, dx, 0.0) if thing else None
+            small = p.one(kind) if p.chance(0.65) else None
+            resting = p.resting(item, k, small, dx, 0.0) if small else None
             out = out.with_items(resting) if resting is not None else out
     return out
 
@@ -71,35 +71,35 @@ _SHORT_RUNS: tuple[tuple[str, ...], ...] = (
 )
 
 
-def kitchen_run(p: Picker, place: RoomContext) -> list[Group]:
+def kitchen_run(p: Picker, room: RoomContext) -> list[Group]:
     """Make everything one cooks with along one wall, as much as fits, then less."""
-    start = 0 if place.area_m2 > 12 else 1  # noqa: PLR2004 - m², a roomy kitchen
+    start = 0 if room.area_m2 > 12 else 1  # noqa: PLR2004 - m², a roomy kitchen
     kinds = list(_RUNS[start:])
     if p.chance(0.5):
         kinds = [k[::-1] for k in kinds]
-    runs = [_run(p, k, length) for k in kinds for length in (place.long_m, place.short_m)]
+    runs = [_run(p, k, length) for k in kinds for length in (room.long_m, room.short_m)]
     return [_laid(p, run) for run in runs if run is not None]
 
 
-def short_run(p: Picker, place: RoomContext) -> list[Group]:
+def short_run(p: Picker, room: RoomContext) -> list[Group]:
     """Make stove and sink where no whole run found room."""
     runs = [
         _run(p, k, length)
         for k in _SHORT_RUNS
-        for length in (0.7 * place.long_m, 0.7 * place.short_m)
+        for length in (0.7 * room.long_m, 0.7 * room.short_m)
     ]
     return [_laid(p, run) for run in runs if run is not None]
 
 
-def counter(p: Picker, place: RoomContext) -> list[Group]:
+def counter(p: Picker, room: RoomContext) -> list[Group]:
     """Make another counter."""
-    run = _run(p, ("CounterTop",), 0.6 * place.long_m)
+    run = _run(p, ("CounterTop",), 0.6 * room.long_m)
     return [_laid(p, run)] if run is not None else []
 
 
-def sink_alone(p: Picker, place: RoomContext) -> list[Group]:
+def sink_alone(p: Picker, room: RoomContext) -> list[Group]:
     """Make a sink by itself."""
-    del place
+    del room
     asset = p.one("Sink")
     if asset is None:
         return []
@@ -107,9 +107,9 @@ def sink_alone(p: Picker, place: RoomContext) -> list[Group]:
     return [Group((item,), (in_front(item, 0.6),))]
 
 
-def island(p: Picker, place: RoomContext) -> list[Group]:
+def island(p: Picker, room: RoomContext) -> list[Group]:
     """Make a free-standing counter with stools."""
-    asset = p.one("KitchenIsland", lambda a: a.size[0] < 0.45 * place.long_m)
+    asset = p.one("KitchenIsland", lambda a: a.size[0] < 0.45 * room.long_m)
     if asset is None:
         return []
     block = PlacedAsset(asset, 0.0, 0.0, FACING_WALL)
@@ -121,4 +121,4 @@ def island(p: Picker, place: RoomContext) -> list[Group]:
         seats = [p.tucked(block, stool, 0, a) for a in (-hx / 2.0, hx / 2.0)]
         group = group.with_items(*seats)
     # Room to walk on the working side.
-    return [_laid(p, group.keeping((around[0] + 0.8, around[1], around[2] - 0.8, -hy)))]
+    return [_laid(p, group.with_clearance((around[0] + 0.8, around[1], around[2] - 0.8, -hy)))]

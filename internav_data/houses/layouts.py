@@ -10,7 +10,7 @@ from internav_data.houses.slicing import (
     Layout,
     at_origin,
     carve,
-    least_width,
+    min_width_cm,
     mirrored,
     slice_rooms,
     snapped,
@@ -52,21 +52,21 @@ def _shuffled(rng: Generator, items: Sequence[int]) -> list[int]:
     return [items[int(k)] for k in keys.argsort(kind="stable")]
 
 
-def _least(specs: Sequence[RoomSpec], rooms: Sequence[int]) -> int:
+def _min_depth(specs: Sequence[RoomSpec], rooms: Sequence[int]) -> int:
     """Depth that some rooms side by side need, centimetres."""
-    return max(least_width(specs[k]) for k in rooms)
+    return max(min_width_cm(specs[k]) for k in rooms)
 
 
-def sliced(specs: Sequence[RoomSpec], rng: Generator) -> Layout:
+def sliced_layout(specs: Sequence[RoomSpec], rng: Generator) -> Layout:
     """One block cut by a slicing tree."""
     order = sorted(range(len(specs)), key=lambda k: (_ORDER.index(specs[k].type), k))
     if float(rng.random()) < 0.35:  # noqa: PLR2004 - other orders now and then
         order = _shuffled(rng, order)
     area = sum(spec.area_m2 for spec in specs) * 1e4
     aspect = _uniform(rng, 1.0, 1.35 if len(specs) == 1 else 1.75)
-    least = _least(specs, order)
-    width = max(snapped(math.sqrt(area * aspect)), least)
-    height = max(snapped(area / width), least)
+    side = _min_depth(specs, order)
+    width = max(snapped(math.sqrt(area * aspect)), side)
+    height = max(snapped(area / width), side)
     layout: Layout = {}
     slice_rooms((0, 0, width, height), specs, order, rng, layout)
     return layout
@@ -119,14 +119,14 @@ def _wrap(
     x0, y0, x1, y1 = rect
     host, guest = cell
     area = specs[guest].area_m2 * 1e4
-    least = least_width(specs[guest])
+    min_width = min_width_cm(specs[guest])
     if float(rng.random()) < 0.3:  # noqa: PLR2004 - ensuite: the whole far end
-        depth = max(least, snapped(area / (x1 - x0)))
+        depth = max(min_width, snapped(area / (x1 - x0)))
         far: Rect = (x0, y0, x1, y0 + depth) if hall_above else (x0, y1 - depth, x1, y1)
         return {host: carve([rect], far), guest: [far]}
-    depth = max(least, snapped(math.sqrt(area) * _uniform(rng, 0.9, 1.25)))
+    depth = max(min_width, snapped(math.sqrt(area) * _uniform(rng, 0.9, 1.25)))
     depth = min(depth, y1 - y0)
-    width = max(least, snapped(area / depth))
+    width = max(min_width, snapped(area / depth))
     left = float(rng.random()) < 0.5  # noqa: PLR2004 - a fair coin
     gx0, gx1 = (x0, x0 + width) if left else (x1 - width, x1)
     near: Rect = (gx0, y1 - depth, gx1, y1) if hall_above else (gx0, y0, gx1, y0 + depth)
@@ -143,16 +143,18 @@ def _fill_band(
 ) -> Layout:
     x0, y0, x1, y1 = rect
     areas = [sum(specs[k].area_m2 for k in cell) for cell in cells]
-    least = [max(least_width(specs[k]) for k in cell) for cell in cells]
-    spare = max(0.0, (x1 - x0) - sum(least))
-    # Widths follow areas, but never under the least.
-    wanted = [max(0.0, a / sum(areas) * (x1 - x0) - w) for a, w in zip(areas, least, strict=True)]
+    min_widths = [max(min_width_cm(specs[k]) for k in cell) for cell in cells]
+    spare = max(0.0, (x1 - x0) - sum(min_widths))
+    # Widths follow areas, but never under the minimum.
+    wanted = [
+        max(0.0, a / sum(areas) * (x1 - x0) - w) for a, w in zip(areas, min_widths, strict=True)
+    ]
     factor = spare / sum(wanted) if sum(wanted) > 0.0 else 0.0
     layout: Layout = {}
     left = x0
     reach = float(x0)
     for k, cell in enumerate(cells):
-        reach += least[k] + factor * wanted[k]
+        reach += min_widths[k] + factor * wanted[k]
         right = x1 if k == len(cells) - 1 else max(left + GRID_CM, snapped(reach))
         piece: Rect = (left, y0, right, y1)
         if len(cell) == 1:
@@ -179,14 +181,14 @@ def _end_zone(
     return end if len(rest) - len(end) >= 2 else []  # noqa: PLR2004 - a hall serves two at least
 
 
-def spine(specs: Sequence[RoomSpec], rng: Generator, wings: float = 0.0) -> Layout:
+def hall_layout(specs: Sequence[RoomSpec], rng: Generator, wings: float = 0.0) -> Layout:
     """Line a hall with rooms on both sides; the living rooms often fill its end."""
     hall = next(k for k, spec in enumerate(specs) if spec.type == "hall")
     rest = [k for k in range(len(specs)) if k != hall]
     end = _end_zone(specs, rest, wings, rng)
     rest = [k for k in rest if k not in end]
     top, bottom = _split_bands(specs, rest, rng)
-    hall_width = snapped(least_width(specs[hall]) * _uniform(rng, 1.0, 1.35))
+    hall_width = snapped(min_width_cm(specs[hall]) * _uniform(rng, 1.0, 1.35))
     depth = 100 * math.sqrt(sum(specs[k].area_m2 for k in rest) / len(rest))
     area = sum(specs[k].area_m2 for k in rest) * 1e4
     sides = (1 if top else 0) + (1 if bottom else 0)
@@ -203,7 +205,7 @@ def spine(specs: Sequence[RoomSpec], rng: Generator, wings: float = 0.0) -> Layo
         if sides == 2 and porch == int(above):  # noqa: PLR2004 - both sides of the hall
             side = length - max(120, snapped(length * _uniform(rng, 0.12, 0.25)))
         band_area = sum(specs[k].area_m2 for k in band) * 1e4
-        deep = max(snapped(band_area / side), _least(specs, band))
+        deep = max(snapped(band_area / side), _min_depth(specs, band))
         heights.append(deep)
         y0, y1 = (hall_width, hall_width + deep) if above else (-deep, 0)
         cells = _cells(specs, band, rng)
@@ -211,14 +213,14 @@ def spine(specs: Sequence[RoomSpec], rng: Generator, wings: float = 0.0) -> Layo
     if end:
         height = heights[0] + heights[1] + hall_width
         width = snapped(sum(specs[k].area_m2 for k in end) * 1e4 / height)
-        width = max(width, _least(specs, end))
+        width = max(width, _min_depth(specs, end))
         order = end if len(end) < 4 else _shuffled(rng, end)  # noqa: PLR2004 - few keep their order
         rect = (-width, -heights[1], 0, heights[0] + hall_width)
         slice_rooms(rect, specs, order, rng, layout)
     return layout
 
 
-def row(specs: Sequence[RoomSpec]) -> Layout:
+def row_layout(specs: Sequence[RoomSpec]) -> Layout:
     """Rooms in a row, along a hall where there is one: plain, and possible for any programme."""
     halls = [k for k, spec in enumerate(specs) if spec.type == "hall"]
     along = halls[0] if halls and len(specs) > 2 else None  # noqa: PLR2004 - two need no hall
@@ -226,18 +228,18 @@ def row(specs: Sequence[RoomSpec]) -> Layout:
     rest = sorted(
         (k for k in range(len(specs)) if k != along), key=lambda k: _ORDER.index(specs[k].type)
     )
-    deepest = max(300, _least(specs, rest))
+    deepest = max(300, _min_depth(specs, rest))
     largest = max(specs[k].area_m2 for k in rest) * 1e4
     # Not deeper than wide for the largest: the smallest would become slivers.
     depth = max(deepest, snapped(0.75 * math.sqrt(largest)))
     layout: Layout = {}
     left = 0
     for k in rest:
-        width = max(least_width(specs[k]), snapped(specs[k].area_m2 * 1e4 / depth + GRID_CM))
+        width = max(min_width_cm(specs[k]), snapped(specs[k].area_m2 * 1e4 / depth + GRID_CM))
         layout[k] = [(left, 0, left + width, depth)]
         left += width
     if along is not None:
-        layout[along] = [(0, depth, left, depth + least_width(specs[along]))]
+        layout[along] = [(0, depth, left, depth + min_width_cm(specs[along]))]
     return at_origin(layout)
 
 
@@ -266,7 +268,11 @@ def draw_layout(specs: Sequence[RoomSpec], rng: Generator, wings: float = 0.0) -
     """Draw one candidate for a floor plan."""
     has_hall = any(spec.type == "hall" for spec in specs)
     few = 3
-    layout = spine(specs, rng, wings) if has_hall and len(specs) >= few else sliced(specs, rng)
+    layout = (
+        hall_layout(specs, rng, wings)
+        if has_hall and len(specs) >= few
+        else sliced_layout(specs, rng)
+    )
     if float(rng.random()) < 0.35:  # noqa: PLR2004 - other orders now and then
         notch(layout, specs, rng)
     return mirrored(layout, rng)

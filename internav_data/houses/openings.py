@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from internav_data.houses.access import JAMB_CM, Span, loop_doors, possible_doors, spans
-from internav_data.houses.choice import LEAST_DOOR_CM
-from internav_data.houses.standards import HABITABLE, PUBLIC
+from internav_data.houses.access import JAMB_CM, WallSpan, loop_doors, possible_doors, spans
+from internav_data.houses.plan import Opening
+from internav_data.houses.standards import HABITABLE, MIN_DOOR_CM, PUBLIC
 from internav_data.records import OUTSIDE, Purpose, generator
 
 if TYPE_CHECKING:
@@ -15,39 +14,16 @@ if TYPE_CHECKING:
 
     from numpy.random import Generator
 
-    from internav_data.houses.choice import FloorPlan
     from internav_data.houses.config import HouseConfig
-    from internav_data.houses.plan import FloorGrid
+    from internav_data.houses.plan import FloorGrid, FloorPlan
     from internav_data.records import DoorKind
 
-DOOR_HEIGHT_CM = 210
 OPEN_PLAN = (
     frozenset({"kitchen", "living"}),
     frozenset({"dining", "kitchen"}),
     frozenset({"dining", "living"}),
 )
 """Pairs of types that may share one wide opening."""
-
-
-@dataclass(frozen=True, slots=True)
-class Opening:
-    """A door or window on the plan, centimetres."""
-
-    along_x: bool
-    at: int
-    low: int
-    high: int
-    rooms: tuple[int, int]
-    """Ascending; windows and entrances have OUTSIDE first."""
-    kind: DoorKind | None
-    """None for windows."""
-    bottom: int = 0
-    top: int = DOOR_HEIGHT_CM
-
-    @property
-    def open(self) -> bool:
-        """Whether people can walk through it."""
-        return self.kind is not None and self.kind != "entrance"
 
 
 def _kind(names: frozenset[str], config: HouseConfig, rng: Generator) -> tuple[DoorKind, int]:
@@ -65,7 +41,7 @@ def _kind(names: frozenset[str], config: HouseConfig, rng: Generator) -> tuple[D
     return ("wide", 150) if size < 0.8 else ("double", 200)  # noqa: PLR2004
 
 
-def _placed(span: Span, width: int, rng: Generator) -> int:
+def _placed(span: WallSpan, width: int, rng: Generator) -> int:
     """Low end of an opening: near one end of the wall, so that furniture keeps its length."""
     spare = span.length - width
     draw, where = float(rng.random()), float(rng.random())
@@ -82,8 +58,8 @@ def draw_doors(
 ) -> list[Opening]:
     """Doors of the tree and of the loops, and the entrance, in order of their rooms."""
     rng = generator(seed, Purpose.DOORS, scene, attempt)
-    plan, types = floor_plan.plan, floor_plan.types
-    possible = possible_doors(plan, LEAST_DOOR_CM[config.preset])
+    grid, types = floor_plan.grid, floor_plan.types
+    possible = possible_doors(grid, MIN_DOOR_CM[config.preset])
     loops = loop_doors(types, sorted(possible), floor_plan.tree, config.loops, rng)
     out: list[Opening] = []
     for a, b in sorted([*floor_plan.tree, *loops]):
@@ -94,7 +70,7 @@ def draw_doors(
         width = min(width, span.length // 2 * 2)
         low = _placed(span, width, rng)
         out.append(Opening(span.along_x, span.at, low, low + width, (a, b), kind))
-    entrance = _entrance(plan, types, config, rng)
+    entrance = _entrance(grid, types, config, rng)
     return [entrance, *out] if entrance is not None else out
 
 
@@ -102,22 +78,22 @@ def _fitting(length: int, config: HouseConfig) -> tuple[DoorKind, int]:
     wide = 150
     if config.preset == "paper" and length >= wide:
         return "wide", wide
-    return "single", LEAST_DOOR_CM[config.preset]
+    return "single", MIN_DOOR_CM[config.preset]
 
 
 def _entrance(
-    plan: FloorGrid, types: Sequence[str], config: HouseConfig, rng: Generator
+    grid: FloorGrid, types: Sequence[str], config: HouseConfig, rng: Generator
 ) -> Opening | None:
     """One closed door to the outside: at a hall's end if there is one."""
     width = 100 if config.preset == "paper" else 92
     likely = ("hall", "living", "studio", "kitchen", "dining")
-    best: tuple[float, Span, int] | None = None
-    for segment in plan.segments:
+    best: tuple[float, WallSpan, int] | None = None
+    for segment in grid.segments:
         if OUTSIDE not in {segment.before, segment.after}:
             continue
         room = max(segment.before, segment.after)
         rank = likely.index(types[room]) if types[room] in likely else len(likely)
-        for span in spans(plan, segment):
+        for span in spans(grid, segment):
             if span.length < width:
                 continue
             # A hall is entered at its end: the shorter the wall, the better.
@@ -155,8 +131,8 @@ def draw_windows(
 ) -> list[Opening]:
     """Windows in the outer walls, more of them where people stay."""
     rng = generator(seed, Purpose.WINDOWS, scene, attempt)
-    plan, out = floor_plan.plan, []
-    for segment in plan.segments:
+    grid, out = floor_plan.grid, []
+    for segment in grid.segments:
         if OUTSIDE not in {segment.before, segment.after}:
             continue
         room = max(segment.before, segment.after)
@@ -167,9 +143,9 @@ def draw_windows(
         room_for = (segment.length - 2 * JAMB_CM) // (width + 110)
         if room_for == 0 and segment.length >= width + 6 * JAMB_CM:
             room_for = 1
-        most = room_for if name in HABITABLE else min(1, room_for)
-        pitch = segment.length / max(1, most)
-        for k in range(most):
+        max_count = room_for if name in HABITABLE else min(1, room_for)
+        pitch = segment.length / max(1, max_count)
+        for k in range(max_count):
             centre = segment.low + round((k + 0.5) * pitch + 10.0 * (float(rng.random()) - 0.5))
             low, high = centre - width // 2, centre + width - width // 2
             if float(rng.random()) < (0.85 if name in HABITABLE else 0.6) and not any(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from internav_data.geometry import asset_corners
-from internav_data.houses.fitting import any_overlap, turned
+from internav_data.houses.fitting import any_overlap, turn_box
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -99,7 +99,7 @@ class Group:
         """Return the group with further items."""
         return Group((*self.items, *items), self.clear, self.related)
 
-    def keeping(self, *clear: tuple[float, float, float, float]) -> Group:
+    def with_clearance(self, *clear: tuple[float, float, float, float]) -> Group:
         """Return the group with further boxes (x0, y0, x1, y1) to keep clear."""
         return Group(self.items, (*self.clear, *clear), self.related)
 
@@ -155,7 +155,7 @@ class Picker:
         local = _BOXES[key]
         out = np.empty_like(local)
         for k in range(len(local)):
-            turned(local[k], item.x, item.y, item.turn % 4, out[k])
+            turn_box(local[k], item.x, item.y, item.turn % 4, out[k])
         out[:, 4:] += item.z
         return out
 

@@ -10,11 +10,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from internav_data.houses.standards import WALL_CM
+from internav_data.houses.standards import DOOR_HEIGHT_CM, WALL_CM
 from internav_data.records import OUTSIDE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
+
+    from internav_data.records import DoorKind
 
 Rect = tuple[int, int, int, int]
 """x_min, y_min, x_max, y_max in centimetres, centre line to centre line."""
@@ -22,7 +24,7 @@ Corner = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True)
-class Segment:
+class WallSegment:
     """A straight piece of wall between two rooms (or a room and OUTSIDE)."""
 
     along_x: bool
@@ -38,6 +40,27 @@ class Segment:
     def length(self) -> int:
         """Centimetres."""
         return self.high - self.low
+
+
+@dataclass(frozen=True, slots=True)
+class Opening:
+    """A door or window on the plan, centimetres."""
+
+    along_x: bool
+    at: int
+    low: int
+    high: int
+    rooms: tuple[int, int]
+    """Ascending; windows and entrances have OUTSIDE first."""
+    kind: DoorKind | None
+    """None for windows."""
+    bottom: int = 0
+    top: int = DOOR_HEIGHT_CM
+
+    @property
+    def open(self) -> bool:
+        """Whether people can walk through it."""
+        return self.kind is not None and self.kind != "entrance"
 
 
 @dataclass(frozen=True)
@@ -87,13 +110,13 @@ class FloorGrid:
         )
 
     @cached_property
-    def segments(self) -> tuple[Segment, ...]:
+    def segments(self) -> tuple[WallSegment, ...]:
         """All walls, as long straight pieces that have the same room on either side."""
         return tuple(self._walls(along_x=False) + self._walls(along_x=True))
 
-    def _walls(self, *, along_x: bool) -> list[Segment]:
+    def _walls(self, *, along_x: bool) -> list[WallSegment]:
         lines, stops = (self.ys, self.xs) if along_x else (self.xs, self.ys)
-        out: list[Segment] = []
+        out: list[WallSegment] = []
         for k, at in enumerate(lines):
             low, pair = 0, (OUTSIDE, OUTSIDE)
             for m in range(len(stops)):
@@ -106,7 +129,7 @@ class FloorGrid:
                     )
                 if here != pair:
                     if pair[0] != pair[1]:
-                        out.append(Segment(along_x, at, low, stops[m], *pair))
+                        out.append(WallSegment(along_x, at, low, stops[m], *pair))
                     low, pair = stops[m], here
         return out
 
@@ -165,6 +188,27 @@ def _without_straight(path: list[Corner]) -> tuple[Corner, ...]:
         if (bx - ax) * (cy - by) != (by - ay) * (cx - bx):
             kept.append((bx, by))
     return tuple(kept)
+
+
+@dataclass(frozen=True, slots=True)
+class FloorPlan:
+    """Rooms on the grid and the doors that are certain.
+
+    A user's plan brings its own doors and windows (see `internav_data.houses.plan_file`).
+    """
+
+    types: tuple[str, ...]
+    grid: FloorGrid
+    tree: tuple[tuple[int, int], ...]
+    """Pairs of rooms to be joined by a door, so that all rooms can be reached."""
+    score: float
+    """Lower is more like a home."""
+    doors: tuple[Opening, ...] = ()
+    """A user's own doors; empty where they are to be drawn."""
+    windows: tuple[Opening, ...] | None = None
+    """A user's own windows; None where they are to be drawn."""
+    ceiling_cm: int | None = None
+    """A user's own height."""
 
 
 def clear_size_m(rect: Rect) -> tuple[float, float]:

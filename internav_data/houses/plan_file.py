@@ -35,9 +35,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from internav_data.houses.access import JAMB_CM, spans
-from internav_data.houses.choice import FloorPlan
-from internav_data.houses.openings import Opening
-from internav_data.houses.plan_shapes import Complaint, laid_out, read_polygon
+from internav_data.houses.plan import FloorPlan, Opening
+from internav_data.houses.plan_shapes import FloorPlanError, lay_out, read_polygon
 from internav_data.houses.standards import CEILING_CM, DOOR_CLEAR_CM, ROOM_TYPES
 from internav_data.records import OUTSIDE
 from internav_data.records.errors import UsageError
@@ -45,10 +44,10 @@ from internav_data.records.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from internav_data.houses.plan import FloorGrid, Segment
+    from internav_data.houses.plan import FloorGrid, WallSegment
     from internav_data.records import DoorKind
 
-MOST_ROOMS = 40
+MAX_PLAN_ROOMS = 40
 _DOOR_KINDS: Mapping[str, int] = {
     "opening": 200,
     "doorway": 100,
@@ -57,7 +56,7 @@ _DOOR_KINDS: Mapping[str, int] = {
     "double": 200,
 }
 """Usual widths, centimetres."""
-LEAST_DOOR_CM = 70
+MIN_USER_DOOR_CM = 70
 """Narrower than this the agent's disc finds no column of the lattice."""
 _KEYS = {
     "": {"ceiling_m", "rooms", "doors", "windows"},
@@ -83,7 +82,7 @@ def load_floor_plan(path: str | Path) -> FloorPlan:
         raise UsageError(f"floor plan {path}: cannot be read ({error}); check the path") from error
     try:
         return _parsed(text, path.suffix.lower())
-    except Complaint as complaint:
+    except FloorPlanError as complaint:
         raise UsageError(f"floor plan {path}: {complaint}") from complaint
 
 
@@ -93,26 +92,26 @@ def _parsed(text: str, suffix: str) -> FloorPlan:
         data = json.loads(text) if suffix == ".json" else tomllib.loads(text)
     except ValueError as error:
         msg = f"is no valid {'JSON' if suffix == '.json' else 'TOML'} ({error})"
-        raise Complaint(msg) from error
+        raise FloorPlanError(msg) from error
     if not isinstance(data, dict):
-        raise Complaint("expected a table with [[rooms]] and [[doors]]")
+        raise FloorPlanError("expected a table with [[rooms]] and [[doors]]")
     _known(data, "")
     rooms = _tables(data, "rooms")
-    if not 1 <= len(rooms) <= MOST_ROOMS:
-        raise Complaint(f"has {len(rooms)} rooms: give 1 to {MOST_ROOMS} [[rooms]]")
+    if not 1 <= len(rooms) <= MAX_PLAN_ROOMS:
+        raise FloorPlanError(f"has {len(rooms)} rooms: give 1 to {MAX_PLAN_ROOMS} [[rooms]]")
     names = _names(rooms)
     polygons = [read_polygon(r.get("polygon"), n) for r, n in zip(rooms, names, strict=True)]
-    plan, shift = laid_out(polygons, names)
+    grid, shift = lay_out(polygons, names)
     types = tuple(str(room["type"]) for room in rooms)
-    doors = [_door(d, plan, names, shift, k) for k, d in enumerate(_tables(data, "doors"))]
+    doors = [_door(d, grid, names, shift, k) for k, d in enumerate(_tables(data, "doors"))]
     _apart(doors, names)
     tree = _joined(doors, names)
-    windows = [_window(w, plan, names, shift, k) for k, w in enumerate(_tables(data, "windows"))]
+    windows = [_window(w, grid, names, shift, k) for k, w in enumerate(_tables(data, "windows"))]
     _apart([*doors, *windows], names)
     doors.sort(key=lambda o: (o.rooms, o.along_x, o.at, o.low))
     return FloorPlan(
         types,
-        plan,
+        grid,
         tree,
         score=0.0,
         doors=tuple(doors),
@@ -125,7 +124,7 @@ def _known(table: Mapping[str, Any], kind: str) -> None:
     for key in table:
         if key not in _KEYS[kind]:
             where = f"[[{kind}]]" if kind else "the file"
-            raise Complaint(
+            raise FloorPlanError(
                 f"unknown key '{key}' in {where}; known: {', '.join(sorted(_KEYS[kind]))}"
             )
 
@@ -133,7 +132,7 @@ def _known(table: Mapping[str, Any], kind: str) -> None:
 def _tables(data: Mapping[str, Any], kind: str) -> list[dict[str, Any]]:
     found = data.get(kind, [])
     if not isinstance(found, list) or not all(isinstance(entry, dict) for entry in found):
-        raise Complaint(f"'{kind}' must be a list of tables: write [[{kind}]]")
+        raise FloorPlanError(f"'{kind}' must be a list of tables: write [[{kind}]]")
     for entry in found:
         _known(entry, kind)
     return found
@@ -145,11 +144,11 @@ def _names(rooms: Sequence[Mapping[str, Any]]) -> list[str]:
         kind = room.get("type")
         name = str(room.get("name", kind if kind is not None else f"number {k + 1}"))
         if kind not in ROOM_TYPES:
-            raise Complaint(
+            raise FloorPlanError(
                 f"room '{name}': type is {kind!r}; choose one of {', '.join(ROOM_TYPES)}"
             )
         if name in names or name == "outside":
-            raise Complaint(
+            raise FloorPlanError(
                 f"room '{name}': this name is taken, give each room a 'name' of its own"
             )
         names.append(name)
@@ -162,7 +161,7 @@ def _ceiling(data: Mapping[str, Any]) -> int | None:
     height = _centimetres(data["ceiling_m"], "ceiling_m")
     low, high = CEILING_CM
     if not low <= height <= high + 80:
-        raise Complaint(
+        raise FloorPlanError(
             f"ceiling_m is {data['ceiling_m']}: choose {low / 100} to {high / 100 + 0.8}"
         )
     return height
@@ -170,13 +169,13 @@ def _ceiling(data: Mapping[str, Any]) -> int | None:
 
 def _centimetres(value: object, what: str) -> int:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise Complaint(f"{what} is {value!r}: expected a number of metres")
+        raise FloorPlanError(f"{what} is {value!r}: expected a number of metres")
     return round(value * 100)
 
 
 def _point(value: object, what: str, shift: tuple[int, int]) -> tuple[int, int]:
     if not isinstance(value, list) or len(value) != 2:  # noqa: PLR2004 - x and y
-        raise Complaint(f"{what}: 'at' is {value!r}, expected [x, y] in metres")
+        raise FloorPlanError(f"{what}: 'at' is {value!r}, expected [x, y] in metres")
     x, y = (_centimetres(v, what) for v in value)
     return x - shift[0], y - shift[1]
 
@@ -185,16 +184,16 @@ def _room(name: object, names: Sequence[str], what: str) -> int:
     if name == "outside":
         return OUTSIDE
     if name not in names:
-        raise Complaint(f"{what}: no room '{name}'; rooms: {', '.join(names)}")
+        raise FloorPlanError(f"{what}: no room '{name}'; rooms: {', '.join(names)}")
     return names.index(str(name))
 
 
 def _wall(
-    plan: FloorGrid, rooms: tuple[int, int], at: tuple[int, int], low_high: tuple[int, int]
-) -> Segment | None:
+    grid: FloorGrid, rooms: tuple[int, int], at: tuple[int, int], low_high: tuple[int, int]
+) -> WallSegment | None:
     """Find the wall between two rooms that holds an opening."""
     before, after = low_high
-    for segment in plan.segments:
+    for segment in grid.segments:
         if sorted((segment.before, segment.after)) != sorted(rooms):
             continue
         along, line = (at[0], at[1]) if segment.along_x else (at[1], at[0])
@@ -206,7 +205,7 @@ def _wall(
 
 def _door(
     entry: Mapping[str, Any],
-    plan: FloorGrid,
+    grid: FloorGrid,
     names: Sequence[str],
     shift: tuple[int, int],
     number: int,
@@ -214,38 +213,38 @@ def _door(
     between = entry.get("between")
     what = f"door {number + 1}"
     if not isinstance(between, list) or len(between) != 2:  # noqa: PLR2004 - two rooms
-        raise Complaint(f"{what}: 'between' is {between!r}, expected two names of rooms")
+        raise FloorPlanError(f"{what}: 'between' is {between!r}, expected two names of rooms")
     what = f"door {number + 1} between '{between[0]}' and '{between[1]}'"
     a, b = sorted(_room(name, names, what) for name in between)
     if a == b:
-        raise Complaint(f"{what}: a door joins two different rooms")
+        raise FloorPlanError(f"{what}: a door joins two different rooms")
     kind = entry.get("kind", "single")
     if kind not in _DOOR_KINDS:
-        raise Complaint(f"{what}: kind is {kind!r}; choose one of {', '.join(_DOOR_KINDS)}")
+        raise FloorPlanError(f"{what}: kind is {kind!r}; choose one of {', '.join(_DOOR_KINDS)}")
     at = _point(entry.get("at"), what, shift)
     width = _centimetres(entry.get("width", _DOOR_KINDS[kind] / 100.0), what)
-    if width < LEAST_DOOR_CM:
-        raise Complaint(
-            f"{what}: {width / 100} m is too narrow, give {LEAST_DOOR_CM / 100} or more"
+    if width < MIN_USER_DOOR_CM:
+        raise FloorPlanError(
+            f"{what}: {width / 100} m is too narrow, give {MIN_USER_DOOR_CM / 100} or more"
         )
     sides = (width // 2, width - width // 2)
-    wall = _wall(plan, (a, b), at, sides)
+    wall = _wall(grid, (a, b), at, sides)
     if wall is None:
-        raise Complaint(
+        raise FloorPlanError(
             f"{what}: does not lie on a wall they share, {JAMB_CM / 100} m from its ends; "
             f"move 'at' or make it narrower"
         )
     along = at[0] if wall.along_x else at[1]
     low, high = along - sides[0], along + sides[1]
-    if not any(s.low <= low and high <= s.high for s in spans(plan, wall)):
-        raise Complaint(f"{what}: a room is less than {DOOR_CLEAR_CM / 100} m deep behind it")
+    if not any(s.low <= low and high <= s.high for s in spans(grid, wall)):
+        raise FloorPlanError(f"{what}: a room is less than {DOOR_CLEAR_CM / 100} m deep behind it")
     door_kind: DoorKind = "entrance" if a == OUTSIDE else kind
     return Opening(wall.along_x, wall.at, low, high, (a, b), door_kind)
 
 
 def _window(
     entry: Mapping[str, Any],
-    plan: FloorGrid,
+    grid: FloorGrid,
     names: Sequence[str],
     shift: tuple[int, int],
     number: int,
@@ -258,11 +257,11 @@ def _window(
         for key, usual in (("width", 1.3), ("sill", 0.9), ("height", 1.2))
     )
     if width < 20 or sill < 10 or height < 20 or sill + height > CEILING_CM[0] - 5:  # noqa: PLR2004 - a pane
-        raise Complaint(f"{what}: width, sill and height make no window under the ceiling")
+        raise FloorPlanError(f"{what}: width, sill and height make no window under the ceiling")
     sides = (width // 2, width - width // 2)
-    wall = _wall(plan, (OUTSIDE, room), at, sides)
+    wall = _wall(grid, (OUTSIDE, room), at, sides)
     if wall is None:
-        raise Complaint(f"{what}: does not lie on an outer wall of the room; move 'at'")
+        raise FloorPlanError(f"{what}: does not lie on an outer wall of the room; move 'at'")
     along = at[0] if wall.along_x else at[1]
     return Opening(
         wall.along_x,
@@ -285,7 +284,9 @@ def _apart(openings: Sequence[Opening], names: Sequence[str]) -> None:
                 and other.low < one.high
             ):
                 room = names[one.rooms[1]]
-                raise Complaint(f"room '{room}': two of its doors or windows overlap; move one")
+                raise FloorPlanError(
+                    f"room '{room}': two of its doors or windows overlap; move one"
+                )
 
 
 def _joined(doors: Sequence[Opening], names: Sequence[str]) -> tuple[tuple[int, int], ...]:
@@ -296,5 +297,5 @@ def _joined(doors: Sequence[Opening], names: Sequence[str]) -> tuple[tuple[int, 
         seen |= {b for a, b in pairs if a in seen} | {a for a, b in pairs if b in seen}
     lost = [name for k, name in enumerate(names) if k not in seen]
     if lost:
-        raise Complaint(f"room '{lost[0]}': no way leads there from '{names[0]}'; add a door")
+        raise FloorPlanError(f"room '{lost[0]}': no way leads there from '{names[0]}'; add a door")
     return tuple(pairs)

@@ -15,19 +15,21 @@ if TYPE_CHECKING:
 
     from internav_data.houses.plan import Corner, Rect
 
-LEAST_SIDE_CM = 100
+MIN_SIDE_CM = 100
 """Narrower rooms leave the agent no place to turn beside furniture."""
-LARGEST_CM = 10_000
+MAX_EXTENT_CM = 10_000
 
 
-class Complaint(ValueError):  # noqa: N818 - the reader turns it into the user's error
+class FloorPlanError(ValueError):
     """What is wrong with a floor plan, before the file's name is known."""
 
 
 def read_polygon(value: object, name: str) -> list[Corner]:
     """Return a room's corners in centimetres, straight ones dropped."""
     if not isinstance(value, list) or len(value) < 4:  # noqa: PLR2004 - a rectangle has four
-        raise Complaint(f"room '{name}': 'polygon' needs four or more corners [x, y] in metres")
+        raise FloorPlanError(
+            f"room '{name}': 'polygon' needs four or more corners [x, y] in metres"
+        )
     corners: list[Corner] = []
     for entry in value:
         good = (
@@ -37,22 +39,22 @@ def read_polygon(value: object, name: str) -> list[Corner]:
                 isinstance(v, (int, float))
                 and not isinstance(v, bool)
                 and math.isfinite(v)
-                and abs(v) * 100 <= LARGEST_CM
+                and abs(v) * 100 <= MAX_EXTENT_CM
                 for v in entry
             )
         )
         if not good:
-            raise Complaint(
+            raise FloorPlanError(
                 f"room '{name}': corner {entry!r} is no [x, y] in metres within "
-                f"{LARGEST_CM // 100} m"
+                f"{MAX_EXTENT_CM // 100} m"
             )
         corners.append((round(entry[0] * 100), round(entry[1] * 100)))
     corners = [c for k, c in enumerate(corners) if c != corners[k - 1]]
     if len(corners) < 4:  # noqa: PLR2004 - a rectangle has four
-        raise Complaint(f"room '{name}': 'polygon' needs four or more different corners")
+        raise FloorPlanError(f"room '{name}': 'polygon' needs four or more different corners")
     for (ax, ay), (bx, by) in itertools.pairwise([*corners, corners[0]]):
         if (ax == bx) == (ay == by):
-            raise Complaint(
+            raise FloorPlanError(
                 f"room '{name}': the side from ({ax / 100}, {ay / 100}) to ({bx / 100}, "
                 f"{by / 100}) is not along x or y; walls are rectilinear"
             )
@@ -62,7 +64,7 @@ def read_polygon(value: object, name: str) -> list[Corner]:
         for k, c in enumerate(corners)
         if not _straight(corners[k - 1], c, corners[(k + 1) % count])
     ]
-    _simple(corners, name)
+    _check_simple(corners, name)
     return corners
 
 
@@ -72,7 +74,7 @@ def _straight(a: Corner, b: Corner, c: Corner) -> bool:
     return ux * vy == uy * vx and ux * vx + uy * vy > 0
 
 
-def _simple(corners: Sequence[Corner], name: str) -> None:
+def _check_simple(corners: Sequence[Corner], name: str) -> None:
     """Complain about sides that touch or cross others than their neighbours."""
     count = len(corners)
     sides = [(corners[k], corners[(k + 1) % count]) for k in range(count)]
@@ -84,7 +86,7 @@ def _simple(corners: Sequence[Corner], name: str) -> None:
         neighbours = b == a + 1 or (a == 0 and b == count - 1)
         backwards = neighbours and (p[0] == q[0]) == (r[0] == s[0])
         if meet and (not neighbours or backwards):
-            raise Complaint(f"room '{name}': its outline touches or crosses itself")
+            raise FloorPlanError(f"room '{name}': its outline touches or crosses itself")
 
 
 def _covers(corners: Sequence[Corner], x: float, y: float) -> bool:
@@ -96,7 +98,7 @@ def _covers(corners: Sequence[Corner], x: float, y: float) -> bool:
     return inside
 
 
-def laid_out(
+def lay_out(
     polygons: Sequence[Sequence[Corner]], names: Sequence[str]
 ) -> tuple[FloorGrid, tuple[int, int]]:
     """Lay rooms on a grid; return the plan and how far it was moved (centimetres)."""
@@ -114,38 +116,38 @@ def laid_out(
                 if _covers(corners, (x0 + x1) / 2, (y0 + y1) / 2)
             ]
             if len(inside) > 1:
-                raise Complaint(
+                raise FloorPlanError(
                     f"room '{names[inside[1]]}': overlaps room '{names[inside[0]]}' at "
                     f"({(x0 + left) / 100}, {(y0 + low) / 100})"
                 )
             if inside:
                 rooms[inside[0]].append((x0, y0, x1, y1))
-    plan = FloorGrid.of(rooms)
-    _whole(plan, names)
-    return plan, (left, low)
+    grid = FloorGrid.of(rooms)
+    _check_tiling(grid, names)
+    return grid, (left, low)
 
 
-def _whole(plan: FloorGrid, names: Sequence[str]) -> None:
+def _check_tiling(grid: FloorGrid, names: Sequence[str]) -> None:
     """Complain about gaps between rooms and about rooms too narrow to furnish."""
     for room, name in enumerate(names):
-        x0, y0, x1, y1 = plan.main_rectangle(room)
-        if min(x1 - x0, y1 - y0) < LEAST_SIDE_CM:
-            raise Complaint(f"room '{name}': it is narrower than {LEAST_SIDE_CM / 100} m")
-    if plan.polygon(frozenset(range(len(names)))):
+        x0, y0, x1, y1 = grid.main_rectangle(room)
+        if min(x1 - x0, y1 - y0) < MIN_SIDE_CM:
+            raise FloorPlanError(f"room '{name}': it is narrower than {MIN_SIDE_CM / 100} m")
+    if grid.polygon(frozenset(range(len(names)))):
         return
     reached = {0}
     for _ in names:
-        for wall in plan.segments:
+        for wall in grid.segments:
             pair = {wall.before, wall.after}
             if OUTSIDE not in pair and pair & reached:
                 reached |= pair
     lost = next((name for k, name in enumerate(names) if k not in reached), None)
     if lost is not None:
-        raise Complaint(
+        raise FloorPlanError(
             f"room '{lost}': shares no wall with the others; rooms are centre lines of walls, "
             "close the gap"
         )
-    raise Complaint(
+    raise FloorPlanError(
         f"room '{names[-1]}': the rooms enclose a gap or touch at a corner only; fill the gap "
         "with a room or close it"
     )

@@ -11,7 +11,7 @@ from internav_data.houses.standards import (
     DOUBLE_BEDROOM,
     SINGLE_BEDROOM,
     STANDARDS,
-    Standard,
+    RoomStandard,
 )
 from internav_data.records import Purpose, generator
 
@@ -32,7 +32,7 @@ class RoomSpec:
 
     type: str
     area_m2: float
-    standard: Standard
+    standard: RoomStandard
 
 
 _HOMES: Mapping[int, tuple[tuple[float, str], ...]] = {
@@ -92,16 +92,17 @@ def _room_types(rng: Generator, count: int, hall_from: int) -> list[str]:
         bedrooms = types.count("bedroom")
         open_types = [
             (weight, name)
-            for name, weight, most in _FURTHER
-            if types.count(name) < most and (name != "bathroom" or types.count(name) < bedrooms)
+            for name, weight, max_count in _FURTHER
+            if types.count(name) < max_count
+            and (name != "bathroom" or types.count(name) < bedrooms)
         ]
         types.append(_choose(rng, open_types))
     return types
 
 
-def _standards(types: list[str], config: HouseConfig, rng: Generator) -> list[Standard]:
+def _standards(types: list[str], config: HouseConfig, rng: Generator) -> list[RoomStandard]:
     table = STANDARDS[config.preset]
-    out: list[Standard] = []
+    out: list[RoomStandard] = []
     bedrooms = 0
     for name in types:
         if config.preset == "realistic" and name == "bedroom":
@@ -113,7 +114,7 @@ def _standards(types: list[str], config: HouseConfig, rng: Generator) -> list[St
     return out
 
 
-def _areas(standards: list[Standard], config: HouseConfig, rng: Generator) -> list[float]:
+def _areas(standards: list[RoomStandard], config: HouseConfig, rng: Generator) -> list[float]:
     """Areas wanted, centre line to centre line, m²."""
     spread = 0.14 if config.preset == "paper" else 0.10
     areas = [s.area_m2 * math.exp(spread * float(rng.standard_normal())) for s in standards]
@@ -140,7 +141,7 @@ def programme(seed: int, scene: int, config: HouseConfig, attempt: int) -> tuple
         shares = SHARES
         if request.counts:
             shares = {count: SHARES[count] for count in request.counts}
-        types = _room_types(rng, room_count(seed, scene, shares), config.halls_from())
+        types = _room_types(rng, room_count(seed, scene, shares), config.min_hall_rooms())
     standards = _standards(types, config, rng)
     areas = _areas(standards, config, rng)
     return tuple(

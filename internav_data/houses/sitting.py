@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from internav_data.records import Asset
 
 
-def seating(p: Picker, place: RoomContext) -> list[Group]:
+def seating(p: Picker, room: RoomContext) -> list[Group]:
     """Make sofa facing a television, coffee table between, an armchair beside."""
     stand = p.one("TVStand")
     screen = p.one("Television", lambda a: stand is not None and a.size[0] <= stand.size[0] + 0.05)
-    sofa = p.one("Sofa", narrow(max(1.6, 0.6 * place.long_m)), any_size=True)
+    sofa = p.one("Sofa", narrow(max(1.6, 0.6 * room.long_m)), any_size=True)
     if sofa is None:
         return []
     out: list[Group] = []
@@ -35,16 +35,16 @@ def seating(p: Picker, place: RoomContext) -> list[Group]:
         base = against(stand)
         resting = p.resting(base, 0, screen, 0.0, 0.0) if screen is not None else None
         screens = (base,) if resting is None else (base, resting)
-        for distance in _viewing_distances(place, stand, sofa):
+        for distance in _viewing_distances(room, stand, sofa):
             out += _around(p, screens, sofa, distance)
         out.append(Group((*screens,), (in_front(base, 0.5),)))
     return out
 
 
-def _viewing_distances(place: RoomContext, stand: Asset, sofa: Asset) -> list[float]:
+def _viewing_distances(room: RoomContext, stand: Asset, sofa: Asset) -> list[float]:
     """Gaps between television stand and sofa: to the opposite wall if that is near, else nearer."""
     gaps = []
-    for span in (place.short_m, place.long_m):
+    for span in (room.short_m, room.long_m):
         gap = span - stand.size[1] - sofa.size[1] - 2 * BACK_GAP_M - 0.02
         if 1.4 <= gap <= 3.4:  # noqa: PLR2004 - metres one watches from
             gaps.append(gap)
@@ -85,9 +85,9 @@ def _around(p: Picker, screens: tuple[PlacedAsset, ...], sofa: Asset, gap: float
     return [full, with_table, plain] if p.chance(0.6) else [with_table, plain]
 
 
-def sofa_alone(p: Picker, place: RoomContext) -> list[Group]:
+def sofa_alone(p: Picker, room: RoomContext) -> list[Group]:
     """Make a sofa with its back to the wall."""
-    asset = p.one("Sofa", narrow(max(1.6, 0.6 * place.long_m)), any_size=True)
+    asset = p.one("Sofa", narrow(max(1.6, 0.6 * room.long_m)), any_size=True)
     if asset is None:
         return []
     out = []
@@ -97,9 +97,9 @@ def sofa_alone(p: Picker, place: RoomContext) -> list[Group]:
     return out
 
 
-def television(p: Picker, place: RoomContext) -> list[Group]:
+def television(p: Picker, room: RoomContext) -> list[Group]:
     """Make a television on its stand."""
-    del place
+    del room
     stand, screen = p.one("TVStand"), p.one("Television")
     if stand is None:
         return []
@@ -109,9 +109,9 @@ def television(p: Picker, place: RoomContext) -> list[Group]:
     return [Group(items, (in_front(base, 0.5),))]
 
 
-def dining(p: Picker, place: RoomContext) -> list[Group]:
+def dining(p: Picker, room: RoomContext) -> list[Group]:
     """Make a table with chairs pushed in, for as many as the room can take."""
-    largest = 1.1 if place.area_m2 < 12 else 1.6 if place.area_m2 < 18 else 2.9  # noqa: PLR2004
+    largest = 1.1 if room.area_m2 < 12 else 1.6 if room.area_m2 < 18 else 2.9  # noqa: PLR2004
     chair = p.one("Chair")
     out: list[list[Group]] = []
     for limit in (largest, 1.5, 1.0):
@@ -138,8 +138,8 @@ def _seated(p: Picker, table: PlacedAsset, chair: Asset | None) -> list[Group]:
     near = [p.parts(item) for item in long_sides]
     ends = [e for e in ends if not any(overlap(p.parts(e), other, 0.04) for other in near)]
     kind = ("Apple", "Bread", "Laptop")[int(float(p.rng.random()) * 3)]
-    thing = p.one(kind) if p.chance(0.5) else None
-    resting = p.resting(table, 0, thing, 0.1, 0.05) if thing else None
+    small = p.one(kind) if p.chance(0.5) else None
+    resting = p.resting(table, 0, small, 0.1, 0.05) if small else None
     laid = plain if resting is None else plain.with_items(resting)
     four = laid.with_items(*long_sides)
     two = laid.with_items(*long_sides[:1], *long_sides[seats : seats + 1])

@@ -25,7 +25,7 @@ def snapped(value: float) -> int:
     return round(value / GRID_CM) * GRID_CM
 
 
-def least_width(spec: RoomSpec) -> int:
+def min_width_cm(spec: RoomSpec) -> int:
     """Least distance of centre lines, on the grid, so that the clear width is kept."""
     clear = round(spec.standard.width_m * 100) + WALL_CM
     return -(-clear // GRID_CM) * GRID_CM
@@ -65,8 +65,8 @@ def slice_rooms(
         first, second, share = second, first, 1.0 - share
     wide = (x1 - x0) * (0.75 + 0.5 * float(rng.random())) > (y1 - y0)
     low, high = (x0, x1) if wide else (y0, y1)
-    near = max(least_width(specs[k]) for k in first)
-    far = max(least_width(specs[k]) for k in second)
+    near = max(min_width_cm(specs[k]) for k in first)
+    far = max(min_width_cm(specs[k]) for k in second)
     at = snapped(low + share * (high - low))
     at = max(low + near, min(high - far, at))
     at = max(low + GRID_CM, min(high - GRID_CM, at))

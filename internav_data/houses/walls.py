@@ -11,17 +11,16 @@ from internav_data.records import Wall
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from internav_data.houses.openings import Opening
-    from internav_data.houses.plan import FloorGrid
+    from internav_data.houses.plan import FloorGrid, Opening
 
 _Run = tuple[int, int, int]
 """Line, low end, high end: centimetres."""
 
 
-def _runs(plan: FloorGrid, *, along_x: bool) -> list[_Run]:
+def _runs(grid: FloorGrid, *, along_x: bool) -> list[_Run]:
     """Longest straight walls, whatever rooms lie beside them."""
     out: list[_Run] = []
-    for segment in plan.segments:
+    for segment in grid.segments:
         if segment.along_x != along_x:
             continue
         if out and out[-1][0] == segment.at and out[-1][2] == segment.low:
@@ -81,14 +80,14 @@ def _pieces(
     return out
 
 
-def build_walls(plan: FloorGrid, openings: Sequence[Opening], ceiling_cm: int) -> tuple[Wall, ...]:
+def build_walls(grid: FloorGrid, openings: Sequence[Opening], ceiling_cm: int) -> tuple[Wall, ...]:
     """Return the boxes of all walls: those along x own the corners."""
-    along_x = _runs(plan, along_x=True)
+    along_x = _runs(grid, along_x=True)
     out: list[Wall] = []
     for line, low, high in along_x:
         run = (line, low - HALF_WALL_CM, high + HALF_WALL_CM)
         out += _pieces(run, openings, ceiling_cm, along_x=True)
-    for run in _runs(plan, along_x=False):
+    for run in _runs(grid, along_x=False):
         for piece in _cut(run, along_x):
             out += _pieces(piece, openings, ceiling_cm, along_x=False)
     return tuple(out)

@@ -132,7 +132,7 @@ def test_a_broken_file_is_named(tmp_path, name, content, words):
 
 
 def test_a_large_file_is_refused_before_it_is_read(tmp_path, monkeypatch):
-    monkeypatch.setattr(user_assets, "MOST_BYTES", 100)
+    monkeypatch.setattr(user_assets, "MAX_BYTES", 100)
     with pytest.raises(UsageError, match="fewer triangles"):
         load_user_assets(folder(tmp_path))
 

@@ -10,7 +10,7 @@ import pytest
 from internav_data.houses import HouseConfig, build_house
 from internav_data.houses.choice import choose_floor_plan
 from internav_data.houses.programme import programme
-from internav_data.houses.standards import STANDARDS
+from internav_data.houses.standards import MIN_DOOR_CM, STANDARDS
 
 
 def test_realistic_minima_hold_in_every_house(sample, oracle):
@@ -73,8 +73,8 @@ def test_candidates_make_plans_better():
 
 
 def test_the_plain_row_serves_every_programme(oracle):
-    from internav_data.houses.choice import LEAST_DOOR_CM, judged
-    from internav_data.houses.layouts import row
+    from internav_data.houses.choice import score_floor_plan
+    from internav_data.houses.layouts import row_layout
     from internav_data.houses.plan import FloorGrid
     from internav_data.records import Purpose, generator
 
@@ -82,11 +82,14 @@ def test_the_plain_row_serves_every_programme(oracle):
         for scene in range(60):
             config = HouseConfig(preset=preset)
             specs = programme(2, scene, config, 0)
-            layout = row(specs)
-            plan = FloorGrid.of([layout[k] for k in range(len(specs))])
+            layout = row_layout(specs)
+            grid = FloorGrid.of([layout[k] for k in range(len(specs))])
             rng = generator(0, Purpose.FLOOR_PLAN)
-            least = LEAST_DOOR_CM[preset]
-            assert judged(plan, specs, least, rng, lenient=True) is not None, (preset, scene)
+            width = MIN_DOOR_CM[preset]
+            assert score_floor_plan(grid, specs, width, rng, lenient=True) is not None, (
+                preset,
+                scene,
+            )
 
 
 def test_bathrooms_are_not_the_way_through_where_avoidable(sample):

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from internav_data.houses import load_floor_plan
-from internav_data.houses.plan_shapes import Complaint, laid_out, read_polygon
+from internav_data.houses.plan_shapes import FloorPlanError, lay_out, read_polygon
 from internav_data.records.errors import UsageError
 
 LIVING = {"type": "living", "polygon": [[0, 0], [5, 0], [5, 4], [0, 4]]}
@@ -26,7 +26,7 @@ def written(tmp_path, rooms=(LIVING, BEDROOM), doors=(DOOR,), **more):
 def test_a_good_plan_is_read_and_moved_to_the_origin(tmp_path):
     found = load_floor_plan(written(tmp_path))
     assert found.types == ("living", "bedroom")
-    assert found.plan.polygon(frozenset({0})) == ((-6, -6), (494, -6), (494, 394), (-6, 394))
+    assert found.grid.polygon(frozenset({0})) == ((-6, -6), (494, -6), (494, 394), (-6, 394))
     (door,) = found.doors
     assert (door.along_x, door.at, door.low, door.high) == (False, 494, 144, 244)
     assert door.rooms == (0, 1)
@@ -35,8 +35,8 @@ def test_a_good_plan_is_read_and_moved_to_the_origin(tmp_path):
 
 def test_corners_may_run_either_way_and_repeat_the_first(tmp_path):
     turned = {**LIVING, "polygon": [[0, 0], [0, 4], [2, 4], [2, 4], [5, 4], [5, 0], [0, 0]]}
-    plain = load_floor_plan(written(tmp_path)).plan
-    again = load_floor_plan(written(tmp_path, (turned, BEDROOM))).plan
+    plain = load_floor_plan(written(tmp_path)).grid
+    again = load_floor_plan(written(tmp_path, (turned, BEDROOM))).grid
     assert again.polygon(frozenset({0})) == plain.polygon(frozenset({0}))
 
 
@@ -188,10 +188,10 @@ def test_any_staircase_of_rectangles_is_laid_out_exactly(data):
         read_polygon([list(c) for c in shape], name)
         for shape, name in ((corners, "stairs"), (below, "hall"))
     ]
-    plan, _ = laid_out(polygons, ["stairs", "hall"])
-    assert plan.area_cm2(0) == sum(w * h for w, h in steps) * 10_000
-    assert plan.area_cm2(1) == x * 3 * 10_000
-    assert len(plan.polygon(frozenset({1}))) == 4
+    grid, _ = lay_out(polygons, ["stairs", "hall"])
+    assert grid.area_cm2(0) == sum(w * h for w, h in steps) * 10_000
+    assert grid.area_cm2(1) == x * 3 * 10_000
+    assert len(grid.polygon(frozenset({1}))) == 4
 
 
 @settings(max_examples=60, deadline=None)
@@ -206,7 +206,7 @@ def test_any_corners_are_a_simple_polygon_or_a_complaint(corners):
 
     try:
         found = read_polygon(corners, "room")
-    except Complaint:
+    except FloorPlanError:
         return
     assert Polygon(found).is_valid
     assert Polygon(found).area > 0

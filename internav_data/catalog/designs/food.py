@@ -17,11 +17,11 @@ _APPLES = ((190, 44, 44), (206, 72, 54), (142, 176, 66), (212, 180, 78), (162, 3
 _TOMATOES = ((206, 58, 42), (190, 44, 40), (218, 88, 48), (212, 66, 58))
 
 
-def bread(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def bread(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a loaf along y: from a tin, or freely formed with cuts across."""
-    crust, x, y = Paint(dice.pick(_CRUSTS), "food"), w / 2, d / 2
+    crust, x, y = Paint(sampler.pick(_CRUSTS), "food"), w / 2, d / 2
     cut = crust.shade(1.22)
-    if dice.chance(0.5):
+    if sampler.chance(0.5):
         low = [(-0.9 * x, 0.0), (0.9 * x, 0.0), (0.92 * x, 0.55 * h), (-0.92 * x, 0.55 * h)]
         s.prism("y", low, (-0.97 * y, 0.97 * y), crust)
         dome = [
@@ -85,9 +85,9 @@ def _fruit(
     s.layers(rings, skin)
 
 
-def apple(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def apple(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw an apple with its stem and a leaf."""
-    skin = Paint(dice.pick(_APPLES), "food")
+    skin = Paint(sampler.pick(_APPLES), "food")
     body = 0.86 * h
     _fruit(s, (w, d, body), ((0, 0.52), (0.28, 0.9), (0.62, 1.0), (0.95, 0.6)), skin)
     s.layers(
@@ -96,7 +96,7 @@ def apple(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None
     )
     t = 0.022 * w + 0.001
     s.strut((0, 0, 0.9 * body), (0.04 * w, 0, h), t, STEM)
-    if dice.chance(0.6):
+    if sampler.chance(0.6):
         z = 0.93 * h
         s.hull(
             [
@@ -110,9 +110,9 @@ def apple(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None
         )
 
 
-def tomato(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def tomato(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a tomato with its green star."""
-    skin = Paint(dice.pick(_TOMATOES), "food")
+    skin = Paint(sampler.pick(_TOMATOES), "food")
     body = 0.92 * h
     _fruit(s, (w, d, body), ((0, 0.56), (0.3, 0.96), (0.62, 1.0), (0.96, 0.56)), skin)
     for k in range(5):
@@ -132,9 +132,9 @@ def tomato(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> Non
     s.rod((0, 0), (0.9 * body, h), 0.03 * w, LEAF.shade(0.8))
 
 
-def lettuce(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def lettuce(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a head of lettuce: a pale heart within six outer leaves."""
-    green = dice.pick(
+    green = sampler.pick(
         (
             Paint((118, 172, 76), "leaf"),
             Paint((98, 152, 70), "leaf"),
@@ -150,8 +150,8 @@ def lettuce(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> No
     s.layers(heart, Paint((186, 210, 128), "leaf"))
     leaves = 6
     for k in range(leaves):
-        turn = math.radians(360 / leaves * k + dice.between(-8, 8))
-        tall = dice.between(0.86, 1.0)
+        turn = math.radians(360 / leaves * k + sampler.between(-8, 8))
+        tall = sampler.between(0.86, 1.0)
 
         def at(r: float, aside: float, z: float, turn: float = turn) -> tuple[float, float, float]:
             angle = turn + math.radians(aside)
@@ -162,4 +162,4 @@ def lettuce(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> No
         corners += [at(0.72, side * 24, 0.95 * tall) for side in (-1, 1)]
         corners += [at(0.96, 0, 0.24), at(1.0, 0, 0.5), at(0.94, 0, 0.78 * tall)]
         corners += [at(0.6, 0, tall), at(0.5, 0, 0.3)]
-        s.hull(corners, green.shade(dice.between(0.84, 1.14)))
+        s.hull(corners, green.shade(sampler.between(0.84, 1.14)))

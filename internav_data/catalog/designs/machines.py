@@ -15,11 +15,11 @@ _DRUM = Paint((96, 112, 124), "glass")
 _ENAMEL = (WHITE, STEEL, Paint((66, 70, 76), "metal"), Paint((226, 222, 212), "metal"))
 
 
-def television(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def television(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a television: a thin panel on a stand, on feet, or an old deep one."""
     x, y = w / 2, d / 2
-    frame = dice.pick((BLACK, IRON, STEEL))
-    old = d > 0.34 and dice.chance(0.4)
+    frame = sampler.pick((BLACK, IRON, STEEL))
+    old = d > 0.34 and sampler.chance(0.4)
     foot = (0.05 if old else 0.11) * h
     thick = min(0.06, 0.5 * d)
     front = -y if old else -thick / 2
@@ -56,7 +56,7 @@ def television(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) ->
         (0.25 * h, 0.8 * h),
         frame.shade(1.2),
     )
-    if dice.chance(0.5):
+    if sampler.chance(0.5):
         s.box((-0.07 * x, 0.07 * x), (-0.3 * thick, 0.3 * thick), (0, 0.3 * h), frame)
         s.cushion((-0.45 * x, 0.45 * x), (-y, y), (0, 0.018), frame, 0.3)
         return
@@ -66,16 +66,16 @@ def television(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) ->
             s.strut((cx, sy * (y - 0.014), 0), (cx, sy * 0.2 * thick, foot + 0.01), 0.014, frame)
 
 
-def microwave(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def microwave(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a microwave oven: door with window, handle, keys."""
-    case, x, y = dice.pick((*_ENAMEL, BLACK)), w / 2, d / 2
+    case, x, y = sampler.pick((*_ENAMEL, BLACK)), w / 2, d / 2
     front = -y + 0.03
     s.legs((-0.9 * x, 0.9 * x), (front + 0.03, 0.9 * y), (0, 0.014), 0.016, BLACK, round_=True)
     s.box((-x, x), (front, y), (0.012, h), case)
     split = 0.5 * x
     s.box((-x + 0.008, split), (front - 0.01, front + 0.01), (0.025, h - 0.012), case.shade(0.92))
     s.box((-0.86 * x, split - 0.07), (front - 0.013, front), (0.2 * h, 0.8 * h), SCREEN)
-    if dice.chance(0.7):
+    if sampler.chance(0.7):
         s.cylinder((split - 0.045, split - 0.025), (-y, -y + 0.02), (0.15 * h, 0.85 * h), CHROME)
     else:
         s.box((split - 0.05, split - 0.02), (-y, front), (0.12 * h, 0.88 * h), case.shade(0.7))
@@ -97,9 +97,9 @@ def microwave(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> 
         )
 
 
-def fridge(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def fridge(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a fridge: two doors above each other or side by side."""
-    case, x, y = dice.pick(_ENAMEL), w / 2, d / 2
+    case, x, y = sampler.pick(_ENAMEL), w / 2, d / 2
     front = -y + 0.05
     s.box((-x + 0.02, x - 0.02), (front + 0.06, y), (0, 0.06), BLACK)
     s.box((-x, x), (front + 0.05, y), (0.05, h), case.shade(0.92))
@@ -123,15 +123,15 @@ def fridge(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> Non
         door((0, x), (0.06, h), 0.05, (0.4 * h, 0.75 * h))
         s.box((-0.7 * x, -0.3 * x), (front - 0.004, front), (0.5 * h, 0.68 * h), BLACK)
     else:
-        split = dice.pick((0.36, 0.68)) * h
-        side = dice.pick((-1, 1)) * (x - 0.06)
+        split = sampler.pick((0.36, 0.68)) * h
+        side = sampler.pick((-1, 1)) * (x - 0.06)
         door((-x, x), (0.06, split), side, (max(0.12, split - 0.42), split - 0.06))
         door((-x, x), (split, h), side, (split + 0.06, min(h - 0.1, split + 0.42)))
 
 
-def stove(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def stove(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a cooker: oven door with window and bar, knobs, four plates."""
-    case, x, y = dice.pick(_ENAMEL), w / 2, d / 2
+    case, x, y = sampler.pick(_ENAMEL), w / 2, d / 2
     top = min(h, 0.92)
     front = -y + 0.04
     s.box((-x, x), (front, y), (0.06, top - 0.012), case)
@@ -157,9 +157,9 @@ def stove(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None
         s.box((-x, x), (y - 0.05, y), (top, h), case)
 
 
-def washing_machine(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def washing_machine(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a front loader: round door, drawer, dial."""
-    case, x, y = dice.pick((WHITE, WHITE, STEEL)), w / 2, d / 2
+    case, x, y = sampler.pick((WHITE, WHITE, STEEL)), w / 2, d / 2
     front = -y + 0.03
     s.box((-x, x), (front, y), (0.02, h), case)
     s.legs((-0.92 * x, 0.92 * x), (front + 0.04, 0.92 * y), (0, 0.02), 0.02, BLACK, round_=True)
@@ -174,9 +174,9 @@ def washing_machine(s: Sketch, w: float, d: float, h: float, dice: UniformSample
     s.box((0.4 * x, 0.82 * x), (front - 0.01, front), (0.88 * h, 0.94 * h), SCREEN)
 
 
-def clothes_dryer(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def clothes_dryer(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a dryer: square door with a round glass, grille, dial on the left."""
-    case, x, y = dice.pick((WHITE, WHITE, STEEL)), w / 2, d / 2
+    case, x, y = sampler.pick((WHITE, WHITE, STEEL)), w / 2, d / 2
     front = -y + 0.03
     s.box((-x, x), (front, y), (0.02, h), case)
     s.legs((-0.92 * x, 0.92 * x), (front + 0.04, 0.92 * y), (0, 0.02), 0.02, BLACK, round_=True)
@@ -201,9 +201,9 @@ def clothes_dryer(s: Sketch, w: float, d: float, h: float, dice: UniformSampler)
     s.box((0.3 * x, 0.82 * x), (front - 0.01, front), (0.89 * h, 0.95 * h), SCREEN)
 
 
-def dishwasher(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def dishwasher(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a dishwasher: one door, a bar, a strip of keys."""
-    case, x, y = dice.pick(_ENAMEL), w / 2, d / 2
+    case, x, y = sampler.pick(_ENAMEL), w / 2, d / 2
     front = -y + 0.035
     s.box((-x + 0.01, x - 0.01), (front + 0.05, y), (0, 0.1), BLACK)
     s.box((-x, x), (front, y), (0.1, h), case.shade(0.92))
@@ -212,15 +212,15 @@ def dishwasher(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) ->
     s.cylinder((-0.7 * x, 0.7 * x), (-y, -y + 0.022), (0.78 * h, 0.78 * h + 0.022), CHROME, "x")
 
 
-def floor_lamp(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def floor_lamp(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a standing lamp: a foot, a pole and a shade."""
     x, y = w / 2, d / 2
-    pole = dice.pick((BRASS, IRON, CHROME))
+    pole = sampler.pick((BRASS, IRON, CHROME))
     shade = Paint(
-        dice.pick(((240, 228, 200), (226, 214, 190), (70, 74, 80), (206, 178, 140))), "fabric"
+        sampler.pick(((240, 228, 200), (226, 214, 190), (70, 74, 80), (206, 178, 140))), "fabric"
     )
-    low = h - dice.between(0.24, 0.32)
+    low = h - sampler.between(0.24, 0.32)
     s.rod((0, 0), (0, 0.03), 0.13, pole)
     s.rod((0, 0), (0.02, h - 0.08), 0.014, pole)
-    top = dice.between(0.55, 0.9)
+    top = sampler.between(0.55, 0.9)
     s.layers((ring(0, 0, low, x, y, 16), ring(0, 0, h, top * x, top * y, 16)), shade)

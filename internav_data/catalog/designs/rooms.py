@@ -29,18 +29,18 @@ if TYPE_CHECKING:
 _WATER = Paint((206, 216, 218), "ceramic")
 
 
-def _base_cabinets(s: Sketch, size: tuple[float, float, float], dice: UniformSampler) -> None:
+def _base_cabinets(s: Sketch, size: tuple[float, float, float], sampler: UniformSampler) -> None:
     """Draw cabinets with doors and one column of drawers under a worktop."""
     w, d, h = size
     x, y = w / 2, d / 2
     front = -y + 0.035
-    paint = dice.pick(
-        (dice.wood(), WHITE, Paint((96, 112, 120), "wood"), Paint((120, 136, 116), "wood"))
+    paint = sampler.pick(
+        (sampler.wood(), WHITE, Paint((96, 112, 120), "wood"), Paint((120, 136, 116), "wood"))
     )
     s.box((-x, x), (front + 0.05, y), (0, 0.1), BLACK)
     s.box((-x, x), (front, y), (0.1, h - 0.04), paint)
-    s.box((-x, x), (-y, y), (h - 0.04, h), dice.stone())
-    drawn = min(0.5, w) if w < 0.75 or dice.chance(0.6) else 0.0
+    s.box((-x, x), (-y, y), (h - 0.04, h), sampler.stone())
+    drawn = min(0.5, w) if w < 0.75 or sampler.chance(0.6) else 0.0
     if drawn:
         drawers(s, (-x, -x + drawn), front, (0.1, h - 0.05), 3, paint.shade(1.06))
     rest = w - drawn
@@ -49,26 +49,28 @@ def _base_cabinets(s: Sketch, size: tuple[float, float, float], dice: UniformSam
         doors(s, (-x + drawn, x), front, (0.1, h - 0.05), leaves, paint.shade(1.06))
 
 
-def counter_top(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def counter_top(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a run of base cabinets with a worktop."""
-    _base_cabinets(s, (w, d, h), dice)
+    _base_cabinets(s, (w, d, h), sampler)
 
 
-def kitchen_island(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def kitchen_island(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw an island: cabinets on one side, a lid that overhangs on the other."""
-    _base_cabinets(s, (w, 0.62 * d, h), dice)
+    _base_cabinets(s, (w, 0.62 * d, h), sampler)
     x, y = w / 2, d / 2
-    s.box((-x, x), (0.62 * y, 1.38 * y), (h - 0.04, h), dice.wood())
+    s.box((-x, x), (0.62 * y, 1.38 * y), (h - 0.04, h), sampler.wood())
     for cx in (-x + 0.04, x - 0.04):
-        s.box((cx - 0.03, cx + 0.03), (1.38 * y - 0.1, 1.38 * y - 0.04), (0, h - 0.04), dice.wood())
+        s.box(
+            (cx - 0.03, cx + 0.03), (1.38 * y - 0.1, 1.38 * y - 0.04), (0, h - 0.04), sampler.wood()
+        )
 
 
-def sink(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def sink(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a wash basin on a pedestal or in a vanity."""
     x, y = w / 2, d / 2
     rim = h - 0.1
     if w > 0.55:
-        paint = dice.wood()
+        paint = sampler.wood()
         s.box((-x + 0.02, x - 0.02), (-y + 0.06, y), (0, 0.08), BLACK)
         s.box((-x + 0.01, x - 0.01), (-y + 0.03, y), (0.08, rim - 0.06), paint)
         doors(s, (-x + 0.015, x - 0.015), -y + 0.03, (0.09, rim - 0.07), 2, paint.shade(1.08))
@@ -85,14 +87,14 @@ def sink(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     s.box((-0.012, 0.012), (0.1 * y, 0.74 * y), (h - 0.024, h), CHROME)
 
 
-def toilet(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def toilet(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a toilet: foot, bowl, seat, tank."""
     x, y = w / 2, d / 2
     bowl = min(0.42, 0.55 * h)
     tank = 0.22 * d
     middle = (-y + (y - tank)) / 2
     reach = (2 * y - tank) / 2 + 0.02
-    lid = dice.pick((WHITE, WHITE, Paint((150, 106, 68), "wood")))
+    lid = sampler.pick((WHITE, WHITE, Paint((150, 106, 68), "wood")))
     s.layers(
         (
             ring(0, middle + 0.2 * reach, 0, 0.55 * x, 0.7 * reach, 12),
@@ -122,10 +124,10 @@ def toilet(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> Non
     s.rod((0, y - tank / 2), (h - 0.01, h), 0.025, CHROME)
 
 
-def bathtub(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def bathtub(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a tub with walls, a floor and taps."""
     x, y, t = w / 2, d / 2, 0.07
-    skirt = dice.pick((CERAMIC, CERAMIC, Paint((150, 166, 170), "ceramic")))
+    skirt = sampler.pick((CERAMIC, CERAMIC, Paint((150, 166, 170), "ceramic")))
     s.box((-x + 0.02, x - 0.02), (-y + 0.02, y - 0.02), (0, 0.14), CERAMIC.shade(0.95))
     for side in (-1, 1):
         edge = (y - t, y) if side > 0 else (-y, -y + t)
@@ -136,12 +138,12 @@ def bathtub(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> No
     s.box((x - 0.18, x - 0.06), (-0.014, 0.014), (h + 0.045, h + 0.07), CHROME)
 
 
-def shower(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def shower(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a shower: tray, glass on two sides, pole and head."""
     x, y = w / 2, d / 2
     s.box((-x, x), (-y, y), (0, 0.1), CERAMIC)
     s.box((-x + 0.05, x - 0.05), (-y + 0.05, y - 0.05), (0.098, 0.104), _WATER.shade(0.9))
-    tile = dice.pick((Paint((198, 210, 212), "ceramic"), Paint((170, 186, 180), "ceramic")))
+    tile = sampler.pick((Paint((198, 210, 212), "ceramic"), Paint((170, 186, 180), "ceramic")))
     s.box((-x, x), (y - 0.03, y), (0.1, h), tile)
     s.box((x - 0.03, x), (-y, y), (0.1, h), tile.shade(0.96))
     for z in (0.12, h - 0.05):
@@ -154,18 +156,23 @@ def shower(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> Non
     s.box((0.3 * x - 0.06, 0.3 * x + 0.06), (y - 0.08, y - 0.03), (1.02, 1.07), CHROME)
 
 
-def house_plant(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def house_plant(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a potted plant: long leaves from the soil, or a crown on a stem."""
     x, y = w / 2, d / 2
-    pot = dice.pick(
-        (Paint((186, 104, 72), "ceramic"), CERAMIC, Paint((88, 92, 96), "ceramic"), dice.plastic())
+    pot = sampler.pick(
+        (
+            Paint((186, 104, 72), "ceramic"),
+            CERAMIC,
+            Paint((88, 92, 96), "ceramic"),
+            sampler.plastic(),
+        )
     )
     high = min(0.4 * h, 0.34)
     r = min(0.3 * min(w, d) + 0.05, 0.48 * min(w, d))
-    green = LEAF.shade(dice.between(0.8, 1.2))
+    green = LEAF.shade(sampler.between(0.8, 1.2))
     s.cone((0, 0), (0, high), (0.72 * r, r), pot)
     s.rod((0, 0), (high - 0.01, high + 0.004), 0.9 * r, SOIL)
-    if dice.chance(0.4):
+    if sampler.chance(0.4):
         s.rod((0, 0), (high, 0.68 * h), 0.022, STEM)
         for k in range(4):
             turn = math.radians(90 * k + 30)
@@ -175,14 +182,14 @@ def house_plant(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -
                 (cx - 0.58 * x, cx + 0.58 * x),
                 (cy - 0.58 * y, cy + 0.58 * y),
                 (low, low + 0.32 * h),
-                green.shade(dice.between(0.85, 1.15)),
+                green.shade(sampler.between(0.85, 1.15)),
             )
         s.ball((-0.6 * x, 0.6 * x), (-0.6 * y, 0.6 * y), (0.7 * h, h), green.shade(1.1))
         return
     for k in range(9):
-        turn = math.radians(360 / 8 * k + dice.between(-10, 10))
-        tall = (1.0 if k == 8 else dice.between(0.74, 0.96)) * h
-        reach = 0.15 if k == 8 else dice.between(0.8, 1.0)
+        turn = math.radians(360 / 8 * k + sampler.between(-10, 10))
+        tall = (1.0 if k == 8 else sampler.between(0.74, 0.96)) * h
+        reach = 0.15 if k == 8 else sampler.between(0.8, 1.0)
         c, sn = math.cos(turn), math.sin(turn)
         wide = 0.17 * min(x, y) + 0.01
         middle = high + 0.55 * (tall - high)
@@ -197,14 +204,14 @@ def house_plant(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -
                 (reach * x * c, reach * y * sn, tall),
                 (0.62 * reach * x * c, 0.62 * reach * y * sn, middle + 0.3 * (tall - middle)),
             ],
-            green.shade(dice.between(0.82, 1.18)),
+            green.shade(sampler.between(0.82, 1.18)),
         )
 
 
-def laundry_hamper(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def laundry_hamper(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a laundry basket with a lid."""
     weave, x, y = (
-        Paint(dice.pick(((196, 164, 120), (150, 116, 82), (226, 220, 208))), "wood"),
+        Paint(sampler.pick(((196, 164, 120), (150, 116, 82), (226, 220, 208))), "wood"),
         w / 2,
         d / 2,
     )
@@ -222,12 +229,12 @@ def laundry_hamper(s: Sketch, w: float, d: float, h: float, dice: UniformSampler
     s.box((-0.2 * x, 0.2 * x), (-0.1 * y, 0.1 * y), (h - 0.01, h + 0.012), weave.shade(0.8))
 
 
-def rug(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def rug(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a rug with a border and a field; stepped in fractions of its thickness."""
-    cloth, x, y = dice.fabric(), w / 2, d / 2
-    other = dice.fabric()
+    cloth, x, y = sampler.fabric(), w / 2, d / 2
+    other = sampler.fabric()
     inset = 0.07 * min(w, d)
-    if dice.chance(0.3):
+    if sampler.chance(0.3):
         s.cylinder((-x, x), (-y, y), (0, 0.85 * h), cloth)
         s.cylinder((-x + inset, x - inset), (-y + inset, y - inset), (0, h), other)
         return
@@ -241,14 +248,16 @@ def rug(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
     )
 
 
-def painting(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def painting(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a framed picture whose back is the wall's side (+y)."""
     x, y = w / 2, d / 2
-    frame = dice.pick((dice.wood(), BLACK, Paint((196, 166, 104), "metal")))
+    frame = sampler.pick((sampler.wood(), BLACK, Paint((196, 166, 104), "metal")))
     sky = Paint(
-        dice.pick(((150, 184, 204), (224, 196, 160), (196, 178, 196), (206, 214, 206))), "paper"
+        sampler.pick(((150, 184, 204), (224, 196, 160), (196, 178, 196), (206, 214, 206))), "paper"
     )
-    land = Paint(dice.pick(((98, 130, 92), (166, 112, 76), (70, 92, 112), (60, 66, 82))), "paper")
+    land = Paint(
+        sampler.pick(((98, 130, 92), (166, 112, 76), (70, 92, 112), (60, 66, 82))), "paper"
+    )
     s.box((-x, x), (-0.4 * y, y), (0, h), frame)
     rim = 0.06 * min(w, h) + 0.01
     s.box((-x + rim, x - rim), (-0.6 * y, 0), (rim, h - rim), PAPER)
@@ -269,11 +278,11 @@ def painting(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> N
     )
 
 
-def mirror(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def mirror(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a wall mirror, rectangular or oval."""
     x, y = w / 2, d / 2
-    frame = dice.pick((dice.wood(), BLACK, CHROME, STEEL))
-    if dice.chance(0.4):
+    frame = sampler.pick((sampler.wood(), BLACK, CHROME, STEEL))
+    if sampler.chance(0.4):
         s.cylinder((-x, x), (-0.7 * y, y), (0, h), frame, "y")
         s.cylinder((-0.93 * x, 0.93 * x), (-y, 0), (0.04 * h, 0.96 * h), MIRROR, "y")
         return

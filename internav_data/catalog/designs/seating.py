@@ -13,21 +13,23 @@ if TYPE_CHECKING:
     from internav_data.catalog.shapes import Paint, Sketch
 
 
-def chair(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def chair(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a dining chair: legs, seat and back."""
     seat = min(0.46, 0.56 * h)
     shallow = d < 0.6  # a moulded seat that deep would be a lounger
-    style = dice.pick(("slats", "spindles", "panel", "padded", *(("shell",) if shallow else ())))
+    style = sampler.pick(("slats", "spindles", "panel", "padded", *(("shell",) if shallow else ())))
     if style == "shell":
-        _shell_chair(s, w, d, h, dice)
+        _shell_chair(s, w, d, h, sampler)
         return
-    wood, x, y = dice.wood(), w / 2, d / 2
+    wood, x, y = sampler.wood(), w / 2, d / 2
     thick = 0.05 * w + 0.012
     lean = 0.1 * d
     front, back = -y, y - lean
     s.legs((-x, x), (front, back), (0, seat - 0.03), thick / 2, wood)
     seat_paint = (
-        dice.cover() if style == "padded" else (dice.fabric() if dice.chance(0.3) else wood)
+        sampler.cover()
+        if style == "padded"
+        else (sampler.fabric() if sampler.chance(0.3) else wood)
     )
     s.cushion((-x, x), (front, back), (seat - 0.035, seat + 0.015), seat_paint, 0.3)
     behind = (back - thick, back), (y - thick, y)
@@ -70,10 +72,10 @@ def chair(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None
         )
 
 
-def _shell_chair(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def _shell_chair(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a moulded seat on splayed legs."""
     seat, x, y = min(0.46, 0.56 * h), w / 2, d / 2
-    shell, leg = dice.plastic(), dice.pick((dice.wood(), CHROME, IRON))
+    shell, leg = sampler.plastic(), sampler.pick((sampler.wood(), CHROME, IRON))
     for sx in (-1, 1):
         for sy in (-1, 1):
             s.strut(
@@ -90,15 +92,15 @@ def _shell_chair(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) 
     )
 
 
-def arm_chair(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def arm_chair(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw an armchair: club, wing or with a wooden frame."""
-    style = dice.pick(("club", "wing", "frame", "club"))
-    cloth, wood = dice.cover(), dice.wood()
+    style = sampler.pick(("club", "wing", "frame", "club"))
+    cloth, wood = sampler.cover(), sampler.wood()
     if style == "frame":
         _framed(s, (w, d, h), cloth, wood)
         return
     seats = 1 if w < 1.2 else 2
-    _upholstered(s, (w, d, h), seats, cloth, wood, dice)
+    _upholstered(s, (w, d, h), seats, cloth, wood, sampler)
     if style == "wing":
         x, y = w / 2, d / 2
         for side in (-1, 1):
@@ -129,16 +131,16 @@ def _framed(s: Sketch, size: tuple[float, float, float], cloth: Paint, wood: Pai
     s.slab(inner, (0.44 * y, 0.68 * y), (0.76 * y, y), (seat, h), cloth.shade(1.05))
 
 
-def sofa(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def sofa(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a sofa; a deep one has a chaise on one side."""
-    cloth, wood = dice.cover(), dice.wood()
+    cloth, wood = sampler.cover(), sampler.wood()
     seats = 2 if w < 1.95 else 3
     if d <= 1.2:
-        _upholstered(s, (w, d, h), seats, cloth, wood, dice)
+        _upholstered(s, (w, d, h), seats, cloth, wood, sampler)
         return
     deep = 0.95
-    side = dice.pick((-1, 1))
-    _upholstered(s, (w, deep, h), seats, cloth, wood, dice, d / 2 - deep / 2)
+    side = sampler.pick((-1, 1))
+    _upholstered(s, (w, deep, h), seats, cloth, wood, sampler, d / 2 - deep / 2)
     x, width = w / 2, 0.34 * w
     span = (-x, -x + width) if side < 0 else (x - width, x)
     front = d / 2 - deep
@@ -157,18 +159,20 @@ def _upholstered(
     seats: int,
     cloth: Paint,
     wood: Paint,
-    dice: UniformSampler,
+    sampler: UniformSampler,
     shift: float = 0.0,
 ) -> None:
     """Draw base, legs, arms, back, and a seat and a back cushion for each place."""
     w, d, h = size
     x, front, back = w / 2, shift - d / 2, shift + d / 2
-    arm_w = min(0.24, dice.between(0.11, 0.17) * w) if seats == 1 else dice.between(0.13, 0.24)
-    foot, base, seat, arm = 0.09 * h, 0.34 * h, 0.5 * h, dice.between(0.62, 0.72) * h
+    arm_w = (
+        min(0.24, sampler.between(0.11, 0.17) * w) if seats == 1 else sampler.between(0.13, 0.24)
+    )
+    foot, base, seat, arm = 0.09 * h, 0.34 * h, 0.5 * h, sampler.between(0.62, 0.72) * h
     rest = 0.2 * d
     s.legs((-x + 0.03, x - 0.03), (front + 0.04, back - 0.04), (0, foot), 0.026, wood, round_=True)
     s.box((-x + 0.02, x - 0.02), (front + 0.02, back), (foot, base), cloth.shade(0.9))
-    rolled = dice.chance(0.35)
+    rolled = sampler.chance(0.35)
     for side in (-1, 1):
         span = (x - arm_w, x) if side > 0 else (-x, -x + arm_w)
         if rolled:
@@ -195,11 +199,11 @@ def _upholstered(
         )
 
 
-def stool(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def stool(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a stool: a round, square or padded seat on four legs with a foot rail."""
-    wood, x, y = dice.wood(), w / 2, d / 2
-    legs = dice.pick((wood, IRON, CHROME))
-    seat = dice.pick((wood, dice.cover()))
+    wood, x, y = sampler.wood(), w / 2, d / 2
+    legs = sampler.pick((wood, IRON, CHROME))
+    seat = sampler.pick((wood, sampler.cover()))
     for sx in (-1, 1):
         for sy in (-1, 1):
             s.strut(
@@ -223,15 +227,15 @@ def stool(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None
             (low + 0.03, low + 0.055),
             legs,
         )
-    if dice.chance(0.5):
+    if sampler.chance(0.5):
         s.cylinder((-0.92 * x, 0.92 * x), (-0.92 * y, 0.92 * y), (h - 0.045, h), seat)
     else:
         s.cushion((-0.94 * x, 0.94 * x), (-0.94 * y, 0.94 * y), (h - 0.06, h), seat, 0.4)
 
 
-def ottoman(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def ottoman(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw an upholstered block on short legs, or a round pouf."""
-    cloth, x, y = dice.cover(), w / 2, d / 2
+    cloth, x, y = sampler.cover(), w / 2, d / 2
     if w < 1.25 * d:
         low, high = ring(0, 0, 0, 0.86 * x, 0.86 * y, 10), ring(0, 0, h, 0.8 * x, 0.8 * y, 10)
         s.layers((low, ring(0, 0, 0.55 * h, x, y, 12), high), cloth)
@@ -239,14 +243,14 @@ def ottoman(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> No
             (-0.3 * x, 0.3 * x), (-0.3 * y, 0.3 * y), (h - 0.02, h + 0.004), cloth.shade(0.85)
         )
         return
-    s.legs((-0.94 * x, 0.94 * x), (-0.9 * y, 0.9 * y), (0, 0.2 * h), 0.022, dice.wood())
+    s.legs((-0.94 * x, 0.94 * x), (-0.9 * y, 0.9 * y), (0, 0.2 * h), 0.022, sampler.wood())
     s.box((-x, x), (-y, y), (0.2 * h, 0.66 * h), cloth.shade(0.92))
     s.cushion((-x, x), (-y, y), (0.66 * h, h), cloth, 0.3)
 
 
-def office_chair(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def office_chair(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a swivel chair on a five-pointed base."""
-    x, y, cloth = w / 2, d / 2, dice.cover()
+    x, y, cloth = w / 2, d / 2, sampler.cover()
     seat = 0.47 * h
     for k in range(5):
         turn = math.radians(90 + 72 * k)
@@ -277,19 +281,21 @@ def office_chair(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) 
     s.box((-0.9 * x, 0.9 * x), (-0.05 * y, 0.05 * y), (seat - 0.08, seat - 0.04), BLACK)
 
 
-def bench(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def bench(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a bench: slab sides or legs, sometimes a cushion on top."""
-    wood, x, y = dice.wood(), w / 2, d / 2
-    if dice.chance(0.5):
+    wood, x, y = sampler.wood(), w / 2, d / 2
+    if sampler.chance(0.5):
         for side in (-1, 1):
             cx = side * 0.82 * x
             s.box((cx - 0.025, cx + 0.025), (-0.9 * y, 0.9 * y), (0, h - 0.08), wood.shade(0.92))
         s.box((-0.82 * x, 0.82 * x), (-0.02, 0.02), (0.3 * h, 0.5 * h), wood.shade(0.88))
     else:
         s.legs((-0.96 * x, 0.96 * x), (-0.92 * y, 0.92 * y), (0, h - 0.08), 0.025, wood)
-    if dice.chance(0.5):
+    if sampler.chance(0.5):
         s.box((-x, x), (-y, y), (h - 0.1, h - 0.06), wood)
-        s.cushion((-0.98 * x, 0.98 * x), (-0.96 * y, 0.96 * y), (h - 0.06, h), dice.fabric(), 0.3)
+        s.cushion(
+            (-0.98 * x, 0.98 * x), (-0.96 * y, 0.96 * y), (h - 0.06, h), sampler.fabric(), 0.3
+        )
     else:
         s.box((-x, x), (-y, y), (h - 0.08, h - 0.03), wood)
         s.box((-x, x), (-y, y), (h - 0.035, h), wood.shade(1.06))

@@ -19,10 +19,10 @@ _CARDBOARD = (
 )
 
 
-def box(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def box(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a cardboard box: taped shut, or open with its flaps out."""
-    card, x, y = dice.pick(_CARDBOARD), w / 2, d / 2
-    if dice.chance(0.5):
+    card, x, y = sampler.pick(_CARDBOARD), w / 2, d / 2
+    if sampler.chance(0.5):
         s.box((-x, x), (-y, y), (0, h - 0.002), card)
         s.box((-0.06 * w, 0.06 * w), (-y - 0.001, y + 0.001), (0.72 * h, h), card.shade(0.82))
         s.box((0.35 * x, 0.85 * x), (-y - 0.001, -y + 0.01), (0.2 * h, 0.46 * h), PAPER)
@@ -50,10 +50,10 @@ def _span(a: float, b: float) -> tuple[float, float]:
     return (a, b) if a < b else (b, a)
 
 
-def alarm_clock(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def alarm_clock(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw an alarm clock: twin bells, digital, or a round face on a block."""
-    paint, x, y = dice.plastic(), w / 2, d / 2
-    style = "digital" if w > 1.25 * h else dice.pick(("bells", "bells", "block"))
+    paint, x, y = sampler.plastic(), w / 2, d / 2
+    style = "digital" if w > 1.25 * h else sampler.pick(("bells", "bells", "block"))
     if style == "digital":
         s.taper(
             ((-x, x), (-y, y), 0), ((-0.97 * x, 0.97 * x), (-0.3 * y, 0.9 * y), h * 0.94), paint
@@ -111,14 +111,14 @@ def alarm_clock(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -
                 (cx - 0.4 * x, cx + 0.4 * x),
                 (-0.6 * y, 0.6 * y),
                 (0.66 * h, 0.95 * h),
-                dice.pick((BRASS, STEEL)),
+                sampler.pick((BRASS, STEEL)),
             )
         s.box((-0.5 * x, 0.5 * x), (-0.12 * y, 0.12 * y), (0.95 * h, h), STEEL)
 
 
-def laptop(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def laptop(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw an open laptop: base, keys, touch pad, screen."""
-    case = dice.pick(
+    case = sampler.pick(
         (
             Paint((184, 188, 192), "metal"),
             Paint((62, 64, 68), "metal"),
@@ -167,18 +167,18 @@ def laptop(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> Non
     )
 
 
-def pot(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def pot(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a cooking pot: open or with a lid, two handles or a long one."""
-    body = dice.pick(
+    body = sampler.pick(
         (STEEL, STEEL, IRON, Paint((176, 62, 54), "metal"), Paint((64, 104, 120), "metal"))
     )
-    grip = dice.pick((BLACK, STEEL.shade(0.8)))
+    grip = sampler.pick((BLACK, STEEL.shade(0.8)))
     long_handle = d > 1.2 * w
     x, y = w / 2, d / 2
     rx = x if long_handle else 0.8 * x
     ry = min(y, 0.62 * d / 2 + 0.02) if long_handle else y
     cy = y - ry
-    lidded = not long_handle and dice.chance(0.5)
+    lidded = not long_handle and sampler.chance(0.5)
     rim = 0.72 * h if lidded else h
     if lidded:
         s.cylinder((-rx, rx), (cy - ry, cy + ry), (0, rim), body)
@@ -214,10 +214,10 @@ def _open_wall(s: Sketch, size: tuple[float, float, float], cy: float, paint: Pa
         s.hull([(a, b, z) for a, b, _ in around for z in (0.0, h)], paint)
 
 
-def garbage_can(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def garbage_can(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a bin: tapered with a lid, pedal bin, or an open basket."""
-    paint, x, y = dice.pick((dice.plastic(), STEEL, IRON)), w / 2, d / 2
-    style = dice.pick(("lid", "pedal", "open", "pedal"))
+    paint, x, y = sampler.pick((sampler.plastic(), STEEL, IRON)), w / 2, d / 2
+    style = sampler.pick(("lid", "pedal", "open", "pedal"))
     if style == "pedal":
         s.box((-0.12 * x, 0.12 * x), (-y, -0.8 * y), (0.03 * h, 0.06 * h), BLACK)
         s.cylinder((-x, x), (-0.9 * y, y), (0, 0.08 * h), BLACK)
@@ -257,7 +257,7 @@ def garbage_can(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -
             ((-x, x), _span(side * y, side * (y - t)), rim),
             paint,
         )
-    bag = dice.pick((LINEN, BLACK, paint.shade(0.8)))
+    bag = sampler.pick((LINEN, BLACK, paint.shade(0.8)))
     for side in (-1, 1):
         s.box((-x, x), _span(side * (y + 0.003), side * (y - t)), (0.93 * h, h + 0.002), bag)
         s.box(_span(side * (x + 0.003), side * (x - t)), (-y, y), (0.93 * h, h + 0.002), bag)

@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from internav_data.catalog.shapes import Sketch
 
 
-def bed(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def bed(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a bed, its head at +y: frame, mattress, duvet, pillows."""
     x, y = w / 2, d / 2
-    wood, cloth = dice.wood(), dice.fabric()
-    head = dice.pick((wood, wood, dice.fabric()))
+    wood, cloth = sampler.wood(), sampler.fabric()
+    head = sampler.pick((wood, wood, sampler.fabric()))
     s.box((-x, x), (y - 0.06, y), (0, h), head)
     s.box((-x, x), (-y, y - 0.05), (0.12, 0.3), wood)
     s.legs((-x + 0.02, x - 0.02), (-y + 0.02, y - 0.08), (0, 0.12), 0.035, wood.shade(0.85))
@@ -31,9 +31,9 @@ def bed(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
         s.cushion((left + 0.02, left + wide - 0.02), (y - 0.5, y - 0.1), (0.48, 0.62), WHITE, 0.4)
 
 
-def pillow(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def pillow(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a stuffed pillow: pointed corners, a full middle, perhaps a stripe."""
-    cloth, x, y = dice.pick((dice.fabric(), dice.fabric(), LINEN)), w / 2, d / 2
+    cloth, x, y = sampler.pick((sampler.fabric(), sampler.fabric(), LINEN)), w / 2, d / 2
 
     def body(grow: float, half_x: float) -> list[tuple[float, float, float]]:
         corners = [(a * half_x, b * y, 0.5 * h) for a in (-1, 1) for b in (-1, 1)]
@@ -47,7 +47,7 @@ def pillow(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> Non
         return corners
 
     s.hull(body(1.0, x), cloth)
-    if dice.chance(0.5):
+    if sampler.chance(0.5):
         s.hull(
             [
                 (a * 0.16 * x, b * share * y, h * z)
@@ -61,15 +61,15 @@ def pillow(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> Non
                     (0.53, 1.004),
                 )
             ],
-            dice.fabric() if dice.chance(0.5) else cloth.shade(0.8),
+            sampler.fabric() if sampler.chance(0.5) else cloth.shade(0.8),
         )
 
 
-def dog_bed(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def dog_bed(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a dog's bed: a cushion within a soft rim, lower in front."""
-    rim, x, y = dice.fabric(), w / 2, d / 2
+    rim, x, y = sampler.fabric(), w / 2, d / 2
     t = 0.15 * min(w, d)
-    if dice.chance(0.5):
+    if sampler.chance(0.5):
         for k in range(8):
             a, b = (math.radians(22.5 + 45 * (k + j)) for j in (0, 1))
             high = h if math.sin((a + b) / 2) > -0.5 else 0.72 * h

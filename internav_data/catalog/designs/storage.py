@@ -48,10 +48,10 @@ def _carcass(s: Sketch, size: tuple[float, float, float], wood: Paint, foot: flo
     s.box((-x, x), (-y + 0.008, y), (h - 0.024, h), wood.shade(1.06))
 
 
-def dresser(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def dresser(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a chest of drawers, one or two columns."""
-    wood, x, y = dice.wood(), w / 2, d / 2
-    foot = dice.pick((0.05, 0.12))
+    wood, x, y = sampler.wood(), w / 2, d / 2
+    foot = sampler.pick((0.05, 0.12))
     _carcass(s, (w, d, h), wood, foot)
     columns, rows = (1, 4) if w < 0.95 else (2, 3)
     wide = (w - 0.03) / columns
@@ -60,18 +60,18 @@ def dresser(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> No
         drawers(s, (left, left + wide), -y + 0.03, (foot + 0.01, h - 0.03), rows, wood.shade(1.1))
 
 
-def nightstand(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def nightstand(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a bedside table with two drawers."""
-    wood, x, y = dice.wood(), w / 2, d / 2
-    foot = dice.pick((0.05, 0.16))
+    wood, x, y = sampler.wood(), w / 2, d / 2
+    foot = sampler.pick((0.05, 0.16))
     _carcass(s, (w, d, h), wood, foot)
     drawers(s, (-x + 0.015, x - 0.015), -y + 0.03, (foot + 0.01, h - 0.03), 2, wood.shade(1.1))
 
 
-def tv_stand(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def tv_stand(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a low board with doors at the sides and open shelves between."""
-    wood, x, y = dice.wood(), w / 2, d / 2
-    _carcass(s, (w, d, h), wood, dice.pick((0.05, 0.12)))
+    wood, x, y = sampler.wood(), w / 2, d / 2
+    _carcass(s, (w, d, h), wood, sampler.pick((0.05, 0.12)))
     front = -y + 0.03
     third = w / 3
     doors(s, (-x + 0.01, -x + third), front, (0.13, h - 0.03), 1, wood.shade(1.1))
@@ -111,76 +111,76 @@ _SPINES = (
 )
 
 
-def _books(s: Sketch, x: Span, y: Span, z: Span, dice: UniformSampler) -> None:
+def _books(s: Sketch, x: Span, y: Span, z: Span, sampler: UniformSampler) -> None:
     """Draw a row of books as one block."""
-    colour = Paint(dice.pick(_SPINES), "paper")
+    colour = Paint(sampler.pick(_SPINES), "paper")
     s.box(x, y, (z[0] - 0.002, z[1]), colour)
 
 
-def shelving_unit(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def shelving_unit(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw open shelves with a few things on them."""
-    wood, x, y = dice.wood(), w / 2, d / 2
+    wood, x, y = sampler.wood(), w / 2, d / 2
     boards = 4 if h < 1.5 else 5
-    tops = _shelves(s, (w, d, h), boards, wood, back=dice.chance(0.5))
+    tops = _shelves(s, (w, d, h), boards, wood, back=sampler.chance(0.5))
     gap = (h - 0.08) / (boards - 1)
     for top in tops[:-1]:
-        left = -x + 0.03 + dice.between(0, 0.4) * w
+        left = -x + 0.03 + sampler.between(0, 0.4) * w
         _books(
             s,
-            (left, left + dice.between(0.2, 0.45) * w),
+            (left, left + sampler.between(0.2, 0.45) * w),
             (-0.6 * y, 0.6 * y),
-            (top, top + dice.between(0.45, 0.75) * gap),
-            dice,
+            (top, top + sampler.between(0.45, 0.75) * gap),
+            sampler,
         )
 
 
-def bookcase(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def bookcase(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a high shelf full of books."""
-    wood, x, y = dice.wood(), w / 2, d / 2
+    wood, x, y = sampler.wood(), w / 2, d / 2
     tops = _shelves(s, (w, d, h), 6, wood, back=True)
     gap = (h - 0.08) / 5
     for top in tops[:-1]:
-        split = dice.between(-0.4, 0.4) * x
+        split = sampler.between(-0.4, 0.4) * x
         _books(
             s,
             (-x + 0.022, split),
             (-0.7 * y, y - 0.01),
-            (top, top + dice.between(0.6, 0.8) * gap),
-            dice,
+            (top, top + sampler.between(0.6, 0.8) * gap),
+            sampler,
         )
         _books(
             s,
-            (split + 0.004, x - dice.between(0.03, 0.5) * x),
+            (split + 0.004, x - sampler.between(0.03, 0.5) * x),
             (-0.6 * y, y - 0.01),
-            (top, top + dice.between(0.5, 0.8) * gap),
-            dice,
+            (top, top + sampler.between(0.5, 0.8) * gap),
+            sampler,
         )
 
 
-def wardrobe(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def wardrobe(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a wardrobe with two or three doors."""
-    wood, x, y = dice.wood(), w / 2, d / 2
+    wood, x, y = sampler.wood(), w / 2, d / 2
     _carcass(s, (w, d, h), wood, 0.06)
     front = -y + 0.03
     low = 0.07
-    if dice.chance(0.4):
+    if sampler.chance(0.4):
         drawers(s, (-x + 0.01, x - 0.01), front, (0.07, 0.42), 1, wood.shade(1.08))
         low = 0.42
     doors(s, (-x + 0.01, x - 0.01), front, (low, h - 0.03), 2 if w < 1.4 else 3, wood.shade(1.1))
 
 
-def shoe_cabinet(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def shoe_cabinet(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a slim cabinet with tilting fronts."""
-    wood, x, y = dice.wood(), w / 2, d / 2
+    wood, x, y = sampler.wood(), w / 2, d / 2
     _carcass(s, (w, d, h), wood, 0.05)
     drawers(
         s, (-x + 0.01, x - 0.01), -y + 0.03, (0.06, h - 0.03), 2 if h < 0.9 else 3, wood.shade(1.1)
     )
 
 
-def filing_cabinet(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def filing_cabinet(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a metal cabinet with deep drawers."""
-    metal, x, y = dice.pick((STEEL, IRON, Paint((214, 212, 204), "metal"))), w / 2, d / 2
+    metal, x, y = sampler.pick((STEEL, IRON, Paint((214, 212, 204), "metal"))), w / 2, d / 2
     _carcass(s, (w, d, h), metal, 0.04)
     drawers(
         s,
@@ -192,30 +192,30 @@ def filing_cabinet(s: Sketch, w: float, d: float, h: float, dice: UniformSampler
     )
 
 
-def storage_rack(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def storage_rack(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a metal rack with boxes on its boards."""
-    metal, x, y = dice.pick((IRON, STEEL)), w / 2, d / 2
+    metal, x, y = sampler.pick((IRON, STEEL)), w / 2, d / 2
     s.legs((-x, x), (-y, y), (0, h), 0.018, metal)
-    board = dice.pick((metal.shade(1.2), Paint((190, 158, 118), "wood")))
+    board = sampler.pick((metal.shade(1.2), Paint((190, 158, 118), "wood")))
     gap = (h - 0.14) / 3
     for k in range(4):
         z = 0.1 + k * gap
         s.box((-x + 0.005, x - 0.005), (-y + 0.005, y - 0.005), (z, z + 0.03), board)
         if k < 3:
-            left = -x + 0.04 + dice.between(0.0, 0.45) * w
-            wide = dice.between(0.28, 0.45) * w
-            paint = dice.pick((Paint((196, 154, 104), "paper"), dice.plastic()))
+            left = -x + 0.04 + sampler.between(0.0, 0.45) * w
+            wide = sampler.between(0.28, 0.45) * w
+            paint = sampler.pick((Paint((196, 154, 104), "paper"), sampler.plastic()))
             s.box(
                 (left, left + wide),
                 (-0.7 * y, 0.7 * y),
-                (z + 0.03, z + 0.03 + dice.between(0.4, 0.7) * gap),
+                (z + 0.03, z + 0.03 + sampler.between(0.4, 0.7) * gap),
                 paint,
             )
 
 
-def coat_rack(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def coat_rack(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a coat stand: a pole, four feet, pegs around its head."""
-    wood, x, y = dice.pick((dice.wood(), IRON)), w / 2, d / 2
+    wood, x, y = sampler.pick((sampler.wood(), IRON)), w / 2, d / 2
     s.rod((0, 0), (0.04, h), 0.022, wood)
     s.taper(((-x, x), (-0.02, 0.02), 0), ((-0.1 * x, 0.1 * x), (-0.02, 0.02), 0.12), wood)
     s.taper(((-0.02, 0.02), (-y, y), 0), ((-0.02, 0.02), (-0.1 * y, 0.1 * y), 0.12), wood)
@@ -224,9 +224,9 @@ def coat_rack(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> 
             s.strut((0, 0, z - 0.06), (sx * reach * x, sy * reach * y, z), 0.012, wood.shade(0.9))
 
 
-def piano(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def piano(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw an upright piano."""
-    wood = dice.pick(
+    wood = sampler.pick(
         (Paint((36, 34, 36), "wood"), Paint((96, 56, 38), "wood"), Paint((60, 40, 32), "wood"))
     )
     x, y = w / 2, d / 2
@@ -257,9 +257,9 @@ def piano(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None
         s.box((cx - 0.02, cx + 0.02), (case - 0.1, case), (0.06, 0.08), BRASS)
 
 
-def safe(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def safe(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a strongbox: door, dial and handle."""
-    metal, x, y = dice.pick((IRON, IRON.shade(1.5), Paint((92, 102, 96), "metal"))), w / 2, d / 2
+    metal, x, y = sampler.pick((IRON, IRON.shade(1.5), Paint((92, 102, 96), "metal"))), w / 2, d / 2
     front = -y + 0.035
     s.box((-x, x), (front, y), (0, h), metal)
     s.box((-x + 0.03, x - 0.03), (front - 0.012, front), (0.03, h - 0.03), metal.shade(1.2))
@@ -276,9 +276,9 @@ def safe(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
         )
 
 
-def crate(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def crate(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw an open wooden crate of slats."""
-    wood, x, y, t = dice.wood(), w / 2, d / 2, 0.014
+    wood, x, y, t = sampler.wood(), w / 2, d / 2, 0.014
     s.box((-x + t, x - t), (-y + t, y - t), (0, t), wood.shade(0.85))
     for cx in (-x, x - t):
         for low, high in ((0.0, 0.45), (0.55, 1.0)):

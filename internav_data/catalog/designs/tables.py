@@ -33,21 +33,21 @@ def drawers(
             )
 
 
-def desk(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def desk(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a desk: pedestals, trestles, panels, an L for deep ones, a hutch for tall ones."""
-    wood = dice.wood()
+    wood = sampler.wood()
     if d > 1.0:
-        _corner_desk(s, (w, d, min(h, 0.8)), wood, dice)
+        _corner_desk(s, (w, d, min(h, 0.8)), wood, sampler)
     else:
         top = h if h <= 1.0 else 0.76
-        style = dice.pick(("double", "single", "trestle", "panels"))
-        _plain_desk(s, (w, d, top), style, wood, dice)
+        style = sampler.pick(("double", "single", "trestle", "panels"))
+        _plain_desk(s, (w, d, top), style, wood, sampler)
     if h > 1.0:
         _hutch(s, (w, d, h), wood)
 
 
 def _plain_desk(
-    s: Sketch, size: tuple[float, float, float], style: str, wood: Paint, dice: UniformSampler
+    s: Sketch, size: tuple[float, float, float], style: str, wood: Paint, sampler: UniformSampler
 ) -> None:
     w, d, h = size
     x, y, lid = w / 2, d / 2, h - 0.035
@@ -55,7 +55,7 @@ def _plain_desk(
     front = -y + 0.03
     side_w = min(0.4, 0.28 * w)
     if style == "trestle":
-        metal = dice.pick((IRON, wood.shade(0.8)))
+        metal = sampler.pick((IRON, wood.shade(0.8)))
         for side in (-1, 1):
             cx = side * 0.72 * x
             for sy in (-1, 1):
@@ -64,7 +64,7 @@ def _plain_desk(
         s.box((-0.72 * x, 0.72 * x), (-0.02, 0.02), (0.55 * h, 0.6 * h), metal)
         return
     s.box((-x + 0.03, x - 0.03), (0.8 * y, 0.8 * y + 0.02), (0.45 * h, lid), wood.shade(0.85))
-    closed = {"double": (-1, 1), "single": (dice.pick((-1, 1)),), "panels": ()}[style]
+    closed = {"double": (-1, 1), "single": (sampler.pick((-1, 1)),), "panels": ()}[style]
     for side in (-1, 1):
         outer = side * (x - 0.015)
         if side in closed:
@@ -83,11 +83,11 @@ def _plain_desk(
 
 
 def _corner_desk(
-    s: Sketch, size: tuple[float, float, float], wood: Paint, dice: UniformSampler
+    s: Sketch, size: tuple[float, float, float], wood: Paint, sampler: UniformSampler
 ) -> None:
     """Draw an L: one leaf along the back, one towards the front."""
     w, d, h = size
-    x, y, side = w / 2, d / 2, dice.pick((-1, 1))
+    x, y, side = w / 2, d / 2, sampler.pick((-1, 1))
     leaf = min(0.65, 0.45 * w)
     lid = h - 0.04
     s.box((-x, x), (y - 0.65, y), (lid, h), wood.shade(1.06))
@@ -124,12 +124,12 @@ def _hutch(s: Sketch, size: tuple[float, float, float], wood: Paint) -> None:
     )
 
 
-def dining_table(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def dining_table(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a dining table: four legs, trestle, or round on a pedestal."""
-    wood, x, y = dice.wood(), w / 2, d / 2
+    wood, x, y = sampler.wood(), w / 2, d / 2
     top = wood.shade(1.06)
     compact = max(w, d) < 1.35 * min(w, d)
-    if compact and dice.chance(0.75):
+    if compact and sampler.chance(0.75):
         s.cylinder((-x, x), (-y, y), (h - 0.04, h), top)
         s.cone((0, 0), (0.06, h - 0.04), (0.09, 0.06), wood)
         s.cone((0, 0), (h - 0.1, h - 0.04), (0.07, 0.3 * min(w, d)), wood)
@@ -140,12 +140,12 @@ def dining_table(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) 
                 wood.shade(0.92),
             )
         return
-    glass = dice.chance(0.12)
+    glass = sampler.chance(0.12)
     s.box((-x, x), (-y, y), (h - 0.04, h), GLASS if glass else top)
     under = h - 0.04
-    style = dice.pick(("legs", "legs", "trestle", "slabs"))
+    style = sampler.pick(("legs", "legs", "trestle", "slabs"))
     if style == "legs":
-        leg = dice.between(0.03, 0.045)
+        leg = sampler.between(0.03, 0.045)
         inset = 0.02
         s.legs((-x + inset, x - inset), (-y + inset, y - inset), (0, under), leg, wood)
         for cy in (-y + 0.06, y - 0.06):
@@ -174,16 +174,16 @@ def dining_table(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) 
     s.box((-0.64 * x, 0.64 * x), (-0.025, 0.025), (0.26 * h, 0.36 * h), wood.shade(0.9))
 
 
-def side_table(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def side_table(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a side table: console, night table, round, shelved or a cube."""
-    wood, x, y = dice.wood(), w / 2, d / 2
+    wood, x, y = sampler.wood(), w / 2, d / 2
     compact = max(w, d) < 1.3 * min(w, d)
     if w > 0.95:
-        _console(s, (w, d, h), wood, dice)
-    elif compact and dice.chance(0.5):
-        _round_table(s, (w, d, h), wood, dice)
+        _console(s, (w, d, h), wood, sampler)
+    elif compact and sampler.chance(0.5):
+        _round_table(s, (w, d, h), wood, sampler)
     else:
-        style = dice.pick(("chest", "shelf", "drawer", "cube"))
+        style = sampler.pick(("chest", "shelf", "drawer", "cube"))
         if style == "cube":
             s.box((-x, x), (-y, y), (h - 0.03, h), wood.shade(1.06))
             for side in (-1, 1):
@@ -210,13 +210,15 @@ def side_table(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) ->
 
 
 def _round_table(
-    s: Sketch, size: tuple[float, float, float], wood: Paint, dice: UniformSampler
+    s: Sketch, size: tuple[float, float, float], wood: Paint, sampler: UniformSampler
 ) -> None:
     w, d, h = size
     x, y = w / 2, d / 2
-    metal = dice.pick((BRASS, IRON, wood))
-    s.cylinder((-x, x), (-y, y), (h - 0.025, h), dice.pick((wood.shade(1.06), dice.stone(), GLASS)))
-    if dice.chance(0.5):
+    metal = sampler.pick((BRASS, IRON, wood))
+    s.cylinder(
+        (-x, x), (-y, y), (h - 0.025, h), sampler.pick((wood.shade(1.06), sampler.stone(), GLASS))
+    )
+    if sampler.chance(0.5):
         s.rod((0, 0), (0.02, h - 0.02), 0.022, metal)
         s.layers(
             (ring(0, 0, 0, 0.72 * x, 0.72 * y, 12), ring(0, 0, 0.02, 0.66 * x, 0.66 * y, 12)), metal
@@ -233,13 +235,13 @@ def _round_table(
 
 
 def _console(
-    s: Sketch, size: tuple[float, float, float], wood: Paint, dice: UniformSampler
+    s: Sketch, size: tuple[float, float, float], wood: Paint, sampler: UniformSampler
 ) -> None:
     w, d, h = size
     x, y = w / 2, d / 2
     s.box((-x, x), (-y, y), (h - 0.035, h), wood.shade(1.06))
     s.legs((-x + 0.01, x - 0.01), (-y + 0.01, y - 0.01), (0, h - 0.035), 0.02, wood)
-    if dice.chance(0.5):
+    if sampler.chance(0.5):
         front = -y + 0.035
         low = h - 0.16
         s.box((-x + 0.03, x - 0.03), (front, y - 0.02), (low, h - 0.035), wood.shade(0.95))
@@ -251,11 +253,11 @@ def _console(
     s.box((-x + 0.02, x - 0.02), (-y + 0.02, y - 0.02), (0.16 * h, 0.16 * h + 0.02), wood)
 
 
-def coffee_table(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def coffee_table(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a low table: oval, with a shelf, or a slab on panels."""
-    wood, x, y = dice.wood(), w / 2, d / 2
-    style = dice.pick(("oval", "shelf", "panels"))
-    top = dice.pick((wood.shade(1.06), wood.shade(1.06), GLASS, dice.stone()))
+    wood, x, y = sampler.wood(), w / 2, d / 2
+    style = sampler.pick(("oval", "shelf", "panels"))
+    top = sampler.pick((wood.shade(1.06), wood.shade(1.06), GLASS, sampler.stone()))
     if style == "oval":
         s.cylinder((-x, x), (-y, y), (h - 0.03, h), top)
         for sx in (-1, 1):
@@ -282,9 +284,9 @@ def coffee_table(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) 
     )
 
 
-def vanity_table(s: Sketch, w: float, d: float, h: float, dice: UniformSampler) -> None:
+def vanity_table(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a dressing table with a mirror."""
-    wood, x, y, top = dice.wood(), w / 2, d / 2, 0.76
+    wood, x, y, top = sampler.wood(), w / 2, d / 2, 0.76
     s.box((-x, x), (-y, y), (top - 0.03, top), wood.shade(1.06))
     s.legs((-x + 0.01, x - 0.01), (-y + 0.01, y - 0.01), (0, top - 0.03), 0.02, wood)
     front = -y + 0.03
