@@ -600,6 +600,8 @@ def dialect(module: Module) -> Iterator[Finding]:
     of_room = DIALECT_NAMES | DIALECT_OF_ROOM.get(module.room, {})
     seen = set()
     for made in definitions(module):
+        if made.name.startswith("__"):
+            continue  # Python's own names, as __slots__
         bare = made.name.strip("_")
         if made.kind == "class":
             word = DIALECT_CLASSES.get(bare)

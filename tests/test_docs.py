@@ -90,7 +90,7 @@ def test_examples_run(example, small_dataset, small_run, tmp_path):
         "ship_agent": [small_run, tmp_path / "agent"],
         "contact_sheet": [small_dataset, tmp_path / "sheet.png", "--pixels", "120"],
         "stream_episodes": [small_dataset],
-        "ways_in_a_house": ["--seed", "7", "--scene", "3"],
+        "paths_in_a_house": ["--seed", "7", "--scene", "3"],
     }[example.stem]
     done = subprocess.run(
         [sys.executable, example, *map(str, arguments)], capture_output=True, text=True, check=False

@@ -1,4 +1,4 @@
-"""Where the agent can stand, and how far it is: lattice, any-angle ways, room and node paths."""
+"""Navigation of the agent's disc: lattice, Euclidean shortest paths, room paths, node paths."""
 
 from internav_data.navigation.lattice import Lattice
 from internav_data.navigation.rooms import PATHS_AT_MOST, node_paths, room_of, room_paths, rooms_of

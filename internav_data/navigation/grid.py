@@ -1,9 +1,11 @@
-"""Numba kernels of the lattice: who blocks which node and edge, and steps between nodes.
+"""Numba kernels of the lattice: blocker counts of nodes and edges, and steps between nodes.
 
-One array holds everything: blockers (3, nx, ny) int32 counts what stands in the way of node
-(i, j) [0], of its edge to (i + 1, j) [1] and of its edge to (i, j + 1) [2]. Edges that leave the
-lattice are blocked for good; that border is what lets the searches skip all bounds checks: an
-index before the first row wraps round to the last one, whose outgoing edges are closed.
+One array holds the lattice: blockers (3, nx, ny) int32 counts the polygons that block node (i, j)
+[0], its edge to (i + 1, j) [1] and its edge to (i, j + 1) [2]. Edges that leave the lattice are
+blocked for good. That border lets the searches skip all bounds checks: an index before the first
+row wraps round to the last one, whose outgoing edges are closed.
+
+`spacing` is the distance of neighbouring nodes in metres; node (i, j) lies at (i, j) * spacing.
 """
 
 from __future__ import annotations
@@ -43,6 +45,17 @@ def mark(  # noqa: C901, PLR0912 - one pass over a window, spelt out for speed
     """Add `step` to the count of every node and edge on which a disc comes too near a polygon.
 
     Each polygon costs only the window of nodes around its bounding box.
+
+    Parameters
+    ----------
+    blockers
+        Counts, (3, nx, ny) int32; changed in place.
+    vertices, offsets
+        Convex polygons: (n, 2) float64, metres; (polygons + 1,) int64.
+    spacing, radius
+        Distance of nodes; distance at which a polygon blocks no more, metres.
+    step
+        1 to add polygons, -1 to remove them.
     """
     nx, ny = blockers.shape[1], blockers.shape[2]
     for k in range(len(offsets) - 1):
@@ -71,24 +84,28 @@ def mark(  # noqa: C901, PLR0912 - one pass over a window, spelt out for speed
         for i in range(i0, i1 + 1):
             for j in range(j0, j1 + 1):
                 here = distance[i - i0, j - j0]
-                for way in (EAST, NORTH):
-                    a, b = (i + 1, j) if way == EAST else (i, j + 1)
+                for direction in (EAST, NORTH):
+                    a, b = (i + 1, j) if direction == EAST else (i, j + 1)
                     if a > i1 or b > j1:
                         continue
                     there = distance[a - i0, b - j0]
                     blocked = here < radius or there < radius
-                    # Distance changes by at most the way gone: far ends make a far edge.
+                    # Along an edge the distance changes by at most the length gone: where both ends
+                    # are far, so is the edge.
                     if not blocked and here + there < 2.0 * radius + spacing:
                         x, y, e, f = i * spacing, j * spacing, a * spacing, b * spacing
                         d = segment_polygon_distance(x, y, e, f, vertices, start, stop)
                         blocked = d < radius
                     if blocked:
-                        blockers[way, i, j] += step
+                        blockers[direction, i, j] += step
 
 
 @njit(cache=True)
 def in_outline(x: float, y: float, outline: Floats) -> bool:
-    """Whether a point lies in or on a simple polygon (n, 2)."""
+    """Return whether a point lies in or on a simple polygon, (n, 2) float64, metres.
+
+    Crossing number of a ray along +x.
+    """
     odd = False
     previous = len(outline) - 1
     for k in range(len(outline)):
@@ -105,7 +122,7 @@ def in_outline(x: float, y: float, outline: Floats) -> bool:
 
 @njit(cache=True)
 def _leaves(ax: float, ay: float, bx: float, by: float, outline: Floats) -> bool:
-    """Whether segment ab, whose ends lie in or on an outline, leaves it on its way.
+    """Return whether segment ab, whose ends lie in or on an outline, leaves it in between.
 
     Unlike `planar.segments_cross`, which settles ties one way, touching is not crossing here.
     """
@@ -126,7 +143,10 @@ def _leaves(ax: float, ay: float, bx: float, by: float, outline: Floats) -> bool
 def close_outside(  # noqa: C901 - nodes, their edges, then edges along each side
     blockers: Counts, outline: Floats, spacing: float
 ) -> None:
-    """Block for good what lies outside the outline, leaves it or leaves the lattice."""
+    """Block for good all nodes outside an outline and all edges that leave it or the lattice.
+
+    `blockers` (3, nx, ny) int32 is changed in place; `outline` (n, 2) float64, metres.
+    """
     nx, ny = blockers.shape[1], blockers.shape[2]
     for i in range(nx):
         for j in range(ny):
@@ -205,7 +225,10 @@ def _spread(
 
 @njit(cache=True)
 def steps_to(blockers: Counts, i: int, j: int) -> Counts:
-    """Count steps from every node to node (i, j), shape (nx, ny) int32; -1 where cut off."""
+    """Return the steps from every node to node (i, j), (nx, ny) int32; -1 where cut off.
+
+    `blockers` (3, nx, ny) int32. Breadth-first.
+    """
     nx, ny = blockers.shape[1], blockers.shape[2]
     steps = np.full((nx, ny), -1, dtype=np.int32)
     if blockers[NODE, i, j] == 0:
@@ -215,7 +238,10 @@ def steps_to(blockers: Counts, i: int, j: int) -> Counts:
 
 @njit(cache=True)
 def steps_between(blockers: Counts, i: int, j: int, a: int, b: int) -> int:
-    """Count steps from node (i, j) to node (a, b); -1 where cut off."""
+    """Return the steps from node (i, j) to node (a, b); -1 where cut off.
+
+    `blockers` (3, nx, ny) int32. Breadth-first, up to the second node.
+    """
     nx, ny = blockers.shape[1], blockers.shape[2]
     steps = np.full((nx, ny), -1, dtype=np.int32)
     if blockers[NODE, i, j] == 0 and blockers[NODE, a, b] == 0:
@@ -226,7 +252,10 @@ def steps_between(blockers: Counts, i: int, j: int, a: int, b: int) -> int:
 
 @njit(cache=True)
 def components(blockers: Counts) -> Counts:
-    """Component of every node (nx, ny) int32, numbered by their first node; -1 where blocked."""
+    """Return the component of every node, (nx, ny) int32; -1 where blocked.
+
+    Components are numbered in order of their first node; `blockers` (3, nx, ny) int32.
+    """
     nx, ny = blockers.shape[1], blockers.shape[2]
     labels = np.full((nx, ny), -1, dtype=np.int32)
     queue = np.empty(nx * ny, dtype=np.int32)
@@ -239,29 +268,35 @@ def components(blockers: Counts) -> Counts:
 
 
 @njit(cache=True)
-def open_edge(blockers: Counts, i: int, j: int, way: int) -> bool:
-    """Whether a step can be made: way 0 to +x, 1 to +y, 2 to -x, 3 to -y."""
-    if way == 0:
+def open_edge(blockers: Counts, i: int, j: int, direction: int) -> bool:
+    """Return whether a step from node (i, j) is free: direction 0 to +x, 1 to +y, 2 to -x, 3 to -y.
+
+    `blockers` (3, nx, ny) int32.
+    """
+    if direction == 0:
         return blockers[EAST, i, j] == 0
-    if way == 1:
+    if direction == 1:
         return blockers[NORTH, i, j] == 0
-    if way == 2:  # noqa: PLR2004 - the third quarter turn
+    if direction == 2:  # noqa: PLR2004 - the third quarter turn
         return i > 0 and blockers[EAST, i - 1, j] == 0
     return j > 0 and blockers[NORTH, i, j - 1] == 0
 
 
 @njit(cache=True)
 def descend(blockers: Counts, steps: Counts, i: int, j: int) -> Ints:
-    """Nodes (n, 2) of a shortest path down a field of steps; straight on where it can."""
+    """Return nodes (n, 2) int64 of a shortest path from node (i, j), straight on where possible.
+
+    `blockers` (3, nx, ny) int32; `steps` (nx, ny) int32 as `steps_to` returns them.
+    """
     path = np.empty((steps[i, j] + 1, 2), dtype=np.int64)
-    way = 0
+    direction = 0
     for k in range(len(path)):
         path[k, 0], path[k, 1] = i, j
         for turn in range(4):
-            candidate = (way + turn) % 4
+            candidate = (direction + turn) % 4
             a = i + (candidate == 0) - (candidate == 2)  # noqa: PLR2004
             b = j + (candidate == 1) - (candidate == 3)  # noqa: PLR2004
             if open_edge(blockers, i, j, candidate) and steps[a, b] == steps[i, j] - 1:
-                i, j, way = a, b, candidate
+                i, j, direction = a, b, candidate
                 break
     return path

@@ -1,4 +1,4 @@
-"""The lattice: nodes 0.25 m apart, free where the agent's disc stands clear of everything."""
+"""Lattice of nodes 0.25 m apart, free where the agent's disc keeps clear of all polygons."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 
     from internav_data.records import House, Vec2
 
-_WAYS = {(1, 0): 0, (0, 1): 1, (-1, 0): 2, (0, -1): 3}
+_DIRECTIONS = {(1, 0): 0, (0, 1): 1, (-1, 0): 2, (0, -1): 3}
 
 
 class Lattice:
-    """Where the agent can stand and step: node (i, j) lies at (0.25 i, 0.25 j) m.
+    """Nodes and edges on which the agent can stand and step: (i, j) lies at (0.25 i, 0.25 j) m.
 
     A node is free when the disc keeps its distance from every polygon, an edge when the swept disc
     does; exact distances, no bitmap. Blockers are *counted*, so that adding or removing a group of
@@ -32,7 +32,7 @@ class Lattice:
     Parameters
     ----------
     blockers : (3, nx, ny) int32
-        How many things block each node, its edge to +x and its edge to +y.
+        Number of polygons that block each node, its edge to +x and its edge to +y.
     """
 
     __slots__ = ("_blockers", "_groups", "_next")
@@ -44,14 +44,14 @@ class Lattice:
 
     @staticmethod
     def of(house: House) -> Lattice:
-        """Build the lattice of a house: its walls and furniture, no obstacles."""
+        """Return the lattice of a house: its walls and furniture, no obstacles."""
         return Lattice.of_polygons(house_footprints(house), house.outline)
 
     @staticmethod
     def of_polygons(polygons: Polygons, outline: Sequence[Vec2] | NDArray[np.float64]) -> Lattice:
-        """Build a lattice over a simple polygon (n, 2): nodes outside it are blocked for good.
+        """Return a lattice over a simple polygon; nodes outside it are blocked for good.
 
-        It reaches from (0, 0) to the outline's largest x and y.
+        The lattice reaches from (0, 0) to the outline's largest x and y; `outline` (n, 2), metres.
         """
         corners = np.ascontiguousarray(outline, dtype=np.float64).reshape(-1, 2)
         # A millionth of a step: an outline that ends on a node row keeps that row.
@@ -69,11 +69,11 @@ class Lattice:
 
     @property
     def free(self) -> NDArray[np.bool_]:
-        """Where the disc can stand, (nx, ny)."""
+        """Nodes on which the disc can stand, (nx, ny) bool."""
         return self._blockers[grid.NODE] == 0
 
     def add(self, polygons: Polygons) -> int:
-        """Put a group of convex polygons in the way; returns the handle that removes it."""
+        """Block nodes and edges by a group of polygons; return the handle that removes it."""
         grid.mark(self._blockers, polygons.vertices, polygons.offsets, SPACING_M, CLEARANCE_M, 1)
         handle = self._next
         self._groups[handle] = polygons
@@ -81,7 +81,7 @@ class Lattice:
         return handle
 
     def remove(self, handle: int) -> None:
-        """Take a group away again.
+        """Remove a group of polygons.
 
         Raises
         ------
@@ -104,30 +104,49 @@ class Lattice:
         return other
 
     def distances(self, i: int, j: int) -> NDArray[np.int32]:
-        """Count steps from every node to node (i, j), shape (nx, ny); -1 where cut off.
+        """Return the steps from every node to node (i, j), (nx, ny) int32; -1 where cut off.
 
-        A blocked (i, j) is cut off from everything, itself included.
+        A blocked (i, j) is cut off from all nodes, itself included.
+
+        Raises
+        ------
+        UsageError
+            The node does not exist.
         """
         self._check(i, j)
         steps: NDArray[np.int32] = grid.steps_to(self._blockers, i, j)
         return steps
 
     def distance(self, start: tuple[int, int], goal: tuple[int, int]) -> int | None:
-        """Count steps between two nodes; None where there is no way."""
+        """Return the steps between two nodes; None without a path.
+
+        Raises
+        ------
+        UsageError
+            One of the nodes does not exist.
+        """
         self._check(*start)
         self._check(*goal)
         steps = int(grid.steps_between(self._blockers, *start, *goal))
         return None if steps < 0 else steps
 
     def components(self) -> NDArray[np.int32]:
-        """Label every node's component, (nx, ny), in order of first nodes; -1 where blocked."""
+        """Return the component of every node, (nx, ny) int32; -1 where blocked.
+
+        Components are numbered in order of their first node.
+        """
         labels: NDArray[np.int32] = grid.components(self._blockers)
         return labels
 
     def path(self, start: tuple[int, int], goal: tuple[int, int]) -> NDArray[np.int64] | None:
-        """Nodes (n, 2) of a shortest path, both ends included; None where there is none.
+        """Return nodes (n, 2) int64 of a shortest path, both ends included; None without one.
 
         Among shortest paths, one that goes straight on as long as that is shortest.
+
+        Raises
+        ------
+        UsageError
+            One of the nodes does not exist.
         """
         self._check(*start)
         self._check(*goal)
@@ -138,14 +157,21 @@ class Lattice:
         return nodes
 
     def edge_free(self, i: int, j: int, di: int, dj: int) -> bool:
-        """Whether the disc can step from node (i, j) by (di, dj), one of the four neighbours."""
+        """Return whether the disc can step from node (i, j) by (di, dj), to one of four neighbours.
+
+        Raises
+        ------
+        UsageError
+            The node does not exist, or (di, dj) is no step.
+        """
         self._check(i, j)
-        way = _WAYS.get((di, dj))
-        if way is None:
+        direction = _DIRECTIONS.get((di, dj))
+        if direction is None:
             raise UsageError(
-                f"Lattice.edge_free: ({di}, {dj}) is no step; expected one of {sorted(_WAYS)}."
+                f"Lattice.edge_free: ({di}, {dj}) is no step; "
+                f"expected one of {sorted(_DIRECTIONS)}."
             )
-        return bool(grid.open_edge(self._blockers, i, j, way))
+        return bool(grid.open_edge(self._blockers, i, j, direction))
 
     def _check(self, i: int, j: int) -> None:
         nx, ny = self.shape

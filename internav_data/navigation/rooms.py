@@ -1,4 +1,4 @@
-"""Rooms as a graph: which room a point is in, and every way from room to room."""
+"""Rooms as a graph: the room of a point, and every path from room to room."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ if TYPE_CHECKING:
     from internav_data.records import House, Vec2
 
 PATHS_AT_MOST = 64
-"""More room paths or node paths than this are cut off, and flagged."""
+"""Maximum number of room paths and of node paths; further ones are left out, and flagged."""
 
 RoomPath = tuple[int, ...]
+"""Room ids from start to goal, no room twice."""
 
 
 def _contains(polygon: Sequence[Vec2], x: float, y: float) -> bool:
-    """Half-open crossing rule: of polygons that tile the plane, exactly one holds any point."""
+    """Return whether a polygon holds a point: half-open, so that of tiles exactly one does."""
     odd = False
     previous = polygon[-1]
     for corner in polygon:
@@ -37,7 +38,7 @@ def _contains(polygon: Sequence[Vec2], x: float, y: float) -> bool:
 
 
 def room_of(house: House, x: float, y: float) -> int:
-    """Room id of the room that holds a point, OUTSIDE (-1) where none does.
+    """Return the id of the room that holds a point (metres), OUTSIDE (-1) where none does.
 
     A point on the line between two rooms belongs to the one at larger x (upright lines) or larger
     y (level lines).
@@ -49,7 +50,10 @@ def room_of(house: House, x: float, y: float) -> int:
 
 
 def rooms_of(house: House, points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return the same for many points (n, 2) at once, shape (n,) int64."""
+    """Return the rooms of many points, (n,) int64, as `room_of` does for one.
+
+    `points` (n, 2) float64, metres.
+    """
     x, y = points[:, 0], points[:, 1]
     found = np.full(len(points), OUTSIDE, dtype=np.int64)
     for room in reversed(house.rooms):
@@ -71,7 +75,7 @@ def _neighbours(house: House) -> dict[int, list[int]]:
 def _best_rest(
     graph: Mapping[int, Sequence[int]], prefix: RoomPath, goal: int, banned: frozenset[int]
 ) -> RoomPath | None:
-    """Shortest simple way on from a prefix to the goal, by ids among equals.
+    """Return the shortest simple path that begins with a prefix, the smallest ids among equals.
 
     `banned` are rooms that may not be the very next one.
     """
@@ -104,13 +108,14 @@ def _best_rest(
 def room_paths(
     house: House, a: int, b: int, limit: int = PATHS_AT_MOST
 ) -> tuple[tuple[RoomPath, ...], bool]:
-    """All ways from room a to room b through open doors, no room twice.
+    """Return the paths from room a to room b through open doors, no room twice.
 
-    Sorted by (number of rooms, room ids); the first `limit` of them, and whether there are more.
+    Sorted by (number of rooms, room ids): the first `limit` of them, and whether there are more.
 
-    Each path found splits the rest by where they leave it, and each part's own best is found by
-    one breadth-first search (Lawler, "A procedure for computing the K best solutions", 1972). So
-    the work is bounded by limit x rooms searches, however many paths a dense graph has.
+    Each path found splits the others by the room at which they leave it, and each part's own best
+    is found by one breadth-first search (Lawler, "A procedure for computing the K best solutions to
+    discrete optimization problems", 1972). So the work is bounded by limit x rooms searches,
+    however many paths a dense graph has.
     """
     graph = _neighbours(house)
     first = _best_rest(graph, (a,), b, frozenset())
@@ -137,9 +142,10 @@ def node_paths(
     paths: Iterable[RoomPath],
     limit: int = PATHS_AT_MOST,
 ) -> tuple[tuple[NodePath, ...], bool]:
-    """Every choice of open doors along each room path: start, door centres, goal.
+    """Return every choice of open doors along each room path: start, door centres, goal.
 
-    In the order of `paths`, then of door ids; the first `limit`, and whether there are more.
+    In the order of `paths`, then of door ids: the first `limit`, and whether there are more.
+    Positions in metres.
     """
     doors: dict[tuple[int, int], list[int]] = {}
     centres: dict[int, Vec2] = {}

@@ -338,7 +338,7 @@ class World:
     def path(self) -> tuple[float, NDArray[np.float64]] | None:
         """Any-angle distance to the goal and the way's points (n, 2); None when cut off."""
         graph, loose = self._loose()
-        found = graph.way(self.position, self.goal_point, loose)
+        found = graph.length_and_path(self.position, self.goal_point, loose)
         return None if found is None else (round_m(found[0]), found[1])
 
     def _loose(self) -> tuple[TangentGraph, Polygons]:

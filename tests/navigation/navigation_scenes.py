@@ -26,7 +26,7 @@ def turned(x, y, width, depth, degrees):
     return [(x + c * a - s * b, y + s * a + c * b) for a, b in corners]
 
 
-def round_thing(x, y, radius):
+def round_object(x, y, radius):
     return [
         (x + radius * math.cos(k * math.pi / 8), y + radius * math.sin(k * math.pi / 8))
         for k in range(16)
@@ -64,16 +64,16 @@ def convex(draw, width=6.0, height=4.0):
 
 
 @st.composite
-def cluttered(draw, most=8):
+def cluttered(draw, max_objects=8):
     """A room of 6 x 4 m, halved by a wall with a door, with convex things in it."""
     door = draw(st.integers(50, 250)) / 100
     wide = draw(st.sampled_from([0.39, 0.399, 0.4, 0.77, 1.0]))
     walls = [rectangle(2.94, 0.0, 3.06, door), rectangle(2.94, door + wide, 3.06, 4.0)]
-    things = draw(st.lists(convex(), max_size=most))
-    return [*ring(6.0, 4.0), *walls], things
+    objects = draw(st.lists(convex(), max_size=max_objects))
+    return [*ring(6.0, 4.0), *walls], objects
 
 
-def random_rooms(seed, columns=4, rows=2, things=60, size=(5.0, 7.0)):
+def random_rooms(seed, columns=4, rows=2, objects=60, size=(5.0, 7.0)):
     """Polygons of a house: rooms on a grid, a door in each wall between two, things strewn."""
     rng = np.random.default_rng(seed)
     width, depth = size
@@ -89,10 +89,10 @@ def random_rooms(seed, columns=4, rows=2, things=60, size=(5.0, 7.0)):
             low, high = c * width + HALF, (c + 1) * width - HALF
             polygons.append(rectangle(low, r * depth - HALF, at, r * depth + HALF))
             polygons.append(rectangle(at + 1, r * depth - HALF, high, r * depth + HALF))
-    for _ in range(things):
+    for _ in range(objects):
         x, y = (float(v) for v in rng.uniform((0, 0), (columns * width, rows * depth)))
         if rng.random() < 0.2:
-            polygons.append(round_thing(x, y, float(rng.uniform(0.1, 0.3))))
+            polygons.append(round_object(x, y, float(rng.uniform(0.1, 0.3))))
         else:
             w, d = (float(v) for v in rng.uniform((0.3, 0.3), (1.6, 0.8)))
             polygons.append(turned(x, y, w, d, 15 * int(rng.integers(24))))
@@ -104,7 +104,7 @@ def _table():
     return Asset("Table_0", "Table", (1.2, 0.8, 0.76), 20.0, 0.6, True, False, True, True, (top,))
 
 
-def house_of(rooms, doors, graph, walls=(), things=(), outline=None):
+def house_of(rooms, doors, graph, walls=(), objects=(), outline=None):
     """A house record that holds what navigation reads of it."""
     asset = _table()
     return House(
@@ -120,7 +120,7 @@ def house_of(rooms, doors, graph, walls=(), things=(), outline=None):
         walls=tuple(walls),
         objects=tuple(
             SceneObject(n, "Table_0", "Table", 0, x, y, 0.0, yaw_quaternion(yaw), -1, -1)
-            for n, (x, y, yaw) in enumerate(things)
+            for n, (x, y, yaw) in enumerate(objects)
         ),
         materials=(),
         room_graph=tuple(graph),
@@ -137,7 +137,7 @@ def graph_house(edges, count):
     return house_of(rooms, doors, edges)
 
 
-def two_rooms(things=()):
+def two_rooms(objects=()):
     """Interior 0..6 x 0..4 m; a wall at x = 3 with a door of 1 m in its middle."""
     low, high = -HALF, 4.0 + HALF
     walls = [
@@ -152,4 +152,4 @@ def two_rooms(things=()):
     rooms = {0: rectangle(low, low, 3.0, high), 1: rectangle(3.0, low, 6 + HALF, high)}
     doors = [Door(0, (0, 1), "single", 3.0, 2.0, 90.0, 1.0, 2.1, True)]
     outline = tuple(rectangle(low, low, 6 + HALF, high))
-    return house_of(rooms, doors, [(0, 1)], walls, things, outline)
+    return house_of(rooms, doors, [(0, 1)], walls, objects, outline)

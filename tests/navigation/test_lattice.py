@@ -16,7 +16,7 @@ from internav_data.records.errors import UsageError
 
 ROOM = rectangle(0.0, 0.0, 3.0, 2.0)
 ELL = [(0.0, 0.0), (3.0, 0.0), (3.0, 1.1), (1.6, 1.1), (1.6, 2.0), (0.0, 2.0)]
-WAYS = ((1, 0), (0, 1), (-1, 0), (0, -1))
+STEPS = ((1, 0), (0, 1), (-1, 0), (0, -1))
 small = convex(3.0, 2.0)
 
 
@@ -24,12 +24,24 @@ def lattice_of(polygons, outline=ROOM):
     return Lattice.of_polygons(Polygons.of(polygons), outline)
 
 
+def edges(lattice):
+    """Every node's edges to its four neighbours."""
+    nx_, ny = lattice.shape
+    return [
+        [lattice.edge_free(i, j, di, dj) for di, dj in STEPS] for i in range(nx_) for j in range(ny)
+    ]
+
+
+def same(first, second):
+    return np.array_equal(first.free, second.free) and edges(first) == edges(second)
+
+
 def check(lattice, graph):
     """Nodes, edges, steps, components and paths are those of the graph."""
     free = {(int(i), int(j)) for i, j in np.argwhere(lattice.free)}
     assert free == set(graph)
     for i, j in free:
-        for di, dj in WAYS:
+        for di, dj in STEPS:
             assert lattice.edge_free(i, j, di, dj) == graph.has_edge((i, j), (i + di, j + dj))
     labels = lattice.components()
     parts = sorted(nx.connected_components(graph), key=min)
@@ -59,14 +71,14 @@ def test_nodes_edges_and_steps_are_those_of_shapely_and_networkx(polygons, outli
 
 
 def test_a_furnished_house_is_that_of_shapely_and_networkx():
-    polygons, outline = random_rooms(3, columns=2, rows=1, things=14)
+    polygons, outline = random_rooms(3, columns=2, rows=1, objects=14)
     lattice = Lattice.of_polygons(polygons, outline)
     assert lattice.shape == (41, 29)
     check(lattice, lattice_graph(list(polygons), outline, lattice.shape))
 
 
 def test_of_a_house_sees_its_walls_and_furniture_but_not_its_lintels():
-    house = two_rooms(things=[(1.5, 3.5, 30.0)])
+    house = two_rooms(objects=[(1.5, 3.5, 30.0)])
     lattice = Lattice.of(house)
     assert lattice.shape == (25, 17)
     walls = [rectangle(w.x_min, w.y_min, w.x_max, w.y_max) for w in house.walls if w.z_min < 1.8]
@@ -121,14 +133,16 @@ groups = st.lists(st.lists(small, max_size=3), min_size=1, max_size=5)
 def test_adding_and_removing_equals_building_anew(fixed, later, data):
     lattice = lattice_of(fixed)
     held = {lattice.add(Polygons.of(group)): group for group in later}
-    for handle in data.draw(st.lists(st.sampled_from(sorted(held)), unique=True)):
+    # All go in the end: a count that is wrong by one shows at the latest when it should be zero.
+    for handle in data.draw(st.permutations(sorted(held))):
+        anew = lattice_of([*fixed, *(p for group in held.values() for p in group)])
+        assert same(lattice, anew)
         lattice.remove(handle)
         del held[handle]
-    anew = lattice_of([*fixed, *(p for group in held.values() for p in group)])
-    assert np.array_equal(lattice._blockers, anew._blockers)
+    assert same(lattice, lattice_of(fixed))
 
 
-def test_copies_go_their_own_ways():
+def test_copies_change_apart_from_each_other():
     lattice = lattice_of(ring(3.0, 2.0))
     handle = lattice.add(Polygons.of([rectangle(1.0, 0.0, 1.2, 2.0)]))
     other = lattice.copy()
@@ -138,15 +152,15 @@ def test_copies_go_their_own_ways():
     other.remove(again)
     assert other.distance((1, 1), (11, 1)) == 10
     lattice.remove(handle)
-    assert np.array_equal(lattice._blockers, other._blockers)
+    assert same(lattice, other)
 
 
 def test_what_lies_off_the_lattice_costs_and_changes_nothing():
     lattice = lattice_of(ring(3.0, 2.0))
-    before = lattice._blockers.copy()
+    before = lattice.copy()
     lattice.add(Polygons.of([rectangle(50.0, 50.0, 51.0, 51.0), rectangle(-9.0, 0.0, -8.0, 2.0)]))
     lattice.add(Polygons.of([]))
-    assert np.array_equal(lattice._blockers, before)
+    assert same(lattice, before)
 
 
 def test_a_path_goes_straight_on_where_it_can():

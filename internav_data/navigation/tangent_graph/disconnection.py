@@ -1,11 +1,14 @@
-"""Sealed or not: whether obstacles close every way of the disc between two points, exactly.
+"""Disconnection: exact proof that obstacles close every path of the disc between two points.
 
 The disc passes between two convex polygons exactly when they are two radii apart. Nearer ones are
-linked: no way of the disc crosses the line between them. Obstacles and what stands in the house
+linked: no path of the disc crosses the line between them. Obstacles and the house's own polygons
 form a graph of links, and start and goal are apart exactly when some cycle of it winds round one of
-them only, that is, crosses any curve from start to goal an odd number of times. With a way that
-was clear before the obstacles came as that curve, everything the house holds is crossed zero times
-and each cluster of it shrinks to one node, so only the obstacles' few links are looked at.
+them only, that is, crosses any curve from start to goal an odd number of times. With a path that
+was clear before the obstacles came as that curve, links of the house are crossed zero times and
+each cluster of its polygons shrinks to one node, so only the obstacles' few links are looked at.
+
+A union-find that stores the parity of crossings from each node to its root finds such a cycle.
+Arrays of polygons are those of `boundary_arcs`.
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ import numpy as np
 from numba import njit
 
 from internav_data.geometry.planar import cross, inside, segments_cross
-from internav_data.navigation.tangent_graph.arcs import near_ids, nearest
+from internav_data.navigation.tangent_graph.boundary_arcs import near_ids, nearest
 
 if TYPE_CHECKING:
     from internav_data.core.typing import Floats, Ints
@@ -25,7 +28,11 @@ if TYPE_CHECKING:
 
 @njit(cache=True)
 def root_of(parent: Ints, parity: Ints, k: int) -> tuple[int, int]:
-    """Return the root of a node's set and the parity of the way there; shortens that way."""
+    """Return the root of node k's set and the parity of crossings on the chain of parents to it.
+
+    `parent` and `parity` are (nodes,) int64. Every node of the chain is linked straight to the root
+    (path compression).
+    """
     root, odd = k, 0
     while parent[root] != root:
         odd ^= parity[root]
@@ -41,7 +48,10 @@ def root_of(parent: Ints, parity: Ints, k: int) -> tuple[int, int]:
 
 @njit(cache=True)
 def unite(parent: Ints, parity: Ints, a: int, b: int, odd: int) -> bool:
-    """Link two nodes by a curve of a parity; False where that closes an odd cycle."""
+    """Link nodes a and b by a curve of parity `odd`; return False where that closes an odd cycle.
+
+    `parent` and `parity` are (nodes,) int64.
+    """
     root_a, odd_a = root_of(parent, parity, a)
     root_b, odd_b = root_of(parent, parity, b)
     if root_a == root_b:
@@ -55,7 +65,11 @@ def unite(parent: Ints, parity: Ints, a: int, b: int, odd: int) -> bool:
 def closest(
     first: Floats, start: int, stop: int, second: Floats, begin: int, end: int
 ) -> tuple[float, float, float, float, float]:
-    """Distance of two convex polygons and a point of each that far apart: d, ax, ay, bx, by."""
+    """Return the distance of two convex polygons and a point of each that far apart, metres.
+
+    The polygons are `first[start:stop]` and `second[begin:end]`, (n, 2) float64, metres; returned
+    are distance, x and y on the first, x and y on the second.
+    """
     best, px, py, qx, qy = math.inf, 0.0, 0.0, 0.0, 0.0
     for k in range(start, stop):
         x, y = first[k, 0], first[k, 1]
@@ -90,7 +104,10 @@ def closest(
 
 @njit(cache=True)
 def clusters(vertices: Floats, offsets: Ints, boxes: Floats, gap: float) -> Ints:
-    """Label the clusters of polygons that lie less than `gap` from each other, (polygons,)."""
+    """Return the cluster of every polygon, (polygons,) int64: the number of one of its polygons.
+
+    Polygons less than `gap` metres from each other share a cluster.
+    """
     count = len(boxes)
     parent, parity = np.arange(count), np.zeros(count, dtype=np.int64)
     for a in range(count):
@@ -107,17 +124,17 @@ def clusters(vertices: Floats, offsets: Ints, boxes: Floats, gap: float) -> Ints
 
 
 @njit(cache=True)
-def _crossings(way: Floats, ax: float, ay: float, bx: float, by: float) -> int:
+def _crossings(path: Floats, ax: float, ay: float, bx: float, by: float) -> int:
     odd = 0
-    for k in range(len(way) - 1):
-        if segments_cross(way[k, 0], way[k, 1], way[k + 1, 0], way[k + 1, 1], ax, ay, bx, by):
+    for k in range(len(path) - 1):
+        if segments_cross(path[k, 0], path[k, 1], path[k + 1, 0], path[k + 1, 1], ax, ay, bx, by):
             odd ^= 1
     return odd
 
 
 @njit(cache=True)
-def closes(
-    way: Floats,
+def disconnects(
+    path: Floats,
     vertices: Floats,
     offsets: Ints,
     boxes: Floats,
@@ -127,9 +144,20 @@ def closes(
     added_boxes: Floats,
     gap: float,
 ) -> bool:
-    """Whether added polygons cut the ends of a way (n, 2) apart that was clear without them.
+    """Return whether added polygons disconnect the ends of a path that was clear without them.
 
-    `labels` are the clusters of the polygons that were there before.
+    Parameters
+    ----------
+    path
+        Points (n, 2) float64, metres, on no corner of any polygon.
+    vertices, offsets, boxes
+        Polygons that were there before.
+    labels
+        Their clusters, (polygons,) int64, as `clusters` returns them.
+    added, added_offsets, added_boxes
+        Polygons that come, as vertices, offsets and boxes.
+    gap
+        Two radii of the disc, metres: nearer polygons let nothing pass.
     """
     count, new = len(boxes), len(added_boxes)
     parent, parity = np.arange(count + new), np.zeros(count + new, dtype=np.int64)
@@ -142,8 +170,10 @@ def closes(
         for b in near_ids(boxes, added_boxes[a], gap):
             d, px, py, qx, qy = closest(added, start, stop, vertices, offsets[b], offsets[b + 1])
             if d < gap:
-                odd = _crossings(way, middles[a, 0], middles[a, 1], px, py)
-                odd ^= _crossings(way, px, py, qx, qy)
+                # From an obstacle's middle to its own nearest point, then over the gap. Inside the
+                # house's cluster no further crossings are counted: the path was clear of it.
+                odd = _crossings(path, middles[a, 0], middles[a, 1], px, py)
+                odd ^= _crossings(path, px, py, qx, qy)
                 if not unite(parent, parity, labels[b], count + a, odd):
                     return True
         for b in near_ids(added_boxes, added_boxes[a], gap):
@@ -153,9 +183,9 @@ def closes(
                 added, start, stop, added, added_offsets[b], added_offsets[b + 1]
             )
             if d < gap:
-                odd = _crossings(way, middles[a, 0], middles[a, 1], px, py)
-                odd ^= _crossings(way, px, py, qx, qy)
-                odd ^= _crossings(way, qx, qy, middles[b, 0], middles[b, 1])
+                odd = _crossings(path, middles[a, 0], middles[a, 1], px, py)
+                odd ^= _crossings(path, px, py, qx, qy)
+                odd ^= _crossings(path, qx, qy, middles[b, 0], middles[b, 1])
                 if not unite(parent, parity, count + b, count + a, odd):
                     return True
     return False

@@ -15,35 +15,39 @@ if TYPE_CHECKING:
     from internav_data.geometry import Polygons
 
 CELL_M = 0.5
+"""Side of a grid cell."""
 SLACK_M = 1e-8
 """Tangents touch what they turn round: a segment may come this much nearer than the radius."""
 
 
-class Scene(NamedTuple):
-    """Convex polygons, their boxes and, per grid cell, those within a reach of it.
-
-    Shapes: vertices (n, 2), metres; offsets (polygons + 1,); boxes (polygons, 4) as x_min, y_min,
-    x_max, y_max; starts (cells_x * cells_y + 1,) into ids: the polygons of each cell.
-    """
+class PolygonGrid(NamedTuple):
+    """Convex polygons, their boxes and, per grid cell, those within a reach of it."""
 
     vertices: Floats
+    """(n, 2) float64, metres: all polygons' corners, each polygon's counter-clockwise."""
     offsets: Ints
+    """(polygons + 1,) int64: polygon k has the rows offsets[k]:offsets[k + 1]."""
     boxes: Floats
+    """(polygons, 4) float64, metres: x_min, y_min, x_max, y_max."""
     low_x: float
     low_y: float
+    """Lower corner of cell (0, 0), metres."""
     cells_x: int
     cells_y: int
+    """Number of cells along x and y; cell (i, j) has the number i * cells_y + j."""
     starts: Ints
+    """(cells_x * cells_y + 1,) int64 into `ids`."""
     ids: Ints
+    """(m,) int64: polygons of each cell."""
 
 
-def scene_of(polygons: Polygons, reach: float) -> Scene:
-    """Index polygons for segments that ask about everything within `reach` of them, metres."""
+def index_polygons(polygons: Polygons, reach: float) -> PolygonGrid:
+    """Return a grid over polygons that tests segments for clearances up to `reach` metres."""
     boxes = boxes_of(polygons.vertices, polygons.offsets)
     if not len(boxes):
         none = np.empty(0, dtype=np.int64)
         starts = np.zeros(2, dtype=np.int64)
-        return Scene(polygons.vertices, polygons.offsets, boxes, 0.0, 0.0, 1, 1, starts, none)
+        return PolygonGrid(polygons.vertices, polygons.offsets, boxes, 0.0, 0.0, 1, 1, starts, none)
     # A micrometre more: a point on the line between two cells may be given to either.
     margin = reach + 1e-6
     low_x, low_y = (float(v) - margin for v in boxes[:, :2].min(axis=0))
@@ -51,14 +55,17 @@ def scene_of(polygons: Polygons, reach: float) -> Scene:
     cells_x = max(1, math.ceil((high_x - low_x) / CELL_M))
     cells_y = max(1, math.ceil((high_y - low_y) / CELL_M))
     starts, ids = _fill(boxes, margin, low_x, low_y, cells_x, cells_y)
-    return Scene(
+    return PolygonGrid(
         polygons.vertices, polygons.offsets, boxes, low_x, low_y, cells_x, cells_y, starts, ids
     )
 
 
 @njit(cache=True)
 def boxes_of(vertices: Floats, offsets: Ints) -> Floats:
-    """Bounding boxes (polygons, 4): x_min, y_min, x_max, y_max."""
+    """Return the polygons' bounding boxes, (polygons, 4) float64: x_min, y_min, x_max, y_max.
+
+    `vertices` (n, 2) float64, metres; `offsets` (polygons + 1,) int64.
+    """
     boxes = np.empty((len(offsets) - 1, 4))
     for k in range(len(boxes)):
         part = vertices[offsets[k] : offsets[k + 1]]
@@ -107,7 +114,10 @@ def touches(
     stop: int,
     limit: float,
 ) -> bool:
-    """Whether a convex polygon comes nearer than `limit` to segment ab."""
+    """Return whether a convex polygon comes nearer than `limit` metres to segment ab.
+
+    The polygon is `vertices[start:stop]`, (n, 2) float64, metres.
+    """
     dx, dy = bx - ax, by - ay
     length = math.sqrt(dx * dx + dy * dy)
     if length > 0.0:
@@ -125,9 +135,15 @@ def touches(
 
 
 @njit(cache=True)
-def segment_clear(scene: Scene, ax: float, ay: float, bx: float, by: float, limit: float) -> bool:
-    """Whether every polygon keeps at least `limit` (<= the scene's reach) from segment ab."""
-    x, y = (ax - scene.low_x) / CELL_M, (ay - scene.low_y) / CELL_M
+def segment_clear(
+    grid: PolygonGrid, ax: float, ay: float, bx: float, by: float, limit: float
+) -> bool:
+    """Return whether every polygon keeps at least `limit` metres from segment ab.
+
+    `limit` must not exceed the grid's reach. Cells are walked from a to b as in Amanatides and
+    Woo, "A fast voxel traversal algorithm for ray tracing", 1987.
+    """
+    x, y = (ax - grid.low_x) / CELL_M, (ay - grid.low_y) / CELL_M
     dx, dy = (bx - ax) / CELL_M, (by - ay) / CELL_M
     i, j = math.floor(x), math.floor(y)
     last_i, last_j = math.floor(x + dx), math.floor(y + dy)
@@ -137,12 +153,12 @@ def segment_clear(scene: Scene, ax: float, ay: float, bx: float, by: float, limi
     to_i = (i + (step_i > 0) - x) / dx if i != last_i else math.inf
     to_j = (j + (step_j > 0) - y) / dy if j != last_j else math.inf
     for _ in range(abs(last_i - i) + abs(last_j - j) + 1):
-        if 0 <= i < scene.cells_x and 0 <= j < scene.cells_y:
-            cell = i * scene.cells_y + j
-            for n in range(scene.starts[cell], scene.starts[cell + 1]):
-                k = scene.ids[n]
-                start, stop = scene.offsets[k], scene.offsets[k + 1]
-                if touches(ax, ay, bx, by, scene.vertices, start, stop, limit):
+        if 0 <= i < grid.cells_x and 0 <= j < grid.cells_y:
+            cell = i * grid.cells_y + j
+            for n in range(grid.starts[cell], grid.starts[cell + 1]):
+                k = grid.ids[n]
+                start, stop = grid.offsets[k], grid.offsets[k + 1]
+                if touches(ax, ay, bx, by, grid.vertices, start, stop, limit):
                     return False
         if i == last_i and j == last_j:
             break
@@ -166,7 +182,10 @@ def segment_clear_of(
     by: float,
     limit: float,
 ) -> bool:
-    """Ask the same of a few polygons without a grid."""
+    """Return whether each of a few polygons, without a grid, keeps `limit` metres from segment ab.
+
+    `vertices` (n, 2) float64, metres; `offsets` (polygons + 1,) int64; `boxes` (polygons, 4).
+    """
     low_x, high_x = min(ax, bx) - limit, max(ax, bx) + limit
     low_y, high_y = min(ay, by) - limit, max(ay, by) + limit
     for k in range(len(boxes)):
@@ -182,10 +201,13 @@ def segment_clear_of(
 
 
 @njit(cache=True)
-def way_clear_of(
+def path_clear_of(
     points: Floats, vertices: Floats, offsets: Ints, boxes: Floats, limit: float
 ) -> bool:
-    """Ask the same of a way (n, 2), of one point or more, leg by leg."""
+    """Return whether each polygon keeps at least `limit` metres from a path.
+
+    `points` (n, 2) float64, metres, n >= 1; polygons as for `segment_clear_of`.
+    """
     for k in range(max(1, len(points) - 1)):
         m = min(k + 1, len(points) - 1)
         ax, ay, bx, by = points[k, 0], points[k, 1], points[m, 0], points[m, 1]
@@ -198,7 +220,10 @@ def way_clear_of(
 def point_clear(
     vertices: Floats, offsets: Ints, boxes: Floats, x: float, y: float, limit: float
 ) -> bool:
-    """Whether every polygon keeps at least `limit` from a point: exact, as the lattice judges."""
+    """Return whether every polygon keeps at least `limit` metres from a point, as for the lattice.
+
+    `vertices` (n, 2) float64, metres; `offsets` (polygons + 1,) int64; `boxes` (polygons, 4).
+    """
     for k in range(len(boxes)):
         if (
             boxes[k, 0] - limit <= x <= boxes[k, 2] + limit

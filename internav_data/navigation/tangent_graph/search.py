@@ -1,12 +1,12 @@
-"""A* over taut strings: the shortest way of the disc among a house's polygons and obstacles.
+"""A* over taut strings: the shortest path of the disc among a house's polygons and obstacles.
 
-A state is a tangent about to be taken ("leaving slot s at progress t"); its cost is the way to
-there. The house's own tangents stand ready. Those to the start, to the goal and to obstacles'
-corners are listed when their slot is first reached, and tested for clearness only when their turn
-comes, so that what lies outside the ellipse of the answer costs next to nothing. Obstacles also
-close tangents of the house (tested in turn) and parts of its arcs (`shadows`).
-
-The table of an A* search over tangents: states, their costs and a heap of the open ones.
+A state is a tangent about to be taken ("leaving directed arc a at progress t"); its cost is the
+length of the path to there, its key that length plus the tangent's plus the straight line from its
+end to the goal, which never overestimates. The house's own tangents stand ready. Those to the
+start, to the goal and to obstacles' corners are listed when their directed arc is first reached,
+and tested for clearness only when they come first in the heap, so that what lies outside the
+ellipse of the answer costs next to nothing. Obstacles also close tangents of the house (tested in
+turn) and parts of its arcs (`Query.forbidden`).
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numba import njit
 
-from internav_data.navigation.tangent_graph.arcs import HALF
+from internav_data.navigation.tangent_graph.boundary_arcs import HALF
 from internav_data.navigation.tangent_graph.polygon_grid import (
     SLACK_M,
-    Scene,
+    PolygonGrid,
     segment_clear,
     segment_clear_of,
 )
@@ -45,33 +45,47 @@ if TYPE_CHECKING:
 
 
 OUT_OF_HEAP, CLOSED = -1, -2
+"""Values of `SearchTable.place` for states that are not in the heap."""
 
 
-class States(NamedTuple):
-    """Tangents on the table: the house's own first, then those listed during the search.
+class SearchTable(NamedTuple):
+    """State of one search: a row a tangent, the house's own first, then those listed on the way.
 
-    Shapes (capacity,) each but data (capacity, 7); `link` chains the listed ones of a slot, whose
-    first is in `first` (slots,). `heap` holds states by `key`, `place` is where in it they are.
-    `sizes`: number of states, length of the heap.
+    Arrays have room for `capacity` tangents; integers are int64, other numbers float64.
     """
 
     target: Ints
+    """(capacity,): directed arc of arrival, or GOAL."""
     data: Floats
+    """(capacity, 7): see `tangents`."""
     cost: Floats
+    """(capacity,): length of the best path to where the tangent leaves, metres."""
     key: Floats
+    """(capacity,): cost + length + straight line to the goal, metres."""
     parent: Ints
+    """(capacity,): tangent before this one on that path, -1 for the start."""
     place: Ints
+    """(capacity,): position in the heap, OUT_OF_HEAP or CLOSED."""
     tested: NDArray[np.bool_]
+    """(capacity,): whether the tangent was found clear."""
     link: Ints
+    """(capacity,): next tangent listed of the same directed arc, -1 for none."""
     heap: Ints
+    """(capacity,): open tangents, a binary heap by `key`."""
     first: Ints
+    """(directed arcs,): first tangent listed of each, -1 for none."""
     listed: NDArray[np.bool_]
+    """(directed arcs,): whether its further tangents are listed."""
     sizes: Ints
+    """(2,): number of tangents, length of the heap."""
 
 
 @njit(cache=True)
-def states_of(tangents: Tangents, slots: int, extra: int) -> States:
-    """Lay out the table with room for `extra` listed tangents."""
+def new_table(tangents: Tangents, directed_arcs: int, extra: int) -> SearchTable:
+    """Return a table of the house's tangents with room for `extra` more.
+
+    `directed_arcs` is the number of directed arcs.
+    """
     own = len(tangents.target)
     size = own + extra
     # Only the house's part is filled in: pages that are never touched cost nothing.
@@ -82,7 +96,7 @@ def states_of(tangents: Tangents, slots: int, extra: int) -> States:
     tested = np.empty(size, dtype=np.bool_)
     tested[:own] = False
     sizes = np.array([own, 0])
-    return States(
+    return SearchTable(
         target,
         data,
         cost,
@@ -92,155 +106,163 @@ def states_of(tangents: Tangents, slots: int, extra: int) -> States:
         tested,
         np.empty(size, dtype=np.int64),
         np.empty(size, dtype=np.int64),
-        np.full(slots, -1),
-        np.zeros(slots, dtype=np.bool_),
+        np.full(directed_arcs, -1),
+        np.zeros(directed_arcs, dtype=np.bool_),
         sizes,
     )
 
 
 @njit(cache=True)
-def rise(states: States, state: int, at: int) -> None:
-    """Move a state up the heap from a hole."""
+def rise(table: SearchTable, state: int, at: int) -> None:
+    """Move a state up the heap from the hole at index `at`."""
     while at > 0:
         above = (at - 1) // 2
-        other = states.heap[above]
-        if states.key[other] <= states.key[state]:
+        other = table.heap[above]
+        if table.key[other] <= table.key[state]:
             break
-        states.heap[at] = other
-        states.place[other] = at
+        table.heap[at] = other
+        table.place[other] = at
         at = above
-    states.heap[at] = state
-    states.place[state] = at
+    table.heap[at] = state
+    table.place[state] = at
 
 
 @njit(cache=True)
-def pop(states: States) -> int:
-    """Take the state of least key; ties by the heap's own, deterministic order."""
-    best = states.heap[0]
-    states.place[best] = OUT_OF_HEAP
-    states.sizes[1] -= 1
-    size = states.sizes[1]
+def pop(table: SearchTable) -> int:
+    """Remove and return the state of the smallest key; ties by the heap's deterministic order."""
+    best = table.heap[0]
+    table.place[best] = OUT_OF_HEAP
+    table.sizes[1] -= 1
+    size = table.sizes[1]
     if size == 0:
         return best
-    last = states.heap[size]
+    last = table.heap[size]
     at = 0
     while True:
         child = 2 * at + 1
         if child >= size:
             break
-        if child + 1 < size and states.key[states.heap[child + 1]] < states.key[states.heap[child]]:
+        if child + 1 < size and table.key[table.heap[child + 1]] < table.key[table.heap[child]]:
             child += 1
-        if states.key[states.heap[child]] >= states.key[last]:
+        if table.key[table.heap[child]] >= table.key[last]:
             break
-        states.heap[at] = states.heap[child]
-        states.place[states.heap[at]] = at
+        table.heap[at] = table.heap[child]
+        table.place[table.heap[at]] = at
         at = child
-    states.heap[at] = last
-    states.place[last] = at
+    table.heap[at] = last
+    table.place[last] = at
     return best
 
 
 GOAL = -1
+"""Target of a tangent that ends at the goal."""
 ORDER_SLACK = 1e-9
 """Arriving and leaving in one direction (along a wall) may differ by rounding, radians."""
 
 
 class Query(NamedTuple):
-    """What one search looks at. Shapes: arcs (n, 6), the house's own first; obstacles' polygons.
-
-    shadow_starts (own arcs + 1,) into shadows (m, 2): closed parts of the house's own arcs, as
-    angles from the arc's middle, counter-clockwise.
-    """
+    """One question to the search: start, goal and obstacles, and the arcs that come with them."""
 
     own: int
-    arcs: Floats
+    """Number of the house's own arcs."""
+    boundary_arcs: Floats
+    """(n, 6) float64: the house's own arcs, then the obstacles'."""
     vertices: Floats
     offsets: Ints
     boxes: Floats
-    shadow_starts: Ints
-    shadows: Floats
+    """Obstacles' polygons, as arrays of `boundary_arcs`."""
+    forbidden_starts: Ints
+    """(own + 1,) int64 into `forbidden`."""
+    forbidden: Floats
+    """(m, 2) float64: parts of the house's own arcs that obstacles forbid, as angles from the arc's
+    middle, counter-clockwise, radians."""
     start: Floats
     goal: Floats
+    """(2,) float64: positions of the disc's centre, metres."""
     radius: float
+    """Radius of the disc, metres."""
 
 
 @njit(cache=True)
-def _relax(states: States, query: Query, state: int, cost: float, parent: int) -> None:
-    if states.place[state] == CLOSED or cost >= states.cost[state]:
+def _relax(table: SearchTable, query: Query, state: int, cost: float, parent: int) -> None:
+    if table.place[state] == CLOSED or cost >= table.cost[state]:
         return
-    data = states.data
+    data = table.data
     ahead = math.hypot(data[state, TO_X] - query.goal[0], data[state, TO_Y] - query.goal[1])
-    states.cost[state] = cost
-    states.key[state] = cost + data[state, LENGTH] + ahead
-    states.parent[state] = parent
-    at = states.place[state]
+    table.cost[state] = cost
+    table.key[state] = cost + data[state, LENGTH] + ahead
+    table.parent[state] = parent
+    at = table.place[state]
     if at == OUT_OF_HEAP:
-        at = states.sizes[1]
-        states.sizes[1] += 1
-    rise(states, state, at)
+        at = table.sizes[1]
+        table.sizes[1] += 1
+    rise(table, state, at)
 
 
 @njit(cache=True)
-def _append(states: States, slot: int, target: int) -> int:
-    """Make the row behind the last one a state that leaves a slot (or the start: -1)."""
-    state = states.sizes[0]
-    states.sizes[0] += 1
-    states.target[state] = target
-    states.cost[state] = np.inf
-    states.place[state] = OUT_OF_HEAP
-    states.tested[state] = False
-    if slot >= 0:
-        states.link[state] = states.first[slot]
-        states.first[slot] = state
+def _append(table: SearchTable, directed_arc: int, target: int) -> int:
+    """Make the row behind the last one a state that leaves a directed arc (or the start: -1)."""
+    state = table.sizes[0]
+    table.sizes[0] += 1
+    table.target[state] = target
+    table.cost[state] = np.inf
+    table.place[state] = OUT_OF_HEAP
+    table.tested[state] = False
+    if directed_arc >= 0:
+        table.link[state] = table.first[directed_arc]
+        table.first[directed_arc] = state
     return state
 
 
 @njit(cache=True)
-def _list(states: States, query: Query, slot: int) -> None:
-    """List a slot's tangents to the goal and to or from obstacles' corners."""
-    states.listed[slot] = True
-    data, arcs, radius = states.data, query.arcs, query.radius
-    if join_point(data, states.sizes[0], arcs, slot, query.goal[0], query.goal[1], radius):
-        _append(states, slot, GOAL)
-    own = slot // 2
-    for other in range(query.own if own < query.own else 0, len(arcs)):
+def _list(table: SearchTable, query: Query, directed_arc: int) -> None:
+    """List a directed arc's tangents to the goal and to or from obstacles' corners."""
+    table.listed[directed_arc] = True
+    data, boundary_arcs, radius = table.data, query.boundary_arcs, query.radius
+    if join_point(
+        data, table.sizes[0], boundary_arcs, directed_arc, query.goal[0], query.goal[1], radius
+    ):
+        _append(table, directed_arc, GOAL)
+    own = directed_arc // 2
+    for other in range(query.own if own < query.own else 0, len(boundary_arcs)):
         if other != own:
-            bits = join(data, states.sizes[0], arcs, slot, other, radius)
+            bits = join(data, table.sizes[0], boundary_arcs, directed_arc, other, radius)
             if bits & 1:
-                _append(states, slot, 2 * other)
+                _append(table, directed_arc, 2 * other)
             if bits & 2:
-                _append(states, slot, 2 * other + 1)
+                _append(table, directed_arc, 2 * other + 1)
 
 
 @njit(cache=True)
-def _begin(states: States, query: Query) -> None:
+def _begin(table: SearchTable, query: Query) -> None:
     """List the tangents from the start to every arc, and straight to the goal."""
     x, y = query.start[0], query.start[1]
-    data, k = states.data, states.sizes[0]
+    data, k = table.data, table.sizes[0]
     data[k, LEAVE] = data[k, ARRIVE] = 0.0
     data[k, FROM_X], data[k, FROM_Y] = x, y
     data[k, TO_X], data[k, TO_Y] = query.goal[0], query.goal[1]
     data[k, LENGTH] = math.hypot(query.goal[0] - x, query.goal[1] - y)
-    _relax(states, query, _append(states, -1, GOAL), 0.0, -1)
-    for slot in range(2 * len(query.arcs)):
-        k = states.sizes[0]
+    _relax(table, query, _append(table, -1, GOAL), 0.0, -1)
+    for directed_arc in range(2 * len(query.boundary_arcs)):
+        k = table.sizes[0]
         # What arrives from a point is what leaves for it in the opposite sense, reversed.
-        if join_point(data, k, query.arcs, slot ^ 1, x, y, query.radius):
+        if join_point(data, k, query.boundary_arcs, directed_arc ^ 1, x, y, query.radius):
             data[k, ARRIVE] = -data[k, LEAVE]
             data[k, TO_X], data[k, TO_Y] = data[k, FROM_X], data[k, FROM_Y]
             data[k, FROM_X], data[k, FROM_Y] = x, y
-            _relax(states, query, _append(states, -1, slot), 0.0, -1)
+            _relax(table, query, _append(table, -1, directed_arc), 0.0, -1)
 
 
 @njit(cache=True)
-def _reach(query: Query, slot: int, begin: float) -> float:
-    """How far round its arc one can go from a progress before an obstacle is in the way."""
-    arc = slot // 2
-    reach = query.arcs[arc, HALF]
+def _reach(query: Query, directed_arc: int, begin: float) -> float:
+    """Return the progress up to which one can turn from progress `begin`, radians."""
+    arc = directed_arc // 2
+    reach = query.boundary_arcs[arc, HALF]
     if arc < query.own:
-        for k in range(query.shadow_starts[arc], query.shadow_starts[arc + 1]):
-            low, high = query.shadows[k, 0], query.shadows[k, 1]
-            if slot % 2 == 1:
+        for k in range(query.forbidden_starts[arc], query.forbidden_starts[arc + 1]):
+            low, high = query.forbidden[k, 0], query.forbidden[k, 1]
+            # Clockwise, progress counts from the other end.
+            if directed_arc % 2 == 1:
                 low, high = -high, -low
             if high > begin + ORDER_SLACK:
                 reach = min(reach, low)
@@ -248,66 +270,67 @@ def _reach(query: Query, slot: int, begin: float) -> float:
 
 
 @njit(cache=True)
-def _arrive(tangents: Tangents, states: States, query: Query, state: int) -> None:
+def _arrive(tangents: Tangents, table: SearchTable, query: Query, state: int) -> None:
     """Offer every tangent that leaves further round the arc on which a state has arrived."""
-    slot, begin = states.target[state], states.data[state, ARRIVE]
-    cost = states.cost[state] + states.data[state, LENGTH]
-    if not states.listed[slot]:
-        _list(states, query, slot)
-    reach = _reach(query, slot, begin) + ORDER_SLACK
-    if slot // 2 < query.own:
-        for k in range(tangents.starts[slot], tangents.starts[slot + 1]):
+    directed_arc, begin = table.target[state], table.data[state, ARRIVE]
+    cost = table.cost[state] + table.data[state, LENGTH]
+    if not table.listed[directed_arc]:
+        _list(table, query, directed_arc)
+    reach = _reach(query, directed_arc, begin) + ORDER_SLACK
+    if directed_arc // 2 < query.own:
+        for k in range(tangents.starts[directed_arc], tangents.starts[directed_arc + 1]):
             turn = tangents.data[k, LEAVE] - begin
             if turn >= -ORDER_SLACK and tangents.data[k, LEAVE] <= reach:
-                _relax(states, query, k, cost + query.radius * max(0.0, turn), state)
-    k = states.first[slot]
+                _relax(table, query, k, cost + query.radius * max(0.0, turn), state)
+    k = table.first[directed_arc]
     while k >= 0:
-        turn = states.data[k, LEAVE] - begin
-        if turn >= -ORDER_SLACK and states.data[k, LEAVE] <= reach:
-            _relax(states, query, k, cost + query.radius * max(0.0, turn), state)
-        k = states.link[k]
+        turn = table.data[k, LEAVE] - begin
+        if turn >= -ORDER_SLACK and table.data[k, LEAVE] <= reach:
+            _relax(table, query, k, cost + query.radius * max(0.0, turn), state)
+        k = table.link[k]
 
 
 @njit(cache=True)
-def _clear(scene: Scene, states: States, query: Query, state: int, own: int) -> bool:
-    x, y = states.data[state, FROM_X], states.data[state, FROM_Y]
-    a, b = states.data[state, TO_X], states.data[state, TO_Y]
+def _clear(grid: PolygonGrid, table: SearchTable, query: Query, state: int, own: int) -> bool:
+    x, y = table.data[state, FROM_X], table.data[state, FROM_Y]
+    a, b = table.data[state, TO_X], table.data[state, TO_Y]
     limit = query.radius - SLACK_M
     return segment_clear_of(query.vertices, query.offsets, query.boxes, x, y, a, b, limit) and (
-        state < own or segment_clear(scene, x, y, a, b, limit)
+        state < own or segment_clear(grid, x, y, a, b, limit)
     )
 
 
 @njit(cache=True)
-def search(scene: Scene, tangents: Tangents, query: Query) -> tuple[float, Floats, Ints]:
-    """Find the shortest way: its length, its tangents (n, 7), the slots they arrive in (n,).
+def search(grid: PolygonGrid, tangents: Tangents, query: Query) -> tuple[float, Floats, Ints]:
+    """Return the shortest path: its length, its tangents and the directed arcs they arrive in.
 
-    The length is infinite and nothing follows it where there is no way.
+    Length in metres, tangents (n, 7) float64, directed arcs (n,) int64 with GOAL last. Where there
+    is no path the length is infinite and n is 0.
     """
-    own, arcs = len(tangents.target), len(query.arcs)
+    own, arcs = len(tangents.target), len(query.boundary_arcs)
     new = arcs - query.own
-    # Each slot lists its tangents once; the start may have two for every arc.
+    # Each directed arc lists its tangents once; the start may have two for every arc.
     extra = 2 + 2 * arcs + 2 * new * 2 * arcs + 2 * query.own * 2 * new + 4 * arcs + 4
-    states = states_of(tangents, 2 * arcs, extra)
-    _begin(states, query)
-    while states.sizes[1] > 0:
-        state = pop(states)
-        if not states.tested[state]:
-            if not _clear(scene, states, query, state, own):
-                states.place[state] = CLOSED
+    table = new_table(tangents, 2 * arcs, extra)
+    _begin(table, query)
+    while table.sizes[1] > 0:
+        state = pop(table)
+        if not table.tested[state]:
+            if not _clear(grid, table, query, state, own):
+                table.place[state] = CLOSED
                 continue
-            states.tested[state] = True
-        if states.target[state] != GOAL:
-            _arrive(tangents, states, query, state)
+            table.tested[state] = True
+        if table.target[state] != GOAL:
+            _arrive(tangents, table, query, state)
             continue
         count, k = 0, state
         while k >= 0:
-            count, k = count + 1, states.parent[k]
-        rows, slots = np.empty((count, 7)), np.empty(count, dtype=np.int64)
+            count, k = count + 1, table.parent[k]
+        rows, directed_arcs = np.empty((count, 7)), np.empty(count, dtype=np.int64)
         k = state
         while k >= 0:
             count -= 1
-            rows[count], slots[count] = states.data[k], states.target[k]
-            k = states.parent[k]
-        return states.cost[state] + states.data[state, LENGTH], rows, slots
+            rows[count], directed_arcs[count] = table.data[k], table.target[k]
+            k = table.parent[k]
+        return table.cost[state] + table.data[state, LENGTH], rows, directed_arcs
     return np.inf, np.empty((0, 7)), np.empty(0, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Shadows and free arcs against a walk round the circle by shapely."""
+"""Forbidden directions and boundary arcs against a walk round the circle by shapely."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from navigation_scenes import convex, rectangle, ring
 
 from internav_data.geometry import Polygons
 from internav_data.navigation import TangentGraph
-from internav_data.navigation.tangent_graph.arcs import (
+from internav_data.navigation.tangent_graph.boundary_arcs import (
     ALL,
     HALF,
     MID_X,
@@ -23,14 +23,26 @@ from internav_data.navigation.tangent_graph.arcs import (
     SOME,
     X,
     Y,
-    shadow,
+    find_boundary_arcs,
+    forbidden_directions,
 )
 from internav_data.navigation.tangent_graph.disconnection import closest
+from internav_data.navigation.tangent_graph.polygon_grid import boxes_of
 
 TURNS = np.radians(np.arange(720) / 2 + 0.123)
 HAIR = 1e-7
 near = convex(1.2, 1.2)
 places = st.tuples(st.integers(0, 120), st.integers(0, 120)).map(lambda c: (c[0] / 100, c[1] / 100))
+
+
+def arcs_of(polygons):
+    """Boundary arcs of polygons among themselves."""
+    vertices, offsets = Polygons.of(polygons).vertices, Polygons.of(polygons).offsets
+    none = Polygons.of([])
+    return find_boundary_arcs(
+        vertices, offsets, boxes_of(vertices, offsets),
+        none.vertices, none.offsets, np.empty((0, 4)), RADIUS,
+    )  # fmt: skip
 
 
 def round_circle(x, y):
@@ -39,8 +51,8 @@ def round_circle(x, y):
 
 @settings(max_examples=200, deadline=None)
 @given(near, places)
-def test_a_shadow_is_where_the_disc_would_meet_the_polygon(polygon, corner):
-    state, low, high = shadow(*corner, RADIUS, np.array(polygon), 0, len(polygon))
+def test_directions_are_forbidden_where_the_disc_would_meet_the_polygon(polygon, corner):
+    state, low, high = forbidden_directions(*corner, RADIUS, np.array(polygon), 0, len(polygon))
     apart = shapely.distance(shapely.Polygon(polygon), round_circle(*corner))
     if state == SOME:
         assert 0.0 < high - low < 2 * math.pi
@@ -56,9 +68,9 @@ def test_a_shadow_is_where_the_disc_would_meet_the_polygon(polygon, corner):
 
 @settings(max_examples=60, deadline=None)
 @given(st.lists(near, min_size=1, max_size=5))
-def test_free_arcs_are_what_all_polygons_leave_of_their_corners_circles(polygons):
+def test_boundary_arcs_are_what_all_polygons_leave_of_their_corners_circles(polygons):
     solid = shapes(polygons)
-    arcs = TangentGraph.of_polygons(Polygons.of(polygons))._arcs
+    arcs = arcs_of(polygons)
     corners = {tuple(corner) for polygon in polygons for corner in polygon}
     assert {(a[X], a[Y]) for a in arcs} <= corners
     for x, y in corners:
@@ -75,7 +87,7 @@ def test_free_arcs_are_what_all_polygons_leave_of_their_corners_circles(polygons
 
 def test_flush_walls_leave_no_corner_between_them():
     flush = [rectangle(0.0, 0.0, 1.0, 0.12), rectangle(1.0, 0.0, 2.0, 0.12)]
-    arcs = TangentGraph.of_polygons(Polygons.of(flush))._arcs
+    arcs = arcs_of(flush)
     found = sorted({(a[X], a[Y]) for a in arcs})
     assert found == [
         (0.0, 0.0),
@@ -92,24 +104,24 @@ crumbs = st.tuples(st.integers(-30, 45), st.integers(-30, 45), st.integers(1, 12
 
 @settings(max_examples=50, deadline=None)
 @given(st.lists(crumbs, min_size=1, max_size=2))
-def test_an_obstacle_in_the_middle_of_a_turn_closes_it(things):
+def test_an_obstacle_in_the_middle_of_a_turn_closes_it(objects):
     corner = [rectangle(-3.0, -3.0, 0.0, 0.0)]
     p, q = (-2.0, 0.3), (0.3, -2.0)
-    ways = TangentGraph.of_polygons(Polygons.of(corner))
-    found = ways.distance(p, q, Polygons.of(things))
-    whole = TangentGraph.of_polygons(Polygons.of([*corner, *things])).distance(p, q)
+    graph = TangentGraph.of_polygons(Polygons.of(corner))
+    found = graph.distance(p, q, Polygons.of(objects))
+    whole = TangentGraph.of_polygons(Polygons.of([*corner, *objects])).distance(p, q)
     assert found == pytest.approx(whole, abs=1e-7)
-    assert found == pytest.approx(shortest([*corner, *things], p, q), rel=2e-3)
+    assert found == pytest.approx(shortest([*corner, *objects], p, q), rel=2e-3)
 
 
 def test_a_crumb_beyond_the_corner_sends_the_disc_round_itself():
-    ways = TangentGraph.of_polygons(Polygons.of([rectangle(-3.0, -3.0, 0.0, 0.0)]))
+    graph = TangentGraph.of_polygons(Polygons.of([rectangle(-3.0, -3.0, 0.0, 0.0)]))
     p, q = (-2.0, 0.3), (0.3, -2.0)
     crumb = Polygons.of([rectangle(0.22, 0.22, 0.24, 0.24)])
-    clear = ways.distance(p, q)
+    clear = graph.distance(p, q)
     assert clear < 4.4
     # Round the crumb it is two tangents to a circle about (0.24, 0.24) and a turn on it.
-    assert ways.distance(p, q, crumb) > clear + 0.15
+    assert graph.distance(p, q, crumb) > clear + 0.15
 
 
 @settings(max_examples=200, deadline=None)
@@ -124,5 +136,5 @@ def test_closest_points_are_as_far_apart_as_the_polygons(first, second):
 
 
 def test_a_room_without_things_has_no_corner_to_turn_round():
-    arcs = TangentGraph.of_polygons(Polygons.of(ring(4.0, 3.0)))._arcs
+    arcs = arcs_of(ring(4.0, 3.0))
     assert all(not (0 < a[X] < 4.0 and 0 < a[Y] < 3.0) for a in arcs)

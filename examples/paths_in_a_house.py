@@ -1,6 +1,6 @@
 """A house from a seed: where the agent can stand, how far it is, and what one obstacle changes.
 
-python examples/ways_in_a_house.py --seed 7 --scene 3
+python examples/paths_in_a_house.py --seed 7 --scene 3
 """
 
 from __future__ import annotations

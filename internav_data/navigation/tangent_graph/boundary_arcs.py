@@ -1,13 +1,17 @@
-"""Free arcs: where the middle of the disc can go round a corner, touching it.
+"""Boundary arcs: curves on which the disc's centre turns round a corner, touching it. Numba.
 
-The shortest way of a disc is a taut string round circles of its radius about polygons' corners.
+The shortest path of a disc is a taut string round circles of its radius about polygons' corners.
 Such a circle serves only inside the corner's normal cone (elsewhere the disc would run into the
-corner's own polygon) and only where no other polygon comes nearer than the radius.
+corner's own polygon) and only where no other polygon comes nearer than the radius: directions that
+others forbid are cut out of the cone, and arcs are left.
 
-An arc is one row (x, y, mid_x, mid_y, half, cos_half): the corner, the unit direction to the arc's
-middle, half its angle in radians and that angle's cosine.
+An array of boundary arcs has shape (n, 6) float64. A row is (x, y, mid_x, mid_y, half, cos_half):
+the corner (metres), the unit direction to the arc's middle, half the arc's angle (radians) and the
+cosine of that half.
 
-Shadows: the directions that a polygon denies to the disc as it goes round a corner.
+Polygons are given by `vertices` (v, 2) float64 in metres, `offsets` (polygons + 1,) int64 (polygon
+k has the rows offsets[k]:offsets[k + 1], counter-clockwise) and `boxes` (polygons, 4) float64 of
+x_min, y_min, x_max, y_max.
 """
 
 from __future__ import annotations
@@ -25,6 +29,7 @@ if TYPE_CHECKING:
 
 
 NONE, SOME, ALL = 0, 1, 2
+"""Share of the directions round a corner that a polygon forbids."""
 TOUCH_M = 1e-9
 """Polygons nearer than this touch: walls in one line, furniture flush with each other."""
 FULL_TURN = 2.0 * math.pi
@@ -44,7 +49,10 @@ def wrapped(angle: float) -> float:
 def nearest(
     x: float, y: float, vertices: Floats, start: int, stop: int
 ) -> tuple[float, float, float]:
-    """Return the point of a convex polygon's outline nearest to (x, y), and its distance."""
+    """Return the outline's point nearest to (x, y) and its distance, metres: x, y, distance.
+
+    The convex polygon is `vertices[start:stop]`, (n, 2) float64, metres.
+    """
     best, best_x, best_y = math.inf, 0.0, 0.0
     previous = stop - 1
     for k in range(start, stop):
@@ -63,10 +71,10 @@ def nearest(
 
 
 @njit(cache=True)
-def _touching_shadow(
+def _forbidden_by_touching(
     x: float, y: float, vertices: Floats, start: int, stop: int
 ) -> tuple[int, float, float]:
-    """Shadow of a polygon that touches the corner: all but its own normal cone there."""
+    """Return what a polygon that touches the corner forbids: all but its normal cone there."""
     mid_x = vertices[start:stop, 0].mean() - x
     mid_y = vertices[start:stop, 1].mean() - y
     middle = math.atan2(mid_y, mid_x)
@@ -83,23 +91,27 @@ def _touching_shadow(
 
 @njit(cache=True)
 def far_from(x: float, y: float, boxes: Floats, k: int, reach: float) -> bool:
-    """Whether a point is farther than `reach` from a box."""
+    """Return whether a point lies `reach` metres or more from box k of `boxes` (n, 4) float64."""
     dx = max(0.0, boxes[k, 0] - x, x - boxes[k, 2])
     dy = max(0.0, boxes[k, 1] - y, y - boxes[k, 3])
     return dx * dx + dy * dy >= reach * reach
 
 
 @njit(cache=True)
-def shadow(
+def forbidden_directions(
     x: float, y: float, radius: float, vertices: Floats, start: int, stop: int
 ) -> tuple[int, float, float]:
-    """Which directions u a convex polygon denies to the disc's middle at corner + radius * u.
+    """Return the directions u in which a convex polygon forbids the disc's centre.
 
-    A disc round the corner meets the polygon on *one* interval of directions: it is the union,
-    over the polygon's connected set of points within two radii, of arcs that move continuously.
-    Its ends come from the polygon's vertices or from its edges' offset lines.
+    The centre is at corner + radius * u, the corner at (x, y), the polygon `vertices[start:stop]`,
+    (n, 2) float64, metres. The forbidden directions are *one* interval: the union, over the
+    polygon's connected set of points within two radii, of intervals that move continuously. Its
+    ends come from the polygon's vertices or from its edges' offset lines.
 
-    Returns (NONE | SOME | ALL, low, high): radians, low < high.
+    Returns
+    -------
+    tuple
+        (NONE | SOME | ALL, low, high) with low < high in radians; 0, 0 unless SOME.
     """
     near_x, near_y, distance = nearest(x, y, vertices, start, stop)
     within = inside(x, y, vertices, start, stop)
@@ -108,7 +120,8 @@ def shadow(
     if distance >= 2.0 * radius:
         return NONE, 0.0, 0.0
     if distance <= TOUCH_M:
-        return _touching_shadow(x, y, vertices, start, stop)
+        return _forbidden_by_touching(x, y, vertices, start, stop)
+    # A point at distance d <= 2 r is met in the directions within acos(d / 2 r) of its own.
     middle = math.atan2(near_y - y, near_x - x)
     spread = math.acos(distance / (2.0 * radius))
     low, high = -spread, spread
@@ -130,6 +143,7 @@ def shadow(
         height = cross(x - ax, y - ay, ex, ey)  # along the outward normal (ey, -ex)
         if not 0.0 <= height < 2.0 * radius:
             continue
+        # The centre is one radius from the edge's line where its own height above it is r.
         normal = math.atan2(-ex, ey)
         opening = math.acos(1.0 - height / radius)
         for side in (-1.0, 1.0):
@@ -143,13 +157,18 @@ def shadow(
 
 
 X, Y, MID_X, MID_Y, HALF, COS_HALF = range(6)
+"""Columns of an array of boundary arcs."""
 TINY_RAD = 1e-10
 """A shorter arc is what rounding leaves where polygons are flush; nothing turns there."""
 
 
 @njit(cache=True)
 def cone(vertices: Floats, start: int, stop: int, k: int) -> tuple[float, float]:
-    """Return where a corner's normal cone begins (counter-clockwise) and its angle, radians."""
+    """Return the direction in which a corner's normal cone begins and the cone's angle, radians.
+
+    The cone opens counter-clockwise from there. The corner is row k of the convex polygon
+    `vertices[start:stop]`, (n, 2) float64, metres.
+    """
     previous = k - 1 if k > start else stop - 1
     following = k + 1 if k + 1 < stop else start
     px, py = vertices[k, 0] - vertices[previous, 0], vertices[k, 1] - vertices[previous, 1]
@@ -176,7 +195,7 @@ def _cover(pieces: Floats, count: int, begin: float, width: float, low: float, h
 def _gaps(
     pieces: Floats, count: int, x: float, y: float, begin: float, width: float, out: Floats
 ) -> int:
-    """Write what covered pieces leave of a cone as arcs; returns how many."""
+    """Write the gaps between covered pieces of a cone as arcs; return their number."""
     order = np.argsort(pieces[:count, 0])
     reached = 0.0
     found = 0
@@ -196,7 +215,10 @@ def _gaps(
 
 @njit(cache=True)
 def near_ids(boxes: Floats, box: Floats, reach: float) -> Ints:
-    """Which boxes come within `reach` of a box."""
+    """Return the indices (m,) int64 of `boxes` (n, 4) float64 nearer than `reach` to `box` (4,).
+
+    All in metres. Nearness is judged by axis: corners of boxes count as squares, not as circles.
+    """
     found = np.empty(len(boxes), dtype=np.int64)
     count = 0
     for k in range(len(boxes)):
@@ -213,7 +235,7 @@ def near_ids(boxes: Floats, box: Floats, reach: float) -> Ints:
 
 @njit(cache=True)
 def _buried(x: float, y: float, vertices: Floats, offsets: Ints, boxes: Floats, ids: Ints) -> bool:
-    """Whether a point lies within one of some polygons, deeper than touching: a cheap refusal."""
+    """Return whether a point lies in one of some polygons, deeper than touching: cheap refusal."""
     for o in ids:
         if not far_from(x, y, boxes, o, 0.5 * TOUCH_M) and inside(
             x, y, vertices, offsets[o], offsets[o + 1]
@@ -225,7 +247,7 @@ def _buried(x: float, y: float, vertices: Floats, offsets: Ints, boxes: Floats, 
 
 
 @njit(cache=True)
-def _cast(
+def _forbid(
     pieces: Floats,
     count: int,
     corner: tuple[float, float, float, float],
@@ -236,15 +258,15 @@ def _cast(
     ids: Ints,
     skip: int,
 ) -> int:
-    """Add the shadows of some polygons to a corner's cone (x, y, begin, width).
+    """Add the directions that some polygons forbid in a corner's cone (x, y, begin, width).
 
-    Returns how many pieces there are, -1 once one of them covers the whole cone.
+    Returns the number of pieces, -1 once one of them covers the cone.
     """
     x, y, begin, width = corner
     for o in ids:
         if o == skip or far_from(x, y, boxes, o, 2.0 * radius):
             continue
-        state, low, high = shadow(x, y, radius, vertices, offsets[o], offsets[o + 1])
+        state, low, high = forbidden_directions(x, y, radius, vertices, offsets[o], offsets[o + 1])
         if state == ALL:
             return -1
         if state == SOME:
@@ -256,7 +278,7 @@ def _cast(
 
 
 @njit(cache=True)
-def free_arcs(
+def find_boundary_arcs(
     vertices: Floats,
     offsets: Ints,
     boxes: Floats,
@@ -265,7 +287,10 @@ def free_arcs(
     other_boxes: Floats,
     radius: float,
 ) -> Floats:
-    """Free arcs (n, 6) of a group's corners, among that group and another one."""
+    """Return the boundary arcs (n, 6) float64 of a group's corners, among it and another group.
+
+    Both groups are arrays as in the module's docstring; `radius` in metres.
+    """
     pieces = np.empty((2 * (len(boxes) + len(other_boxes)), 2))
     found = np.empty((len(pieces) + 1, 6))
     out = np.empty((2 * len(vertices) + 8, 6))
@@ -281,41 +306,56 @@ def free_arcs(
                 continue
             begin, width = cone(vertices, offsets[k], offsets[k + 1], v)
             corner = (x, y, begin, width)
-            count = _cast(pieces, 0, corner, radius, vertices, offsets, boxes, own, k)
+            count = _forbid(pieces, 0, corner, radius, vertices, offsets, boxes, own, k)
             if count >= 0:
-                count = _cast(
+                count = _forbid(
                     pieces, count, corner, radius, others, other_offsets, other_boxes, foreign, -1
                 )
             if count < 0 or width <= TINY_RAD:
                 continue
-            arcs = _gaps(pieces, count, x, y, begin, width, found)
-            while size + arcs > len(out):
+            gaps = _gaps(pieces, count, x, y, begin, width, found)
+            while size + gaps > len(out):
                 out = np.concatenate((out, np.empty_like(out)))
-            out[size : size + arcs] = found[:arcs]
-            size += arcs
+            out[size : size + gaps] = found[:gaps]
+            size += gaps
     return out[:size].copy()
 
 
 @njit(cache=True)
-def shadows_on(
-    arcs: Floats, vertices: Floats, offsets: Ints, boxes: Floats, radius: float
+def forbidden_parts(
+    boundary_arcs: Floats, vertices: Floats, offsets: Ints, boxes: Floats, radius: float
 ) -> tuple[Ints, Floats]:
-    """Which parts of arcs (n, 6) polygons close: starts (n + 1,) into pieces (m, 2).
+    """Return the parts of boundary arcs (n, 6) float64 that polygons forbid.
 
-    A piece is a closed interval of angles from its arc's middle, counter-clockwise, radians.
+    Parameters
+    ----------
+    boundary_arcs
+        Arcs of other polygons, (n, 6) float64.
+    vertices, offsets, boxes
+        Polygons that forbid, as in the module's docstring.
+    radius
+        Radius of the disc, metres.
+
+    Returns
+    -------
+    tuple
+        Starts (n + 1,) int64 into pieces (m, 2) float64. A piece is a closed interval of angles
+        from its arc's middle, counter-clockwise, radians.
     """
-    starts = np.zeros(len(arcs) + 1, dtype=np.int64)
-    pieces = np.empty((2 * len(boxes) * len(arcs), 2))
+    starts = np.zeros(len(boundary_arcs) + 1, dtype=np.int64)
+    pieces = np.empty((2 * len(boxes) * len(boundary_arcs), 2))
     count = 0
-    for a in range(len(arcs)):
-        x, y, half = arcs[a, X], arcs[a, Y], arcs[a, HALF]
+    for a in range(len(boundary_arcs)):
+        x, y, half = boundary_arcs[a, X], boundary_arcs[a, Y], boundary_arcs[a, HALF]
         begin = math.nan
         for k in range(len(boxes)):
             if far_from(x, y, boxes, k, 2.0 * radius):
                 continue
             if math.isnan(begin):
-                begin = math.atan2(arcs[a, MID_Y], arcs[a, MID_X]) - half
-            state, low, high = shadow(x, y, radius, vertices, offsets[k], offsets[k + 1])
+                begin = math.atan2(boundary_arcs[a, MID_Y], boundary_arcs[a, MID_X]) - half
+            state, low, high = forbidden_directions(
+                x, y, radius, vertices, offsets[k], offsets[k + 1]
+            )
             first = count
             if state == ALL:
                 pieces[count, 0], pieces[count, 1] = -math.inf, math.inf
