@@ -72,6 +72,17 @@ def _line(note: str) -> str:
     return " ".join(note.split()).replace("|", "\\|")
 
 
+def actions() -> str:
+    """Return the table of actions."""
+    from internav_data.world import Action  # noqa: PLC0415 - seconds
+
+    rows = [
+        f"| {int(a)} | {a.label} | {a.description} |".replace("| -", "| −")  # noqa: RUF001 - minus
+        for a in Action
+    ]
+    return "\n".join(["| | action | effect |", "|---|---|---|", *rows])
+
+
 def commands() -> str:
     """Return the commands as a table."""
     rows = [f"| `internav-gen {name}` | {text} |" for name, text in COMMANDS.items()]
@@ -89,11 +100,12 @@ def replaced(text: str, name: str, content: str) -> str:
 def updated() -> dict[Path, str]:
     """Return texts as they should be."""
     readme, configuration = ROOT / "README.md", ROOT / "docs" / "configuration.md"
-    training = ROOT / "docs" / "training.md"
+    training, environment = ROOT / "docs" / "training.md", ROOT / "docs" / "environment.md"
     written = training.read_text(encoding="utf-8")
     return {
         readme: replaced(readme.read_text(encoding="utf-8"), "commands", commands()),
         configuration: replaced(configuration.read_text(encoding="utf-8"), "settings", settings()),
+        environment: replaced(environment.read_text(encoding="utf-8"), "actions", actions()),
         training: replaced(written, "training settings", training_settings()),
     }
 

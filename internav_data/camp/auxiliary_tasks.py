@@ -14,10 +14,11 @@ from internav_data.camp.tasks import WithoutObstacles, env_state
 from internav_data.envs.auxiliary import AuxiliaryStart, auxiliary_starts, is_cleared
 from internav_data.envs.processes import concatenate_infos
 from internav_data.envs.spaces import layout
-from internav_data.envs.tasks import KINDS, STEP, SUCCESS
+from internav_data.envs.tasks import STEP, SUCCESS
 from internav_data.envs.vector import InterNavVectorEnv
 from internav_data.records import Purpose, generator
 from internav_data.records.errors import CorruptDataError, UsageError
+from internav_data.world.actions import INTERACTION_KINDS, Action
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -119,7 +120,7 @@ class AuxiliaryTasks:
             told["auxiliary_reward"] = np.zeros(self.num_envs)
         for k in range(self._first, self.num_envs):
             note, extra = self._notes[k], 0.0
-            if int(actions[k]) in KINDS:
+            if Action(actions[k]).kind in INTERACTION_KINDS:
                 extra = self._chosen(note, int(infos["target"][k]), infos["action_success"][k])
             note["extra"] += extra
             before, reward[k] = reward[k], reward[k] + extra

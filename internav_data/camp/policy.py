@@ -13,6 +13,7 @@ from internav_data.evaluation.archive import About
 from internav_data.evaluation.evaluate import episode_generator
 from internav_data.evaluation.reference_policies import ORACLES, oracle
 from internav_data.records.errors import UsageError
+from internav_data.world.actions import ACTIONS
 
 if TYPE_CHECKING:
     from numpy.random import Generator
@@ -23,13 +24,13 @@ if TYPE_CHECKING:
     from internav_data.evaluation.policies import Note
     from internav_data.records import Episode
 
-OPTIONS: Final = ("Navigate", "Push", "Pick", "Done")
-ACTIONS: Final = (
-    "MoveAhead", "RotateLeft", "RotateRight", "LookDown", "LookUp", "PushAhead", "PushBack",
-    "PushRight", "PushLeft", "Pickup", "Drop", "Done",
-)  # fmt: skip
 _CHECKPOINT: Final = "internav_data.camp.checkpoint"
 
+_NAMES: Final = {
+    len(names): names
+    for names in (("Navigate", "Push", "Pick", "Done"), tuple(action.label for action in ACTIONS))
+}
+"""Names of options and of actions, by their number."""
 _NOTED: Final = {
     "plan": ("option", "option"),
     "intent": ("intent", ""),
@@ -120,7 +121,7 @@ class AgentPolicy:
             if noted is None:
                 continue
             shares = tuple(float(share) for share in noted[seat].reshape(-1).tolist())
-            names = {len(OPTIONS): OPTIONS, len(ACTIONS): ACTIONS}.get(len(shares))
+            names = _NAMES.get(len(shares))
             chosen = self._record.get(taken)
             if names is not None:
                 told.append((title, names, shares, -1 if chosen is None else int(chosen[seat])))

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from internav_data.envs.tasks import (
-    KINDS,
     STEP,
     SUCCESS,
     EpisodeStatistics,
@@ -20,6 +19,7 @@ from internav_data.navigation import SPACING_M
 from internav_data.records.errors import UsageError
 from internav_data.render.camera import CameraView
 from internav_data.world import ACTION_COUNT, Action, World
+from internav_data.world.actions import INTERACTION_KINDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -29,20 +29,6 @@ if TYPE_CHECKING:
     from internav_data.physics import PushModel
     from internav_data.records import Asset, Episode
     from internav_data.world import StepResult
-
-WAIT: Final = -1
-"""Passes a step: outside the action space, for options that hand control back."""
-_SEEN: Final = frozenset(
-    {
-        Action.MOVE_AHEAD,
-        Action.ROTATE_LEFT,
-        Action.ROTATE_RIGHT,
-        Action.LOOK_DOWN,
-        Action.LOOK_UP,
-        *KINDS,
-    }
-)
-"""Actions that change the picture when they succeed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +69,7 @@ class EpisodeRun:
     world
         What happens.
     actions
-        So far; -1 is `WAIT`.
+        So far; -1 waits.
     start
         Node i, j and quarter turn it began at, where that is not the episode's own.
     stale
@@ -143,25 +129,24 @@ class EpisodeRun:
         """
         if self.over:
             raise UsageError("step: the episode is over; call reset() first")
-        if not WAIT <= action < ACTION_COUNT:
+        if not Action.WAIT <= action < ACTION_COUNT:
             raise UsageError(
-                f"step: expected an action of 0 … {ACTION_COUNT - 1}, or {WAIT} to wait; "
-                f"got {action}"
+                f"step: expected an action of 0 … {ACTION_COUNT - 1}, or -1 to wait; got {action}"
             )
         before = self.world.lattice
-        known = Action.WAIT if action == WAIT else Action(action)
+        known = Action(action)
         self.last = result = self.world.step(known)
         self.actions.append(action)
         reward = STEP
         terminated = known == Action.DONE
-        if known == Action.MOVE_AHEAD:
+        if known.kind == "move":
             reward += self._moved() if result.success else 0.0
-        elif known in KINDS:
+        elif known.kind in INTERACTION_KINDS:
             reward += self._interacted(known, result, before)
         elif terminated:
             self.success = result.success
             reward += SUCCESS if result.success else self._config.failed_done_reward
-        self.stale |= result.success and known in _SEEN
+        self.stale |= result.success and known.changes_picture
         truncated = not terminated and len(self.actions) >= self._config.max_steps
         self.over = terminated or truncated
         self.statistics.reward += reward
@@ -192,7 +177,7 @@ class EpisodeRun:
         return move_reward(before, after)
 
     def _interacted(self, action: Action, result: StepResult, lattice: Lattice) -> float:
-        kind, statistics = KINDS[action], self.statistics
+        kind, statistics = action.kind, self.statistics
         statistics.tried[kind] += 1
         if not result.success:
             return 0.0

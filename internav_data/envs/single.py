@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any, Unpack
 import gymnasium
 import numpy as np
 
-from internav_data.envs.episode import WAIT
 from internav_data.envs.slot import Arguments, EnvSlot, EpisodeSnapshot, check_options, step_info
 from internav_data.envs.spaces import ObservationBuffer, observation_space
 from internav_data.records.errors import UsageError
 from internav_data.render.camera import Camera
-from internav_data.world import ACTION_COUNT
+from internav_data.world import ACTION_COUNT, Action
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -97,7 +96,7 @@ class InterNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
 
     def wait(self) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Pass a step: for options that hand control back."""
-        return self.step(WAIT)
+        return self.step(Action.WAIT)
 
     def state(self) -> EpisodeSnapshot:
         """Return all that this environment is, in a few words."""

@@ -9,16 +9,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from internav_data.navigation import SPACING_M
-from internav_data.world import Action
-
-KINDS: Final = {
-    **dict.fromkeys(
-        (Action.PUSH_AHEAD, Action.PUSH_BACK, Action.PUSH_RIGHT, Action.PUSH_LEFT), "push"
-    ),
-    Action.PICKUP: "pick",
-    Action.DROP: "drop",
-}
-"""Interactions by kind."""
+from internav_data.world.actions import INTERACTION_KINDS, ActionKind
 
 
 @dataclass(slots=True)
@@ -27,8 +18,10 @@ class EpisodeStatistics:
 
     moves: int = 0
     """Successful ones only, each counted once."""
-    tried: dict[str, int] = field(default_factory=lambda: {"push": 0, "pick": 0, "drop": 0})
-    done: dict[str, int] = field(default_factory=lambda: {"push": 0, "pick": 0, "drop": 0})
+    tried: dict[ActionKind, int] = field(
+        default_factory=lambda: dict.fromkeys(INTERACTION_KINDS, 0)
+    )
+    done: dict[ActionKind, int] = field(default_factory=lambda: dict.fromkeys(INTERACTION_KINDS, 0))
     interaction_m: float = 0.0
     openings: int = 0
     closings: int = 0

@@ -15,6 +15,7 @@ import numpy as np
 from internav_data.evaluation.metrics import EpisodeResult, result_of
 from internav_data.records import Purpose, generator
 from internav_data.records.errors import UsageError
+from internav_data.world.actions import Action
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     Observations = Mapping[str, NDArray[Any]]
     Tell = Callable[[int, int], None]
 
-WAIT = -1
 """What an empty seat does: nothing, until the last episodes have ended."""
 STEPS_AT_MOST = 10_000
 _SUBSET, _ACTIONS = 1, 0
@@ -173,7 +173,7 @@ class _Round:
         while any(episode is not None for episode in self._episodes):
             actions = np.array(self._player.act(seen), dtype=np.int64)
             idle = [episode is None for episode in self._episodes]
-            actions[idle] = WAIT
+            actions[idle] = Action.WAIT
             for seat, action in enumerate(actions.tolist()):
                 self._actions[seat].append(action)
             seen, _, terminated, truncated, infos = env.step(actions)

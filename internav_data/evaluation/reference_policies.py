@@ -9,6 +9,7 @@ import numpy as np
 
 from internav_data.evaluation.evaluate import episode_generator
 from internav_data.records.errors import UsageError
+from internav_data.world import ACTION_COUNT, Action
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -25,10 +26,13 @@ if TYPE_CHECKING:
     ActionPlanner = Callable[[Episode], Sequence[int]]
 
 ORACLES: Final = ("expert", "planner", "random")
-ACTIONS: Final = 12
-AHEAD, LEFT, RIGHT, DONE = 0, 1, 2, 11
 _DIRECTIONS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))
-_TURNS: Final[tuple[tuple[int, ...], ...]] = ((), (LEFT,), (LEFT, LEFT), (RIGHT,))
+_TURNS: Final[tuple[tuple[int, ...], ...]] = (
+    (),
+    (Action.ROTATE_LEFT,),
+    (Action.ROTATE_LEFT,) * 2,
+    (Action.ROTATE_RIGHT,),
+)
 """What turns the agent by so many quarters, counter-clockwise."""
 
 
@@ -83,7 +87,7 @@ class ScriptedPlayer:
 
     def act(self, observations: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:  # noqa: ARG002
         """See `Policy`."""
-        return np.array([left.popleft() if left else DONE for left in self._left], np.int64)
+        return np.array([left.popleft() if left else Action.DONE for left in self._left], np.int64)
 
 
 class RandomPlayer:
@@ -106,13 +110,16 @@ class RandomPlayer:
 
     def act(self, observations: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:  # noqa: ARG002
         """See `Policy`."""
-        drawn = [DONE if draw is None else int(draw.integers(ACTIONS)) for draw in self._draws]
+        drawn = [
+            Action.DONE if draw is None else int(draw.integers(ACTION_COUNT))
+            for draw in self._draws
+        ]
         return np.array(drawn, np.int64)
 
 
 def expert_actions(episode: Episode) -> Sequence[int]:
     """Return the stored expert's actions; of an episode without one, Done alone: a failure."""
-    return (DONE,) if episode.expert is None else episode.expert.actions
+    return (int(Action.DONE),) if episode.expert is None else episode.expert.actions
 
 
 def planner_of(dataset: Dataset[Episode]) -> ActionPlanner:
@@ -128,7 +135,7 @@ def planner_of(dataset: Dataset[Episode]) -> ActionPlanner:
         start, goal = (world.i, world.j), world.goal
         if world.lattice.distance(start, goal) is None:
             goal = nearest(world.lattice, stage.lattice, start, goal)
-        return [*shortest(world.lattice, (*start, world.quarter), goal), DONE]
+        return [*shortest(world.lattice, (*start, world.quarter), goal), int(Action.DONE)]
 
     return plan
 
@@ -168,7 +175,7 @@ def shortest(lattice: Lattice, start: tuple[int, int, int], goal: Node) -> list[
                 if not _leads(lattice, steps, (i, j), (di, dj), left):
                     continue
                 there = (i + di, j + dj, heading)
-                longer = [*actions, *_TURNS[(heading - quarter) % 4], AHEAD]
+                longer = [*actions, *_TURNS[(heading - quarter) % 4], Action.MOVE_AHEAD]
                 if there not in ahead or len(longer) < len(ahead[there]):
                     ahead[there] = longer
         reached = ahead

@@ -16,6 +16,7 @@ It gives imitation data and every metric's ceiling. No expert is returned that w
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 from itertools import pairwise
@@ -29,7 +30,7 @@ from internav_data.planner.problem import EVERYTHING, PICK_PRICE, PlanningProble
 from internav_data.planner.push_heuristic import clearing_pushes, path_marks
 from internav_data.records import Expert
 from internav_data.world import Action, World
-from internav_data.world.actions import HORIZONS_DEG, PUSH_TURNS
+from internav_data.world.actions import HORIZONS_DEG, PUSHES
 from internav_data.world.occlusion import placed_occlusion_shape
 
 if TYPE_CHECKING:
@@ -325,8 +326,8 @@ class _BestFirstSearch:
         entry = None
         for pose, horizon, cost in reversed(places):
             penalty, last = state.penalty, (-1, -1)
-            if action in PUSH_TURNS:
-                last = (thing, (pose + PUSH_TURNS[action]) % 4)
+            if action.kind == "push":
+                last = (thing, (pose + action.quarter_turns) % 4)
                 turn = (last[1] - state.last[1]) % 4 if state.last[0] == thing else 0
                 if turn == 2:  # noqa: PLR2004 - to and fro
                     continue
@@ -359,7 +360,7 @@ class _BestFirstSearch:
     def _attempt(self, entry: Candidate) -> None:
         """Ask the world; where it works, go on from there."""
         state, problem = entry.state, self.problem
-        if entry.action in PUSH_TURNS and state.world.count_movers(*entry.last) > MAX_MOVERS:
+        if entry.action.kind == "push" and state.world.count_movers(*entry.last) > MAX_MOVERS:
             return
         world = state.world.copy()
         self._place(world, entry.pose, entry.horizon)
@@ -463,18 +464,17 @@ def replay(world: World, actions: Sequence[int]) -> Expert | None:
 
     The world is changed.
     """
-    counts = [0] * len(Action)
+    counts: Counter[int] = Counter()
     for action in actions:
         if not world.step(action).success:
             return None
         counts[action] += 1
     if not actions or actions[-1] != Action.DONE:
         return None
-    pushes = range(Action.PUSH_AHEAD, Action.PUSH_LEFT + 1)
     return Expert(
         actions=tuple(int(action) for action in actions),
         steps=len(actions),
-        pushes=sum(counts[push] for push in pushes),
+        pushes=sum(counts[push] for push in PUSHES),
         picks=counts[Action.PICKUP],
         path_m=SPACING_M * counts[Action.MOVE_AHEAD],
     )

@@ -9,13 +9,12 @@ from typing import Final
 
 from internav_data.records.errors import UsageError
 from internav_data.views.replay_story import ACTIONS_AT_MOST
-from internav_data.world import Action
+from internav_data.world import ACTION_COUNT, ACTIONS, Action
 
 _BYTES_AT_MOST: Final = 1_000_000
 _KEYS: Final = {"episode_id", "actions"}
 _NAMES: Final = {action.name.replace("_", "").lower(): action for action in Action}
 _EXAMPLE: Final = '["MoveAhead", "PushAhead", 0, 11] or {"episode_id": ..., "actions": [...]}'
-_WAIT: Final = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +69,7 @@ def _action(path: Path, place: int, entry: object) -> int:
         found = _NAMES.get(entry.replace("_", "").lower())
         if found is not None:
             return int(found)
-    elif type(entry) is int and _WAIT <= entry <= Action.WAIT:
+    elif type(entry) is int and Action.WAIT <= entry < ACTION_COUNT:
         return entry
-    names = ", ".join(f"{int(a)} {a.name.title().replace('_', '')}" for a in Action)
+    names = ", ".join(f"{int(a)} {a.label}" for a in ACTIONS)
     raise UsageError(f"{path}: action {place} is {str(entry)[:40]!r}; expected one of {names}, -1")

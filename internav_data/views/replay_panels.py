@@ -18,7 +18,6 @@ from internav_data.render.camera import Camera, CameraView, StaticScene
 from internav_data.views.asset_sheet import draw_assets
 from internav_data.views.canvas import Canvas
 from internav_data.views.plan import INK, PAPER, paint_house, paint_labels
-from internav_data.views.replay_story import PUSHES
 from internav_data.views.silhouettes import Outline, outlines, paint, shaded
 from internav_data.views.tasks import (
     COLOURS,
@@ -32,6 +31,7 @@ from internav_data.views.tasks import (
     paint_start,
 )
 from internav_data.world import Action
+from internav_data.world.actions import INTERACTION_KINDS
 from internav_data.world.visibility import CAMERA_M, REACH_M
 
 if TYPE_CHECKING:
@@ -374,11 +374,11 @@ def _fitting(canvas: Canvas, text: str, height_px: float, room: float) -> float:
 
 
 def _colour(result: StepResult) -> RGB:
-    if result.action in PUSHES:
+    if result.action.kind == "push":
         return _PUSH
-    if result.action in {Action.PICKUP, Action.DROP}:
+    if result.action.kind in INTERACTION_KINDS:
         return _PICK
-    if result.action == Action.MOVE_AHEAD:
+    if result.action.kind == "move":
         return _MOVE
     return {Action.DONE: GOAL, Action.WAIT: _WAIT}.get(result.action, _TURN)
 
@@ -503,7 +503,7 @@ def _title_rows(story: Story, title: str) -> list[tuple[RGB | None, int, str]]:
 
 def _summary(story: Story, title: str) -> str:
     results = story.results
-    pushes = sum(r.action in PUSHES for r in results)
+    pushes = sum(r.action.kind == "push" for r in results)
     picks = sum(r.action == Action.PICKUP for r in results)
     parts = [f"{len(results)} action{'' if len(results) == 1 else 's'}"]
     parts += [f"{pushes} push{'' if pushes == 1 else 'es'}"] if pushes else []

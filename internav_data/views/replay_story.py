@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Final, Literal
 from internav_data.navigation import SPACING_M
 from internav_data.records import Pose
 from internav_data.records.errors import UsageError
-from internav_data.world import Action, HouseModel, World
+from internav_data.world import ACTION_COUNT, Action, HouseModel, World
+from internav_data.world.actions import INTERACTION_KINDS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -21,28 +22,6 @@ if TYPE_CHECKING:
 
 ACTIONS_AT_MOST: Final = 10_000
 """No longer list is played."""
-
-WORDS: Final = {
-    Action.MOVE_AHEAD: "move ahead",
-    Action.ROTATE_LEFT: "turn left",
-    Action.ROTATE_RIGHT: "turn right",
-    Action.LOOK_DOWN: "look down",
-    Action.LOOK_UP: "look up",
-    Action.PUSH_AHEAD: "push ahead",
-    Action.PUSH_BACK: "push back",
-    Action.PUSH_RIGHT: "push right",
-    Action.PUSH_LEFT: "push left",
-    Action.PICKUP: "pick up",
-    Action.DROP: "drop",
-    Action.DONE: "done",
-    Action.WAIT: "wait",
-}
-
-PUSHES: Final = frozenset(
-    {Action.PUSH_AHEAD, Action.PUSH_BACK, Action.PUSH_RIGHT, Action.PUSH_LEFT}
-)
-
-INTERACTIONS: Final = PUSHES | {Action.PICKUP, Action.DROP}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -143,7 +122,7 @@ def played(
             "dataset's assets or the catalogue that the episode was made with"
         )
     world = World.of_episode(stage, episode, assets, model)
-    chosen = [Action.WAIT if action == -1 else Action(action) for action in _known(actions)]
+    chosen = [Action(action) for action in _known(actions)]
     if Action.DONE in chosen:
         chosen = chosen[: chosen.index(Action.DONE) + 1]
     moments = [Moment(0, len(chosen), world.copy(), None, world.steps())]
@@ -157,9 +136,9 @@ def played(
 
 def _known(actions: Sequence[int]) -> Sequence[int]:
     for k, action in enumerate(actions):
-        if not -1 <= action <= Action.WAIT:
+        if not Action.WAIT <= action < ACTION_COUNT:
             raise UsageError(
-                f"action {k}: expected a number from 0 to {int(Action.WAIT)}, or -1 to wait; "
+                f"action {k}: expected a number from 0 to {ACTION_COUNT - 1}, or -1 to wait; "
                 f"got {action}"
             )
     return actions
@@ -170,11 +149,11 @@ def sentence(story: Story, moment: Moment) -> str:
     result = moment.result
     if result is None:
         return "start"
-    action, words = result.action, WORDS[result.action]
+    action, words = result.action, result.action.words
     target = f" {story.name(result.target)}" if result.target >= 0 else ""
     if not result.success:
         return f"{words}{target} failed: {result.reason}"
-    if action in PUSHES:
+    if action.kind == "push":
         said = f"{words}: {target.strip()} slid {result.displacement_m:.2f} m"
         if result.toppled:
             said += ", fell over"
@@ -182,7 +161,7 @@ def sentence(story: Story, moment: Moment) -> str:
         if others:
             said += f", moved {others} other thing{'s' if others > 1 else ''}"
         return said + _opened(story, moment)
-    if action in INTERACTIONS:
+    if action.kind in INTERACTION_KINDS:
         return f"{words}{target}{_opened(story, moment)}"
     if action == Action.DONE:
         return f"done: reached the goal in {moment.step} actions"
@@ -286,12 +265,12 @@ def _acted(story: Story, before: Moment, after: Moment, fps: float) -> Iterator[
     if not result.success:
         frames = _frames(_RESULT_S, fps)
         yield _still(story, after, frames, text, "bad", result.target)
-    elif result.action in INTERACTIONS:
+    elif result.action.kind in INTERACTION_KINDS:
         if result.action != Action.DROP:
-            aim = f"{WORDS[result.action]}: {story.name(result.target)}"
+            aim = f"{result.action.words}: {story.name(result.target)}"
             frames = _frames(_AIM_S, fps)
             yield _still(story, after, frames, aim, "plain", result.target, shown=before)
-        if result.action in PUSHES:
+        if result.action.kind == "push":
             yield from _slide(story, before, after, result, fps)
         yield _still(story, after, _frames(_RESULT_S, fps), text, "plain", result.target)
     elif result.action == Action.DONE:
@@ -370,7 +349,7 @@ def _slide(
     """Show things on their way; in a straight line, slower towards the end."""
     count = _frames(_SLIDE_S, fps)
     still = _still(story, after, 1, "", "plain", result.target, shown=before)
-    text = f"{WORDS[result.action]}: {story.name(result.target)}"
+    text = f"{result.action.words}: {story.name(result.target)}"
     for k in range(1, count):
         share = 1.0 - (1.0 - k / count) ** 2
         poses = dict(still.poses)

@@ -11,7 +11,7 @@ import numpy as np
 
 from internav_data.views.captions import with_caption
 from internav_data.views.plan import PAPER, house_canvas, paint_house, paint_labels
-from internav_data.views.replay_story import INTERACTIONS, played
+from internav_data.views.replay_story import played
 from internav_data.views.silhouettes import outlines, shaded
 from internav_data.views.tasks import (
     COLOURS,
@@ -25,6 +25,7 @@ from internav_data.views.tasks import (
     paint_start,
 )
 from internav_data.world import Action, HouseModel
+from internav_data.world.actions import INTERACTION_KINDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -128,7 +129,7 @@ def _paint_interactions(canvas: Canvas, story: Story) -> None:
     seen: dict[Vec2, int] = {}
     for moment in story.moments:
         result = moment.result
-        if result is None or result.action not in INTERACTIONS:
+        if result is None or result.action.kind not in INTERACTION_KINDS:
             continue
         place = moment.world.position
         k = seen[place] = seen.get(place, -1) + 1

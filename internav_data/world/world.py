@@ -19,9 +19,9 @@ from internav_data.physics.scene import Body
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import (
     HORIZONS_DEG,
-    PUSH_TURNS,
     START_HORIZON_DEG,
     Action,
+    ActionKind,
     Reason,
     StepResult,
 )
@@ -54,19 +54,6 @@ _BLOCKED: Final = StepResult(Action.MOVE_AHEAD, success=False, reason="something
 _AHEAD: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))
 
 
-def act(world: World, action: int) -> StepResult:
-    """Change a world by one action; where that fails, leave it as it is."""
-    if action == Action.MOVE_AHEAD:
-        di, dj = _AHEAD[world.quarter]
-        if not world.lattice.edge_free(world.i, world.j, di, dj):
-            return _BLOCKED
-        world.i += di
-        world.j += dj
-        return _STEPPED
-    known = _known(action)
-    return _ACTS[known](world, known)
-
-
 def _known(action: int) -> Action:
     try:
         return Action(action)
@@ -75,9 +62,17 @@ def _known(action: int) -> Action:
         raise UsageError(f"World.step: no action is called {action!r}; expected {names}") from None
 
 
+def _move(world: World, _: Action) -> StepResult:
+    di, dj = _AHEAD[world.quarter]
+    if not world.lattice.edge_free(world.i, world.j, di, dj):
+        return _BLOCKED
+    world.i += di
+    world.j += dj
+    return _STEPPED
+
+
 def _rotate(world: World, action: Action) -> StepResult:
-    turn = 1 if action == Action.ROTATE_LEFT else 3
-    world.quarter = (world.quarter + turn) % 4
+    world.quarter = (world.quarter + action.quarter_turns) % 4
     return StepResult(action, success=True)
 
 
@@ -93,7 +88,7 @@ def _push(world: World, action: Action) -> StepResult:
     target = world.target(pick=False)
     if target < 0:
         return _failed(action, "nothing to push in sight and reach")
-    pushed = world.simulate_push(target, (world.quarter + PUSH_TURNS[action]) % 4)
+    pushed = world.simulate_push(target, (world.quarter + action.quarter_turns) % 4)
     if not pushed.success:
         reason: Reason = pushed.reason
         return StepResult(
@@ -191,17 +186,17 @@ def _failed(action: Action, reason: Reason) -> StepResult:
     return StepResult(action, success=False, reason=reason)
 
 
-_ACTS: Final[dict[Action, Callable[[World, Action], StepResult]]] = {
-    Action.ROTATE_LEFT: _rotate,
-    Action.ROTATE_RIGHT: _rotate,
-    Action.LOOK_DOWN: _look,
-    Action.LOOK_UP: _look,
-    **dict.fromkeys(PUSH_TURNS, _push),
-    Action.PICKUP: _pick,
-    Action.DROP: _drop,
-    Action.DONE: _done,
-    Action.WAIT: _wait,
+_BEHAVIOURS: Final[dict[ActionKind, Callable[[World, Action], StepResult]]] = {
+    "move": _move,
+    "turn": _rotate,
+    "look": _look,
+    "push": _push,
+    "pick": _pick,
+    "drop": _drop,
+    "done": _done,
+    "wait": _wait,
 }
+"""Effect of each kind of action; one that fails leaves the world as it is."""
 
 
 class World:
@@ -308,8 +303,22 @@ class World:
         return other
 
     def step(self, action: int) -> StepResult:
-        """Act. An action that fails changes nothing and says why."""
-        return act(self, action)
+        """Act. An action that fails changes nothing and its result gives the reason.
+
+        Raises
+        ------
+        UsageError
+            No action has this number.
+        NotImplementedError
+            The action's kind has no behaviour here.
+        """
+        known = _known(action)
+        behaviour = _BEHAVIOURS.get(known.kind)
+        if behaviour is None:
+            raise NotImplementedError(
+                f"World.step: {known.name} has no behaviour: add {known.kind!r} to _BEHAVIOURS"
+            )
+        return behaviour(self, known)
 
     @property
     def position(self) -> Vec2:

@@ -17,7 +17,8 @@ from internav_data.houses import HouseConfig, build_house
 from internav_data.navigation import CLEARANCE_M, Lattice
 from internav_data.records import Pose
 from internav_data.records.errors import UsageError
-from internav_data.world import Action, HouseModel, World
+from internav_data.world import ACTIONS, Action, HouseModel, World
+from internav_data.world.actions import actions_of_option
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 SCENES = (0, 1, 6)
@@ -76,7 +77,34 @@ def test_actions_have_the_released_order():
         "PUSH_LEFT PICKUP DROP DONE WAIT"
     )
     assert [action.name for action in Action] == names.split()
-    assert [int(action) for action in Action] == list(range(13))
+    assert [int(action) for action in Action] == [*range(12), -1]
+    assert tuple(Action)[:-1] == ACTIONS
+
+
+def test_every_action_has_every_column_and_a_behaviour(small):
+    """A row of the table without words, options or behaviour is found by its name."""
+    for action in Action:
+        assert action.words, action.name
+        assert action.description, action.name
+        assert bool(action.options) == (action in ACTIONS), action.name
+        assert small.copy().step(action).action == action, action.name
+    assert [*ACTIONS] == [*range(len(ACTIONS))], "numbered from 0 without a gap"
+
+
+def test_an_action_whose_kind_does_nothing_is_named(small, monkeypatch):
+    monkeypatch.setattr(Action.DROP, "kind", "throw")
+    with pytest.raises(NotImplementedError, match="DROP has no behaviour: add 'throw'"):
+        small.step(Action.DROP)
+
+
+def test_options_take_their_own_actions_then_borrowed_ones_and_done():
+    taken = {name: actions_of_option(name) for name in ("navigate", "push", "pick", "done")}
+    assert taken == {
+        "navigate": (0, 1, 2, 3, 4, 11),
+        "push": (5, 6, 7, 8, 11),
+        "pick": (9, 10, 1, 2, 11),
+        "done": (11,),
+    }
 
 
 def test_an_episode_begins_with_its_own_distances(worlds):
@@ -94,7 +122,7 @@ def test_another_house_is_refused(worlds):
 
 
 def test_an_unknown_action_is_refused(small):
-    for action in (-1, 13):
+    for action in (-2, 12):
         with pytest.raises(UsageError, match="expected 0 MOVE_AHEAD"):
             small.step(action)
 

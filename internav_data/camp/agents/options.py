@@ -9,29 +9,29 @@ import torch
 from torch import Tensor
 
 from internav_data.camp.config import INTERACTION_ACTIONS
-from internav_data.world.actions import Action
+from internav_data.world.actions import ACTION_COUNT, Action, OptionName, actions_of_option
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 NAVIGATE, PUSH, PICK, STOP = range(4)
 """Options, as global's logits have them. STOP executes Done. (0 in a state: none is open.)"""
-OPTIONS: Final = 4
+OPTION_NAMES: Final[tuple[OptionName, ...]] = ("navigate", "push", "pick", "done")
+"""Options by number."""
+OPTIONS: Final = len(OPTION_NAMES)
 OPTION_INPUTS: Final = 3
 """Push is open, Pick is open, actions used / 11."""
 DONE: Final = int(Action.DONE)
-WAIT: Final = -1
-"""What the world is told when an interaction hands control back."""
-ACTIONS_OF: Final[tuple[tuple[int, ...], ...]] = (
-    (0, 1, 2, 3, 4, DONE),
-    (5, 6, 7, 8, DONE),
-    (int(Action.PICKUP), int(Action.DROP), 1, 2, DONE),
+WAIT: Final = int(Action.WAIT)
+"""Action of the step at which an interaction hands control back."""
+ACTIONS_OF: Final[tuple[tuple[int, ...], ...]] = tuple(
+    tuple(int(action) for action in actions_of_option(option)) for option in OPTION_NAMES[:STOP]
 )
 """Actions of the three policies (table 1), in the order of their logits; Done is the last."""
 # A run of pushes; what is picked, put down and turned between without a move; all else.
 _RUNS: Final = re.compile("(?P<push>P+)|(?P<pick>I(?:T*I)*)|(?P<else>.)")
-_LETTERS: Final = "ATTLLPPPPIID"
-"""Of the twelve actions: ahead, turn, look, push, pick up or drop, Done."""
+_LETTERS: Final = {"turn": "T", "push": "P", "pick": "I", "drop": "I"}
+"""Letters of the kinds of action that `_RUNS` tells apart."""
 
 
 def start_chances(end: float, interact: float) -> tuple[list[float], list[float]]:
@@ -56,7 +56,7 @@ def action_table() -> Tensor:
     ends = [0]
     for actions in ACTIONS_OF:
         ends.append(ends[-1] + len(actions))
-    table = torch.full((OPTIONS, DONE + 1), ends[-1], dtype=torch.int64)
+    table = torch.full((OPTIONS, ACTION_COUNT), ends[-1], dtype=torch.int64)
     for option, actions in enumerate(ACTIONS_OF):
         for place, action in enumerate(actions):
             table[option, action] = ends[option] + place
@@ -104,7 +104,7 @@ def follow(actions: Sequence[int], *, keeps: bool) -> dict[str, list[int]]:
         for column, value in zip(label.values(), values, strict=True):
             column.append(value)
 
-    letters = "".join(_LETTERS[action] for action in actions)
+    letters = "".join(_LETTERS.get(Action(action).kind, ".") for action in actions)
     for run in _RUNS.finditer(letters):
         option = {"push": PUSH, "pick": PICK}.get(run.lastgroup or "", NAVIGATE)
         taken = actions[run.start() : run.end()]
