@@ -3,9 +3,9 @@
     python benchmarks/navigation.py [--scenes 12] [--seed 0] [--out FILE]
 
 In each house: building the lattice, steps from one node to all, an obstacle that comes and goes,
-preparing any-angle ways, a way without and with four obstacles, and whether they seal it. Both
-sides run in turn in one process; times are the median of the best of several runs, in ms, and
-`times_faster` is what the plain way takes over what ours takes. Exits 1 if answers differ.
+building the tangent graph, a shortest path without and with four obstacles, and whether they seal
+it. Both sides run in turn in one process; times are the median of the best of several runs, in ms,
+and `times_faster` is the plain side's time over ours. Exits 1 if answers differ.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ OBSTACLES = 4
 
 
 def best_ms(work: Callable[[], object], runs: int) -> float:
-    """Best of several runs: what the machine's other work took does not count."""
+    """Return the best time of several runs: other work of the machine does not count."""
     times = []
     for _ in range(runs):
         begin = time.perf_counter()
@@ -57,7 +57,7 @@ def best_ms(work: Callable[[], object], runs: int) -> float:
 
 
 def plain_lattice(solid: NDArray[Any], house: House, shape: tuple[int, int]) -> nx.Graph:
-    """Nodes and swept edges by shapely distances, found through a search tree."""
+    """Return nodes and swept edges by shapely distances, found through a search tree."""
     i, j = (a.ravel() for a in np.indices(shape))
     tree = shapely.STRtree(solid)
     points = shapely.points(SPACING_M * np.column_stack([i, j]).astype(float))
@@ -82,8 +82,8 @@ def plain_lattice(solid: NDArray[Any], house: House, shape: tuple[int, int]) -> 
     return graph
 
 
-def plain_way(solid: NDArray[Any], p: Vec2, q: Vec2) -> float | None:
-    """Any-angle distance by a visibility graph of the grown union's corners."""
+def plain_distance(solid: NDArray[Any], p: Vec2, q: Vec2) -> float | None:
+    """Return the shortest path's length by a visibility graph of the grown union's corners."""
     area = shapely.union_all(shapely.buffer(solid, CLEARANCE_M, quad_segs=CHORDS))
     core = shapely.union_all(shapely.buffer(solid, CLEARANCE_M - 1e-6, quad_segs=CHORDS))
     shapely.prepare(core)
@@ -107,22 +107,22 @@ def plain_way(solid: NDArray[Any], p: Vec2, q: Vec2) -> float | None:
         return None
 
 
-def spawned(ways: TangentGraph, p: Vec2, q: Vec2, random: Generator) -> Polygons:
-    """Strew some of the catalogue's obstacles along the way, as spawning does."""
-    line = shapely.LineString(ways.path(p, q))
-    things = catalogue().spawnable
+def spawned(graph: TangentGraph, p: Vec2, q: Vec2, random: Generator) -> Polygons:
+    """Strew some of the catalogue's obstacles along the shortest path, as spawning does."""
+    line = shapely.LineString(graph.path(p, q))
+    obstacles = catalogue().spawnable
     groups = []
     for _ in range(OBSTACLES):
         spot = line.interpolate(float(random.uniform(0.15, 0.85)), normalized=True)
         x, y = spot.x + float(random.normal(0, 0.25)), spot.y + float(random.normal(0, 0.25))
         yaw = yaw_quaternion(15 * int(random.integers(24)))
-        asset = things[int(random.integers(len(things)))]
+        asset = obstacles[int(random.integers(len(obstacles)))]
         groups.append(footprint(asset, Pose(x, y, 0.0, yaw)))
     return Polygons.joined(groups)
 
 
 def questions(
-    lattice: Lattice, ways: TangentGraph, random: Generator
+    lattice: Lattice, graph: TangentGraph, random: Generator
 ) -> list[tuple[Any, Any, Any]]:
     labels = lattice.components()
     nodes = np.argwhere(labels == np.bincount(labels[labels >= 0]).argmax())
@@ -131,7 +131,7 @@ def questions(
         (a, b), (c, d) = nodes[random.integers(len(nodes), size=2)].tolist()
         p, q = (SPACING_M * a, SPACING_M * b), (SPACING_M * c, SPACING_M * d)
         if math.dist(p, q) >= 2.0:
-            out.append((p, q, spawned(ways, p, q, random)))
+            out.append((p, q, spawned(graph, p, q, random)))
     return out
 
 
@@ -142,29 +142,32 @@ def agree(ours: float | None, plain: float | None) -> bool:
     return abs(ours - plain) <= AGREE * plain
 
 
-def way_times(
+def path_times(
     times: dict[str, list[float]], polygons: Polygons, solid: NDArray[Any], asked: list[Any]
 ) -> int:
-    """Time any-angle questions; the plain way, which takes long, answers one of each kind."""
-    ways = TangentGraph(polygons)
-    clear_ms, way_ms, sealed_ms = [], [], []
+    """Time shortest paths; the plain side, which takes long, answers one question of each kind.
+
+    Returns the number of answers that differ.
+    """
+    graph = TangentGraph(polygons)
+    free_ms, obstructed_ms, sealed_ms = [], [], []
     differ = 0
-    for p, q, things in asked:
-        fresh = TangentGraph(polygons)  # remembers nothing yet
-        clear, way = [], ways.distance(p, q, things)
-        clear_ms.append(best_ms(lambda c=clear, f=fresh, a=p, b=q: c.append(f.distance(a, b)), 1))
-        sealed_ms.append(best_ms(lambda a=p, b=q, t=things: ways.sealed(a, b, t), 5))
-        if len(clear_ms) == 1:
-            differ += compare(times, "a way without obstacles", clear[0], solid, p, q)
-        if way is not None:
-            way_ms.append(best_ms(lambda a=p, b=q, t=things: ways.distance(a, b, t), 5))
-            if len(way_ms) == 1:
-                everything = np.append(solid, [shapely.Polygon(t) for t in things])
-                differ += compare(times, "a way past four obstacles", way, everything, p, q)
-    times["any-angle: a way without obstacles"][0] = median(clear_ms)
-    if way_ms:
-        times["any-angle: a way past four obstacles"][0] = median(way_ms)
-    times["any-angle: whether four obstacles seal"] = [median(sealed_ms)]
+    for p, q, obstacles in asked:
+        fresh = TangentGraph(polygons)  # its cache is empty
+        free, length = [], graph.distance(p, q, obstacles)
+        free_ms.append(best_ms(lambda c=free, f=fresh, a=p, b=q: c.append(f.distance(a, b)), 1))
+        sealed_ms.append(best_ms(lambda a=p, b=q, t=obstacles: graph.sealed(a, b, t), 5))
+        if len(free_ms) == 1:
+            differ += compare(times, "without obstacles", free[0], solid, p, q)
+        if length is not None:
+            obstructed_ms.append(best_ms(lambda a=p, b=q, t=obstacles: graph.distance(a, b, t), 5))
+            if len(obstructed_ms) == 1:
+                everything = np.append(solid, [shapely.Polygon(t) for t in obstacles])
+                differ += compare(times, "past four obstacles", length, everything, p, q)
+    times["shortest path without obstacles"][0] = median(free_ms)
+    if obstructed_ms:
+        times["shortest path past four obstacles"][0] = median(obstructed_ms)
+    times["whether four obstacles seal"] = [median(sealed_ms)]
     return differ
 
 
@@ -177,29 +180,29 @@ def compare(
     q: Vec2,
 ) -> int:
     plain: list[float | None] = []
-    took = best_ms(lambda: plain.append(plain_way(solid, p, q)), 1)
-    times[f"any-angle: {name}"] = [0.0, took]
+    took = best_ms(lambda: plain.append(plain_distance(solid, p, q)), 1)
+    times[f"shortest path {name}"] = [0.0, took]
     return int(not agree(ours, plain[0]))
 
 
 def house_times(scene: int, seed: int) -> tuple[dict[str, list[float]], int]:
-    """Time every question in one house; how many answers differed."""
+    """Return the times of every question in one house, and the number of answers that differ."""
     house = build_house(seed, scene, HouseConfig(), catalogue())
     polygons = house_footprints(house)
     solid = np.array([shapely.Polygon(p) for p in polygons])
-    lattice, ways = Lattice.of(house), TangentGraph.of(house)
-    asked = questions(lattice, ways, generator(seed, Purpose.SPAWN, scene))
-    graph = plain_lattice(solid, house, lattice.shape)
-    _, q, things = asked[0]
+    lattice, graph = Lattice.of(house), TangentGraph.of(house)
+    asked = questions(lattice, graph, generator(seed, Purpose.SPAWN, scene))
+    plain = plain_lattice(solid, house, lattice.shape)
+    _, q, obstacles = asked[0]
     goal = (round(q[0] / SPACING_M), round(q[1] / SPACING_M))
     node = goal[0] * lattice.shape[1] + goal[1]
     steps = lattice.distances(*goal)
-    reached = nx.single_source_shortest_path_length(graph, node)
+    reached = nx.single_source_shortest_path_length(plain, node)
     differ = int({int(k): int(steps.flat[k]) for k in np.flatnonzero(steps >= 0)} != reached)
-    group = np.array([shapely.Polygon(t) for t in things])
+    group = np.array([shapely.Polygon(t) for t in obstacles])
 
     def again() -> None:
-        lattice.remove(lattice.add(things))
+        lattice.remove(lattice.add(obstacles))
 
     def rebuilt() -> None:
         plain_lattice(np.append(solid, group), house, lattice.shape)
@@ -211,12 +214,12 @@ def house_times(scene: int, seed: int) -> tuple[dict[str, list[float]], int]:
         ],
         "steps from one node to all": [
             best_ms(lambda: lattice.distances(*goal), 9),
-            best_ms(lambda: nx.single_source_shortest_path_length(graph, node), 3),
+            best_ms(lambda: nx.single_source_shortest_path_length(plain, node), 3),
         ],
         "four obstacles come and go on the lattice": [best_ms(again, 9), best_ms(rebuilt, 2)],
-        "any-angle: prepare a house": [best_ms(lambda: TangentGraph(polygons), 3)],
+        "tangent graph of a house": [best_ms(lambda: TangentGraph(polygons), 3)],
     }
-    differ += way_times(times, polygons, solid, asked)
+    differ += path_times(times, polygons, solid, asked)
     return times, differ
 
 

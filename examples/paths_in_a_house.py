@@ -1,4 +1,4 @@
-"""A house from a seed: where the agent can stand, how far it is, and what one obstacle changes.
+"""Lattice of a house from a seed: free nodes, steps to a goal, and what each obstacle changes.
 
 python examples/paths_in_a_house.py --seed 7 --scene 3
 """
@@ -16,7 +16,7 @@ from internav_data.navigation import Lattice
 
 
 def main() -> None:
-    """Build a house and ask its lattice."""
+    """Build a house and count steps on its lattice."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=7)
     parser.add_argument("--scene", type=int, default=3)

@@ -24,7 +24,7 @@ def grown(polygons, radius=RADIUS):
 
 
 def joined(polygons, p, q, radius=RADIUS):
-    """Whether p and q lie in one piece of what grown polygons leave of the plane."""
+    """Return whether p and q lie in one piece of the plane outside grown polygons."""
     left = shapely.box(-50, -50, 50, 50).difference(grown(polygons, radius))
     parts = shapely.get_parts(left)
     p, q = shapely.Point(p), shapely.Point(q)
@@ -32,7 +32,7 @@ def joined(polygons, p, q, radius=RADIUS):
 
 
 def shortest(polygons, p, q, radius=RADIUS):
-    """Shortest way among grown polygons by the whole visibility graph; None where there is none.
+    """Return the shortest path among grown polygons by the full visibility graph; None without one.
 
     A lower bound for `radius`; for `radius * OUTSIDE_IN` an upper one.
     """

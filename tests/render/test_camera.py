@@ -54,7 +54,7 @@ def litter(house, count):
     return out
 
 
-def things(house):
+def objects(house):
     return [(house.assets[t.asset_id], t.pose) for t in house.objects]
 
 
@@ -64,7 +64,7 @@ def same(a, b):
 
 def test_depth_and_ids_agree_with_a_ray_caster(house):
     obstacles = litter(house, 5)
-    instances = [*things(house), *obstacles]
+    instances = [*objects(house), *obstacles]
     views = some_views(house, Props(instances), 5)
     triangles, labels = scene(house, instances)
     frames = Camera(SIZE).render(views)
