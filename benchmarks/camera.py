@@ -22,8 +22,9 @@ import numpy as np
 from internav_data import generate_house
 from internav_data.catalog import asset_mesh
 from internav_data.navigation import SPACING_M, Lattice
+from internav_data.records.agent import AGENT
 from internav_data.render.asset_mesh import LIBRARY
-from internav_data.render.camera import EYE_HEIGHT_M, Camera, CameraView, StaticScene, camera_axes
+from internav_data.render.camera import Camera, CameraView, StaticScene, camera_axes
 from internav_data.render.frame import picture
 from internav_data.render.shading import shade
 
@@ -91,7 +92,7 @@ def bullet_scene(house: House) -> Any:  # noqa: ANN401 - pybullet is untyped
 def tiny(client: Any, view: CameraView, size: int) -> None:  # noqa: ANN401 - pybullet is untyped
     """Draw one view with TinyRenderer: colour, depth and segmentation."""
     yaw, down = math.radians(view.yaw_deg), math.radians(view.horizon_deg)
-    eye = [view.x, view.y, EYE_HEIGHT_M]
+    eye = [view.x, view.y, AGENT.camera_height_m]
     ahead = [math.cos(yaw) * math.cos(down), math.sin(yaw) * math.cos(down), -math.sin(down)]
     target = [e + a for e, a in zip(eye, ahead, strict=True)]
     look = client.computeViewMatrix(eye, target, [0.0, 0.0, 1.0])

@@ -11,12 +11,12 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from internav_data.dataset.summary_statistics import Spread, mean, share, spread
+from internav_data.records.agent import SPACING_M
 
 if TYPE_CHECKING:
     from internav_data.dataset.manifest import Manifest
     from internav_data.records import Redraw
 
-_STEP_M = 0.25
 EXPERT_COLUMNS = tuple(f"expert.{name}" for name in ("steps", "pushes", "picks", "path_m"))
 OUTCOME_COLUMNS = tuple(
     f"obstacles.list.element.outcomes.list.element.{name}"
@@ -131,7 +131,7 @@ def expert_row(table: pa.Table, manifest: Manifest) -> ExpertRow:
         spl=share(
             float((shortest_path_m / np.maximum(path_m, shortest_path_m)).sum()), len(solved)
         ),
-        sts=share(float((shortest_path_m / _STEP_M / steps).sum()), len(solved)),
+        sts=share(float((shortest_path_m / SPACING_M / steps).sum()), len(solved)),
         refused=manifest.redraws.get(REFUSED, 0),
         refused_share=refused_share(manifest),
     )

@@ -25,12 +25,12 @@ from internav_data.dataset.outcome_stats import (
 from internav_data.dataset.parquet import read_all
 from internav_data.dataset.summary_statistics import Spread, counts, mean, share, spread
 from internav_data.dataset.tables import EPISODES
+from internav_data.records.agent import SPACING_M
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-_STEP_M = 0.25  # of the lattice: the distance of Table 2 counts its steps
 _SCALARS = (
     *("scene_id", "split", "room_count", "mode", "sealed", "rooms_on_path"),
     *(
@@ -233,7 +233,7 @@ def _rooms_row(
         episodes=part.num_rows,
         ratio=mean(chosen),
         obstacle_num=mean(part.column("obstacle_count").to_numpy()),
-        distance_m=mean(_STEP_M * part.column("shortest_path_steps").to_numpy()),
+        distance_m=mean(SPACING_M * part.column("shortest_path_steps").to_numpy()),
         cross_room_num=mean(part.column("rooms_on_path").to_numpy()),
         blocked=int((chosen & blocked).sum()),
         sealed=int((chosen & sealed).sum()),

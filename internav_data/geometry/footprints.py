@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numba import njit
@@ -16,6 +16,7 @@ from numba import njit
 from internav_data.geometry.planar import cross, inside, polygon_distance
 from internav_data.geometry.poses import rotation_matrix
 from internav_data.geometry.solids import asset_corners
+from internav_data.records.agent import AGENT
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -23,10 +24,10 @@ if TYPE_CHECKING:
     from internav_data.core.typing import Floats, Ints
     from internav_data.records import Asset, House, Pose, Vec2, Wall
 
-LOWEST_M = 0.02
-"""What is flatter than this is stepped over."""
-HIGHEST_M = 1.8
-"""The agent's height: what hangs above it is walked under."""
+LOWEST_M: Final = AGENT.step_over_m
+"""Height below which parts do not block: they are stepped over."""
+HIGHEST_M: Final = AGENT.height_m
+"""Height above which parts do not block: they are walked under."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,18 +12,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numba import njit
 
+from internav_data.geometry import HIGHEST_M, LOWEST_M
+from internav_data.records.agent import CLEARANCE_M, SPACING_M
+
 if TYPE_CHECKING:
     from internav_data.core.typing import Bools, Floats, Ints
 
-SPACING_M = 0.25
-RADIUS_M = 0.2
-TOLERANCE_M = 1e-6
 GAP_M = 0.02
 """Least distance between things of different groups."""
 FROM_WALL_M = 0.005
 """Least distance between a thing and a wall."""
-HIGHEST_M = 1.8
-LOWEST_M = 0.02
 
 
 @njit(cache=True)
@@ -93,7 +91,7 @@ def mark_blocked(free: Bools, origin: Ints, box: Floats) -> None:
     """Mark the nodes that a box takes from the agent."""
     if box[4] >= HIGHEST_M or box[5] <= LOWEST_M:
         return
-    reach = RADIUS_M - TOLERANCE_M
+    reach = CLEARANCE_M
     for i in range(free.shape[0]):
         x = (origin[0] + i) * SPACING_M
         if box[0] - reach < x < box[2] + reach:

@@ -11,9 +11,6 @@ from internav_data.geometry import yaw_quaternion
 from internav_data.houses.choice import clear_area_m2
 from internav_data.houses.faces import WallFace, poses_along, wall_faces
 from internav_data.houses.fitting import (
-    RADIUS_M,
-    SPACING_M,
-    TOLERANCE_M,
     first_fit,
     mark_blocked,
     turn_box,
@@ -21,6 +18,7 @@ from internav_data.houses.fitting import (
 from internav_data.houses.pieces import BACK_GAP_M
 from internav_data.houses.plan import clear_size_m
 from internav_data.houses.standards import DOOR_CLEAR_CM, HALF_WALL_CM
+from internav_data.records.agent import CLEARANCE_M, SPACING_M
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -219,7 +217,7 @@ def room_state(
     )
     origin = np.floor(inner[:2] / SPACING_M).astype(np.int64)
     shape = np.ceil(inner[2:] / SPACING_M).astype(np.int64) - origin + 1
-    reach = RADIUS_M - TOLERANCE_M
+    reach = CLEARANCE_M
     xs = (origin[0] + np.arange(shape[0])) * SPACING_M
     ys = (origin[1] + np.arange(shape[1])) * SPACING_M
     free = ((xs >= inner[0] + reach) & (xs <= inner[2] - reach))[:, None] & (

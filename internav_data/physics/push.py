@@ -23,6 +23,7 @@ from internav_data.physics.scene import (
 )
 from internav_data.physics.sweep import extent_of
 from internav_data.records import Pose
+from internav_data.records.agent import AGENT
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Container, Sequence
@@ -50,7 +51,7 @@ TOUCH_M: Final = 0.005
 MEET_M: Final = 0.012
 """What a body's kept poses come this near of may touch it: poses lie up to 1 cm apart, so what lies
 between them is missed by half of that at most."""
-AGENT_M: Final = 0.21
+AGENT_M: Final = AGENT.collider_radius_m
 """Radius of the agent's column: nothing ends inside its disc of 0.2 m."""
 AGENT_MIN_M: Final = 0.2005
 """What already stands nearer than the column is not pressed away by it."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Protocol
 
 from internav_data.records import Asset, Part, Pose
+from internav_data.records.agent import AGENT
 
 if TYPE_CHECKING:
     from internav_data.physics.kdop import Dop8
@@ -15,7 +16,7 @@ UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
 AGENT_LOW_M: Final = 0.022
 """What is lower than 2 cm is no obstacle (footprints leave it out), so the agent's body begins
 above it: a column down to the floor would wedge under the feet of what it stands beside."""
-AGENT_HEIGHT_M: Final = 1.8
+AGENT_HEIGHT_M: Final = AGENT.height_m
 
 
 @dataclass(frozen=True, slots=True)

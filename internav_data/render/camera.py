@@ -22,11 +22,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final, NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
 from internav_data.geometry import rotation_matrix
+from internav_data.records.agent import AGENT
 from internav_data.records.errors import UsageError
 from internav_data.render.asset_mesh import LIBRARY
 from internav_data.render.frame import Scratch, picture
@@ -40,9 +41,6 @@ if TYPE_CHECKING:
 
     from internav_data.core.typing import Floats
     from internav_data.records import Asset, House, Pose
-
-EYE_HEIGHT_M: Final = 1.575
-FIELD_OF_VIEW_DEG: Final = 90.0
 
 
 class Frames(NamedTuple):
@@ -128,7 +126,8 @@ class CameraView:
     """0 looks along +x, counter-clockwise."""
     horizon_deg: float
     """How far down the camera looks: the agent's -30 to 60."""
-    z: float = EYE_HEIGHT_M
+    z: float = AGENT.camera_height_m
+    """Height, metres."""
 
 
 class Camera:

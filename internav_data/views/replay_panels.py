@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final
 import cv2
 import numpy as np
 
+from internav_data.records.agent import AgentSpec
 from internav_data.render.camera import Camera, CameraView, StaticScene
 from internav_data.views.asset_sheet import draw_assets
 from internav_data.views.canvas import Canvas
@@ -54,7 +55,8 @@ _MARGIN_M: Final = 0.7
 _ROOM_M: Final = 1.8
 _MOST: Final = 0.55
 """A house is shown whole where this share of it would be."""
-_RADIUS_M: Final = 0.2
+_RADIUS_M: Final = AgentSpec().radius_m
+_HALF_VIEW_DEG: Final = AgentSpec().field_of_view_deg / 2.0
 _NARROWEST, _WIDEST = 0.75, 1.6
 """Of a map, as a share of its height."""
 _SMALLEST_PX: Final = 7.0
@@ -215,7 +217,8 @@ class MapPainter:
     def _paint_cone(self, shot: Shot) -> None:
         """Tint what the camera's field of view takes in, as far as the agent reaches."""
         at = np.array((shot.x, shot.y))
-        arc = self._canvas.arc((shot.x, shot.y), REACH_M, shot.yaw_deg - 45.0, shot.yaw_deg + 45.0)
+        left, right = shot.yaw_deg - _HALF_VIEW_DEG, shot.yaw_deg + _HALF_VIEW_DEG
+        arc = self._canvas.arc((shot.x, shot.y), REACH_M, left, right)
         cone = np.vstack([at, at + (arc - at) * _open_shares(at, arc, self._walls)[:, None]])
         window = self._canvas.window(
             (float(cone[:, 0].min()), float(cone[:, 1].min())),

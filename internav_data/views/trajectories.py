@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import cv2
 import numpy as np
 
+from internav_data.records.agent import AgentSpec
 from internav_data.views.captions import with_caption
 from internav_data.views.plan import PAPER, house_canvas, paint_house, paint_labels
 from internav_data.views.replay_story import played
@@ -42,7 +43,7 @@ LATE: Final[RGB] = (160, 16, 92)
 WORKED: Final[RGB] = (24, 150, 80)
 FAILED: Final[RGB] = (214, 40, 28)
 _GHOST: Final[RGB] = (120, 84, 10)
-_AGENT_M: Final = 0.2
+_AGENT_M: Final = AgentSpec().radius_m
 _MARK_M: Final = 0.11
 
 

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING, Final, Literal, Self
 
+from internav_data.records.agent import AGENT
+
 if TYPE_CHECKING:
     from internav_data.records import Pose
 
@@ -125,9 +127,9 @@ def actions_of_option(option: OptionName) -> tuple[Action, ...]:
     return tuple(sorted(taken, key=lambda action: action.options[0] != option))
 
 
-HORIZONS_DEG: Final = (-30, 0, 30, 60)
+HORIZONS_DEG: Final = AGENT.horizons_deg
 """Horizons of the camera, degrees; negative is up."""
-START_HORIZON_DEG: Final = 30
+START_HORIZON_DEG: Final = AGENT.start_horizon_deg
 
 Reason = Literal[
     "",

@@ -18,10 +18,11 @@ from internav_data.geometry import (
 )
 from internav_data.geometry.headings import TURNS, turned
 from internav_data.geometry.planar import segment_polygon_distance
-from internav_data.navigation import CLEARANCE_M, RADIUS_M
+from internav_data.navigation import CLEARANCE_M
 from internav_data.physics.kdop import dop8_of_square
 from internav_data.physics.settle import settle
 from internav_data.records import Pose
+from internav_data.records.agent import AGENT
 from internav_data.world.visibility import axis_distance
 
 if TYPE_CHECKING:
@@ -83,7 +84,7 @@ def _standing(asset: Asset, heading: int) -> Polygons:
 def _spot(plan: Polygons, agent: Vec2, ux: float, uy: float, gap: float) -> Vec2:
     """Where the thing's near side is a gap away from the agent's disc."""
     nearest = min((ux * x + uy * y for x, y in plan.vertices.tolist()), default=0.0)
-    far = RADIUS_M + gap - nearest
+    far = AGENT.radius_m + gap - nearest
     return round_m(agent[0] + far * ux), round_m(agent[1] + far * uy)
 
 

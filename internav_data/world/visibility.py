@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 
 from internav_data.geometry.planar import point_polygon_distance
+from internav_data.records.agent import AGENT
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,9 +18,9 @@ if TYPE_CHECKING:
     from internav_data.geometry import Polygons
     from internav_data.world.occlusion import OcclusionShape
 
-REACH_M: Final = 1.25
+REACH_M: Final = AGENT.reach_m
 """A visibility point farther from the agent's axis, in the plane, cannot be acted on."""
-CAMERA_M: Final = 1.575
+CAMERA_M: Final = AGENT.camera_height_m
 """Height of the camera on the agent's axis."""
 SLACK: Final = 1e-9
 """Share of a ray: what it only touches does not hide what is behind."""

@@ -9,7 +9,7 @@ from numba import njit
 from internav_data.catalog import asset_mesh
 from internav_data.geometry import rotation_matrix
 from internav_data.navigation import room_of
-from internav_data.render.camera import EYE_HEIGHT_M
+from internav_data.records.agent import AGENT
 
 FLOOR, CEILING, WALL, DOOR, WINDOW = -1, -2, -3, -4, -5
 
@@ -103,7 +103,7 @@ def _nearest(eye, directions, triangles, best, hits):
 
 def cast(triangles, labels, view, size):
     """Depth and ids (size, size) of a view."""
-    eye = np.array([view.x, view.y, EYE_HEIGHT_M])
+    eye = np.array([view.x, view.y, AGENT.camera_height_m])
     directions = rays(view, size)
     best = np.full(len(directions), np.inf)
     hits = np.full(len(directions), -1)
