@@ -45,10 +45,3 @@ def test_houses_are_the_released_ones(case, assets):
 
 def test_the_goldens_hold_every_number_of_rooms(assets):
     assert {len(house.rooms) for house in houses("paper", assets)} == set(range(1, 11))
-
-
-if __name__ == "__main__":
-    from internav_data.catalog import catalogue
-
-    for name in GOLDEN:
-        print(name, digest(name, catalogue()))
