@@ -16,7 +16,7 @@ from internav_data.envs.processes import concatenate_infos
 from internav_data.envs.spaces import layout
 from internav_data.envs.tasks import STEP, SUCCESS
 from internav_data.envs.vector import InterNavVectorEnv
-from internav_data.records import Purpose, generator
+from internav_data.records import Purpose, TrainingStream, generator
 from internav_data.records.errors import CorruptDataError, UsageError
 from internav_data.world.actions import INTERACTION_KINDS, Action
 
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 CHOSEN_ACTION: Final = 0.1
 """r_as and r_af: an interaction succeeds (once for each object), or fails."""
-_STARTS: Final = 4
-"""Where the seeds table has attempts: which obstacle an auxiliary episode is about."""
 _STARTS_KEPT: Final = 8192
 
 
@@ -202,7 +200,10 @@ class AuxiliaryTasks:
             if starts:
                 obstacles = sorted({start.obstacle for start in starts})
                 rng = generator(
-                    self._seed + k, Purpose.TRAINING, attempt=_STARTS, draw=note["cursor"]
+                    self._seed + k,
+                    Purpose.TRAINING,
+                    attempt=TrainingStream.AUXILIARY,
+                    draw=note["cursor"],
                 )
                 obstacle = obstacles[int(rng.integers(len(obstacles)))]
                 start = next(each for each in starts if each.obstacle == obstacle)

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from internav_data.camp.agents import Batch
 from internav_data.camp.rollout import Columns, Finished, Rollout
-from internav_data.records import Purpose, generator
+from internav_data.records import Purpose, TrainingStream, generator
 from internav_data.records.errors import NotFiniteError
 
 if TYPE_CHECKING:
@@ -20,9 +20,6 @@ if TYPE_CHECKING:
 
     from internav_data.camp.agents import Agent
     from internav_data.envs.types import Observations, Stepped
-
-_ACTIONS, _ORDERS = 0, 1
-"""Where the seeds table has attempts: what of training is drawn."""
 
 
 class Environments(Protocol):
@@ -45,7 +42,9 @@ def uniforms_of(seed: int, rollout: int, environments: Sequence[int], steps: int
     Environment by environment, so that several ranks draw what one would.
     """
     drawn = [
-        generator(seed, Purpose.TRAINING, k, _ACTIONS, draw=rollout).random((steps, 2), np.float32)
+        generator(seed, Purpose.TRAINING, k, TrainingStream.ACTIONS, draw=rollout).random(
+            (steps, 2), np.float32
+        )
         for k in environments
     ]
     return torch.from_numpy(np.stack(drawn, 1))
@@ -53,7 +52,7 @@ def uniforms_of(seed: int, rollout: int, environments: Sequence[int], steps: int
 
 def orders_of(seed: int, rollout: int, epochs: int, count: int) -> list[list[int]]:
     """Return a permutation of the environments for each epoch of an update."""
-    rng = generator(seed, Purpose.TRAINING, attempt=_ORDERS, draw=rollout)
+    rng = generator(seed, Purpose.TRAINING, attempt=TrainingStream.MINIBATCHES, draw=rollout)
     return [rng.permutation(count).tolist() for _ in range(epochs)]
 
 

@@ -21,7 +21,7 @@ from internav_data.camp.stages import PARTS, check_parts, plan
 from internav_data.camp.train import Trainer
 from internav_data.core.config import config_toml
 from internav_data.core.files import write_atomically
-from internav_data.records import Purpose, generator
+from internav_data.records import Purpose, TrainingStream, generator
 from internav_data.records.errors import CorruptDataError, UsageError
 
 if TYPE_CHECKING:
@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 
 CONFIG: Final = "config.toml"
 """The resolved settings of a run, for people and for `--config`."""
-_TORCH: Final = 5
-"""Where the seeds table has attempts: torch's own random numbers."""
 _MEASURED: Final = 2
 """Updates that a prediction is made of, after one that warms up."""
 
@@ -178,7 +176,7 @@ def _prepared(
     config = request.config
     torch.set_num_threads(config.run.threads)
     # Nothing here draws from torch's own generator, but a user's agent may.
-    drawn = generator(config.seed, Purpose.TRAINING, attempt=_TORCH).integers(2**62)
+    drawn = generator(config.seed, Purpose.TRAINING, attempt=TrainingStream.TORCH).integers(2**62)
     torch.manual_seed(int(drawn))
     data = TrainingData(request.dataset, config.data.where)
     with torch.device("meta"):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from internav_data.camp.agents.options import NAVIGATE, PICK, PUSH
-from internav_data.records import Purpose, generator
+from internav_data.records import Purpose, TrainingStream, generator
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
@@ -18,8 +18,6 @@ PARTS: Final = ("auxiliary", "single", "all")
 """What `--stages` can name, in order."""
 TASKS: Final = {NAVIGATE: "navigate", PUSH: "push", PICK: "pick"}
 """Names of the auxiliary tasks, by the option that each is about."""
-_ENVIRONMENTS: Final = 3
-"""Where the seeds table has attempts: orders of episodes in training."""
 _NUMBERS: Final = ("cloning", *PARTS, *(f"auxiliary-{name}" for name in TASKS.values()))
 
 
@@ -108,7 +106,9 @@ def check_parts(parts: Sequence[str]) -> None:
 
 def order_seed(seed: int, stage: str) -> int:
     """Return the seed of environment 0 in a stage; environment k has the k-th after it."""
-    rng = generator(seed, Purpose.TRAINING, attempt=_ENVIRONMENTS, draw=_NUMBERS.index(stage))
+    rng = generator(
+        seed, Purpose.TRAINING, attempt=TrainingStream.EPISODES, draw=_NUMBERS.index(stage)
+    )
     return int(rng.integers(2**31))
 
 

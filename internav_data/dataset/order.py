@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from internav_data.records import Purpose, generator
+from internav_data.records import LoaderStream, Purpose, generator
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,7 +36,7 @@ def epoch_order(
     count = int(blocks[-1])
     if not shuffle:
         return np.arange(count)
-    rng = generator(seed, Purpose.LOADER, draw=epoch)
+    rng = generator(seed, Purpose.LOADER, attempt=LoaderStream.ROWS, draw=epoch)
     parts = [np.arange(blocks[k], blocks[k + 1]) for k in rng.permutation(len(blocks) - 1)]
     windows = [np.concatenate(parts[k : k + WINDOW]) for k in range(0, len(parts), WINDOW)]
     return np.concatenate([rng.permutation(w) for w in windows] or [np.arange(0)])

@@ -6,16 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from internav_data.records import Purpose, generator
+from internav_data.records import LoaderStream, Purpose, generator
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.dataset import Dataset
     from internav_data.records import Episode
-
-_RUNS, _WITHIN = 1, 2
-"""Where the seeds table has attempts: what of the order is drawn."""
 
 
 def scene_bounds(dataset: Dataset[Episode]) -> NDArray[np.int64]:
@@ -69,7 +66,7 @@ class EpisodeOrder:
         if not self._shuffle:
             return offset
         if epoch != self._epoch:
-            rng = generator(self._seed, Purpose.LOADER, attempt=_RUNS, draw=epoch)
+            rng = generator(self._seed, Purpose.LOADER, attempt=LoaderStream.HOUSES, draw=epoch)
             self._runs = rng.permutation(len(self._scenes))
             self._ends = np.cumsum(self._lengths[self._runs])
             self._epoch = epoch
@@ -78,6 +75,6 @@ class EpisodeOrder:
         nth = offset - int(self._ends[at]) + int(self._lengths[run])
         scene = int(self._scenes[run])
         low, high = int(self._bounds[scene]), int(self._bounds[scene + 1])
-        rng = generator(self._seed, Purpose.LOADER, scene, _WITHIN, 0, epoch)
+        rng = generator(self._seed, Purpose.LOADER, scene, LoaderStream.EPISODES, 0, epoch)
         within = rng.permutation(high - low)
         return low + int(within[int(self._starts[run]) + nth])

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from internav_data.evaluation.metrics import EpisodeResult, result_of
-from internav_data.records import Purpose, generator
+from internav_data.records import EvaluationStream, Purpose, generator
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import Action
 
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 """What an empty seat does: nothing, until the last episodes have ended."""
 STEPS_AT_MOST = 10_000
-_SUBSET, _ACTIONS = 1, 0
-"""Where the seeds table has attempts: what of an evaluation is drawn."""
 
 
 class Policy(Protocol):
@@ -87,14 +85,14 @@ class EvaluationConfig:
 def episode_generator(seed: int, episode: Episode) -> Generator:
     """Return the random numbers of one episode of an evaluation, whoever plays it and when."""
     scene = int(episode.scene_id.rpartition("-")[2])
-    return generator(seed, Purpose.EVALUATION, scene, _ACTIONS, episode.index)
+    return generator(seed, Purpose.EVALUATION, scene, EvaluationStream.ACTIONS, episode.index)
 
 
 def chosen(count: int, limit: int | None) -> list[int]:
     """Return the numbers of the episodes to play, ascending: all, or a fixed choice of them."""
     if limit is None or limit >= count:
         return list(range(count))
-    order = generator(0, Purpose.EVALUATION, attempt=_SUBSET).permutation(count)
+    order = generator(0, Purpose.EVALUATION, attempt=EvaluationStream.SUBSET).permutation(count)
     return sorted(order[:limit].tolist())
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from internav_data.evaluation.metrics import GROUPS, MEASURES
-from internav_data.records import Purpose, generator
+from internav_data.records import EvaluationStream, Purpose, generator
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
@@ -28,8 +28,6 @@ CONFIDENCE: Final = 0.95
 POWER: Final = 0.8
 DRAWS: Final = 4000
 """Of the bootstrap."""
-_BOOTSTRAP: Final = 2
-"""Where the seeds table has attempts."""
 _TWO: Final = 2
 
 
@@ -147,7 +145,7 @@ def scene_interval(
     sums = [_scene_sums(each, measure, names) for each in (results, other) if each is not None]
     if len(names) < _TWO or any(s[1].sum() == 0.0 for s in sums):
         return None
-    rng = generator(0, Purpose.EVALUATION, attempt=_BOOTSTRAP)
+    rng = generator(0, Purpose.EVALUATION, attempt=EvaluationStream.BOOTSTRAP)
     weights = rng.multinomial(len(names), np.full(len(names), 1.0 / len(names)), DRAWS)
     ones = np.ones((1, len(names)))
     drawn, whole = (_figure(w, sums) for w in (weights.astype(np.float64), ones))

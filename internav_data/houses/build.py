@@ -13,7 +13,7 @@ from internav_data.houses.plan_file import load_floor_plan
 from internav_data.houses.programme import programme
 from internav_data.houses.standards import CEILING_CM
 from internav_data.houses.walls import build_walls
-from internav_data.records import Door, House, Purpose, Room, Window, generator
+from internav_data.records import Door, FloorPlanStream, House, Purpose, Room, Window, generator
 from internav_data.records.splits import split_of_scene
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def _rooms(
 
 def _ceiling_cm(seed: int, scene: int, attempt: int) -> int:
     """Draw a height for the whole house: mostly 2.5 to 2.8 m."""
-    rng = generator(seed, Purpose.FLOOR_PLAN, scene, attempt, draw=1)
+    rng = generator(seed, Purpose.FLOOR_PLAN, scene, attempt, draw=FloorPlanStream.CEILING)
     low, high = CEILING_CM
     draw = float(rng.random())
     return 5 * round((low + (high - low) * draw * draw) / 5)

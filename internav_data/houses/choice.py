@@ -18,7 +18,7 @@ from internav_data.houses.standards import (
     WANTED,
     type_pair,
 )
-from internav_data.records import OUTSIDE, Purpose, generator
+from internav_data.records import OUTSIDE, FloorPlanStream, Purpose, generator
 from internav_data.records.errors import QuarantineError
 
 if TYPE_CHECKING:
@@ -218,7 +218,7 @@ def choose_floor_plan(
         Never for programmes of 1 to 10 rooms; it guards against standards that exclude each other.
 
     """
-    rng = generator(seed, Purpose.FLOOR_PLAN, scene, attempt)
+    rng = generator(seed, Purpose.FLOOR_PLAN, scene, attempt, draw=FloorPlanStream.CANDIDATES)
     min_door_cm = MIN_DOOR_CM[config.preset]
     best: FloorPlan | None = None
     # Tight programmes get more draws, but only until the first plan that holds.

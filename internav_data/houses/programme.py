@@ -13,7 +13,7 @@ from internav_data.houses.standards import (
     STANDARDS,
     RoomStandard,
 )
-from internav_data.records import Purpose, generator
+from internav_data.records import ProgrammeStream, Purpose, generator
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -134,7 +134,7 @@ def programme(seed: int, scene: int, config: HouseConfig, attempt: int) -> tuple
     The number of rooms is the same in every attempt: the quota must not depend on what failed.
     """
     request = config.check()
-    rng = generator(seed, Purpose.PROGRAMME, scene, attempt, episode=1)
+    rng = generator(seed, Purpose.PROGRAMME, scene, attempt, episode=ProgrammeStream.ROOMS)
     if request.programme:
         types = list(request.programme)
     else:

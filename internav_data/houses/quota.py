@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from internav_data.records import Purpose, generator
+from internav_data.records import ProgrammeStream, Purpose, generator
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -39,7 +39,7 @@ def room_count(seed: int, scene: int, shares: Mapping[int, float] = SHARES) -> i
         Share by room count; they need not sum to one.
 
     """
-    turn = float(generator(seed, Purpose.PROGRAMME).random())
+    turn = float(generator(seed, Purpose.PROGRAMME, episode=ProgrammeStream.COUNTS).random())
     position = (turn + scene * GOLDEN) % 1.0 * sum(shares.values())
     for count in sorted(shares):
         position -= shares[count]

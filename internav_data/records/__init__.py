@@ -28,7 +28,16 @@ from internav_data.records.houses import (
     Window,
 )
 from internav_data.records.poses import Pose, Quaternion, Vec2, Vec3
-from internav_data.records.seeds import Purpose, generator
+from internav_data.records.seeds import (
+    EvaluationStream,
+    FloorPlanStream,
+    LoaderStream,
+    ProgrammeStream,
+    Purpose,
+    SceneKey,
+    TrainingStream,
+    generator,
+)
 
 __all__ = [
     "OUTSIDE",
@@ -37,11 +46,14 @@ __all__ = [
     "Door",
     "DoorKind",
     "Episode",
+    "EvaluationStream",
     "Expert",
+    "FloorPlanStream",
     "Goal",
     "House",
     "HousePreset",
     "InternavError",
+    "LoaderStream",
     "Material",
     "Mode",
     "NodePath",
@@ -50,14 +62,17 @@ __all__ = [
     "Part",
     "Physics",
     "Pose",
+    "ProgrammeStream",
     "Purpose",
     "Quaternion",
     "Redraw",
     "Room",
+    "SceneKey",
     "SceneObject",
     "Shape",
     "Split",
     "Start",
+    "TrainingStream",
     "Vec2",
     "Vec3",
     "Wall",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from internav_data.dataset import ASSETS, EPISODES, SCENES, from_table, read_table
 from internav_data.dataset.parquet import open_parquet, read_group
-from internav_data.records import Purpose, generator
+from internav_data.records import LoaderStream, Purpose, generator
 from internav_data.records.errors import UsageError
 from internav_data.verification.checked_config import CheckedConfig, checked_config
 from internav_data.verification.files import check_file, check_listing, check_manifest
@@ -147,7 +147,7 @@ def _check_scenes(
     if not assets or not shard_refs:
         return
     if sample is not None and sample < len(shard_refs):
-        rng = generator(manifest.seed, Purpose.LOADER, draw=sample)
+        rng = generator(manifest.seed, Purpose.LOADER, attempt=LoaderStream.ROWS, draw=sample)
         chosen = sorted(rng.permutation(len(shard_refs))[:sample].tolist())
         shard_refs = [shard_refs[k] for k in chosen]
     units = [

@@ -17,7 +17,7 @@ from internav_data.camp.agents.flat import PPOAgent, PPOIntentAgent, RandomAgent
 from internav_data.camp.agents.hierarchy import Hierarchy
 from internav_data.camp.agents.nie import NIEAgent
 from internav_data.camp.agents.protocol import Agent, AgentStep, Batch, Evaluated, State
-from internav_data.records import Purpose, generator
+from internav_data.records import Purpose, TrainingStream, generator
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
@@ -49,8 +49,6 @@ AGENTS: Final[dict[str, Callable[[CampConfig], Agent]]] = {
 }
 """What makes the agent of each method."""
 GROUP: Final = "internav.agents"
-_PARAMETERS: Final = 2
-"""Where the seeds table has attempts: initial parameters."""
 
 
 def agent_names() -> list[str]:
@@ -72,7 +70,9 @@ def make_agent(name: str, config: CampConfig) -> Agent:
         if name not in own:
             raise UsageError(f"method {name!r}: expected one of {', '.join(agent_names())}")
         make = own[name].load()
-    seed = generator(config.seed, Purpose.TRAINING, attempt=_PARAMETERS).integers(2**62)
+    seed = generator(config.seed, Purpose.TRAINING, attempt=TrainingStream.PARAMETERS).integers(
+        2**62
+    )
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(int(seed))
         agent: Agent = make(config)
