@@ -37,16 +37,16 @@ def test_reading_imports_nothing_heavy(tmp_path, hand_house, hand_episode):
     from internav_data.dataset import (
         Identity,
         assemble,
-        open_work,
-        write_quarantine,
-        write_scene_work,
+        open_staging,
+        stage_quarantine,
+        stage_scene,
     )
 
     out = tmp_path / "d"
     identity = Identity("test", "1", 0, 1, "0", {})
-    write_scene_work(open_work(out, identity), 3, hand_house, [hand_episode])
+    stage_scene(open_staging(out, identity), 3, hand_house, [hand_episode])
     for scene in range(3):
-        write_quarantine(out / ".work", scene, "none", split="train", attempts=1)
+        stage_quarantine(out, scene, "none", split="train", attempts=1)
     assemble(out, identity, tuple(hand_house.assets.values()), 4)
     code = f"""
 from internav_data import load_dataset

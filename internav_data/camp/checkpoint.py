@@ -11,7 +11,6 @@ What training is between two updates, as counters and tensors by name; and back 
 from __future__ import annotations
 
 import json
-import os
 import platform
 import shutil
 from dataclasses import dataclass, field
@@ -25,7 +24,12 @@ from safetensors.torch import load_file, save_file
 
 from internav_data.camp.agents import make_agent
 from internav_data.camp.config import from_mapping, plain, preset
-from internav_data.core.files import file_sha256, sync, write_atomically
+from internav_data.core.storage import (
+    file_sha256,
+    sync,
+    write_atomically,
+    write_folder_atomically,
+)
 from internav_data.records.errors import CorruptDataError, InternavError, UsageError
 
 if TYPE_CHECKING:
@@ -201,10 +205,7 @@ def export_agent(path: str | Path, folder: str | Path, which: str = "last") -> P
 
 
 def _write_folder(folder: Path, checkpoint: Checkpoint) -> None:
-    temporary = folder.with_name(f".{folder.name}.{os.getpid()}.tmp")
-    shutil.rmtree(temporary, ignore_errors=True)
-    temporary.mkdir(parents=True)
-    try:
+    def fill(temporary: Path) -> None:
         files = {}
         for name, tensors in ((WEIGHTS, checkpoint.weights), (TRAINING, checkpoint.training)):
             kept = {key: value.detach().cpu().contiguous() for key, value in tensors.items()}
@@ -227,12 +228,8 @@ def _write_folder(folder: Path, checkpoint: Checkpoint) -> None:
         }
         text = json.dumps(said, indent=1, allow_nan=False)
         write_atomically(temporary / ABOUT, (text + "\n").encode())
-        sync(temporary)
-        temporary.rename(folder)
-    except BaseException:
-        shutil.rmtree(temporary, ignore_errors=True)
-        raise
-    sync(folder.parent)
+
+    write_folder_atomically(folder, fill)
 
 
 def _pointer(run: Path) -> dict[str, Any]:

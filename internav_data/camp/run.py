@@ -20,7 +20,7 @@ from internav_data.camp.logging import LOG
 from internav_data.camp.stages import PARTS, check_parts, plan
 from internav_data.camp.train import Trainer
 from internav_data.core.config import config_toml
-from internav_data.core.files import write_atomically
+from internav_data.core.storage import write_atomically
 from internav_data.records import Purpose, TrainingStream, generator
 from internav_data.records.errors import CorruptDataError, UsageError
 

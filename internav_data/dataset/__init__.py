@@ -1,6 +1,12 @@
 """Datasets on disk: schemas, shards, manifest, loader, statistics and dataset card."""
 
-from internav_data.dataset.commit import Identity, assemble, done_scenes, identity_of, open_work
+from internav_data.dataset.commit import (
+    Identity,
+    assemble,
+    done_scenes,
+    identity_of,
+    open_staging,
+)
 from internav_data.dataset.decode import from_table
 from internav_data.dataset.digest import logical_digest
 from internav_data.dataset.encode import to_table
@@ -24,12 +30,13 @@ from internav_data.dataset.manifest import (
 from internav_data.dataset.outcome_stats import refused_share
 from internav_data.dataset.parquet import FileInfo, read_table, write_parquet
 from internav_data.dataset.staging import (
+    STAGING,
     SceneState,
-    finished_scenes,
-    read_scene_rows,
-    work_dir,
-    write_quarantine,
-    write_scene_work,
+    any_staged,
+    read_staged_rows,
+    stage_quarantine,
+    stage_scene,
+    staged_scenes,
 )
 from internav_data.dataset.stats import compute_stats
 from internav_data.dataset.tables import (
@@ -46,6 +53,7 @@ __all__ = [
     "EPISODES",
     "FORMAT_VERSION",
     "SCENES",
+    "STAGING",
     "TABLES",
     "DataFile",
     "Dataset",
@@ -55,30 +63,30 @@ __all__ = [
     "Quarantined",
     "SceneState",
     "TableSpec",
+    "any_staged",
     "assemble",
     "compute_stats",
     "dataset_folder",
     "done_scenes",
-    "finished_scenes",
     "from_table",
     "has_manifest",
     "identity_of",
     "load_dataset",
     "locate",
     "logical_digest",
-    "open_work",
+    "open_staging",
     "read_manifest",
-    "read_scene_rows",
+    "read_staged_rows",
     "read_table",
     "refused_share",
     "schema_folder",
     "schema_text",
     "schemas",
+    "stage_quarantine",
+    "stage_scene",
+    "staged_scenes",
     "to_table",
-    "work_dir",
     "write_manifest",
     "write_parquet",
-    "write_quarantine",
-    "write_scene_work",
     "write_schemas",
 ]

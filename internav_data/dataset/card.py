@@ -51,9 +51,11 @@ def _front_matter(manifest: Manifest) -> str:
         lines += [f"- config_name: {table}"] + ["  default: true"] * (table == "episodes")
         lines.append("  data_files:")
         for split in manifest.counts:
-            if manifest.of(table, split):
-                lines += [f"  - split: {split}", f"    path: data/{table}/{split}-*.parquet"]
-    lines += ["- config_name: assets", "  data_files: data/assets.parquet", "---"]
+            if files := manifest.of(table, split):
+                lines += [f"  - split: {split}", "    path:"]
+                lines += [f"    - {file.path}" for file in files]
+    lines += ["- config_name: assets", "  data_files:"]
+    lines += [f"  - {file.path}" for file in manifest.of("assets")] + ["---"]
     return "\n".join(lines)
 
 
@@ -129,8 +131,17 @@ episode = ds[0]
 house = ds.scene(episode.scene_id)
 ```
 
-It is plain Parquet: `datasets.load_dataset("path/to/this/folder", "episodes")`,
-`duckdb.sql("from 'data/episodes/*.parquet'")`, `polars.read_parquet("data/episodes/*.parquet")`.
+It is plain Parquet: `datasets.load_dataset("path/to/this/folder", "episodes")` of Hugging Face
+reads the files that are listed above, and pandas, Polars and DuckDB those that `manifest.json`
+names:
+
+```python
+import json
+import polars
+
+files = json.load(open("manifest.json"))["files"]
+episodes = polars.read_parquet([f["path"] for f in files if f["table"] == "episodes"])
+```
 """
 
 

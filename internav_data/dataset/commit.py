@@ -1,31 +1,27 @@
-"""From unfinished work to a finished dataset: readers see the old one, the new one, or none.
+"""From staged scenes to a finished dataset: readers see the old one, the new one, or none.
 
 The order of things, for whoever generates:
 
-1. `open_work(out, identity)` before the first scene: refuses a folder that holds anything else or
-   another configuration's dataset, and returns the work folder.
-2. `write_scene_work` / `write_quarantine` for every scene (any process, any order); on resume skip
-   `done_scenes(out)`: scenes in the finished dataset that is being extended, or in `.work/`.
-3. `assemble(out, identity, assets, scenes)`: shards are built in `.work/shards/`, renamed into
-   `data/`, the manifest last, `.work/` removed. Interrupted anywhere, calling it again finishes.
+1. `open_staging(out, identity)` before the first scene: refuses a folder that holds anything else
+   or another configuration's dataset.
+2. `stage_scene` / `stage_quarantine` for every scene (any process, any order); on resume skip
+   `done_scenes(out)`: scenes in the finished dataset that is being extended, or staged.
+3. `assemble(out, identity, assets, scenes)`: shards go into `data/`, the manifest last; then what
+   it does not name and `.work/` are removed. Interrupted anywhere, calling it again finishes.
 
-When a dataset is extended, the manifest in place stays valid until the next one replaces it: new
-shards get new names ("-of-N" grows). Where a name stays but not its content, the shard first comes
-under an interim name with a manifest that says so, then under its own name with a second manifest.
+When a dataset is extended, the manifest in place stays valid until the next one replaces it: a
+shard that differs has another name (see `shards`).
 """
 
 from __future__ import annotations
 
 import json
-import shutil
 from collections import Counter
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path, PurePosixPath
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from internav_data.core.files import link_or_copy, write_atomically
+from internav_data.core.storage import Store, StoreLike, exists, is_temporary, store_of
 from internav_data.dataset.manifest import (
-    MANIFEST,
     Counts,
     DataFile,
     Manifest,
@@ -34,9 +30,9 @@ from internav_data.dataset.manifest import (
     read_manifest,
     write_manifest,
 )
-from internav_data.dataset.metadata_files import write_sidecars
-from internav_data.dataset.shards import SPLITS, SceneSource, write_shards
-from internav_data.dataset.staging import SceneState, finished_scenes, work_dir
+from internav_data.dataset.metadata_files import write_metadata
+from internav_data.dataset.shards import SPLITS, SceneSource, put_shards
+from internav_data.dataset.staging import STAGING, SceneState, staged_scenes
 from internav_data.dataset.tables import FORMAT_VERSION
 from internav_data.records.errors import CorruptDataError, UsageError
 
@@ -45,12 +41,15 @@ if TYPE_CHECKING:
 
     from internav_data.records import Asset
 
-_IDENTITY = "identity.json"
+_IDENTITY = f"{STAGING}identity.json"
 
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What makes two runs the same dataset; the number of scenes and workers does not."""
+    """Inputs that decide every scene: runs of one identity make one dataset.
+
+    The number of scenes and of workers is no part of it.
+    """
 
     generator: str
     generator_version: str
@@ -73,8 +72,8 @@ def identity_of(manifest: Manifest) -> Identity:
     )
 
 
-def open_work(out: Path, identity: Identity) -> Path:
-    """Prepare a folder for work on a dataset and return its work folder.
+def open_staging(out: StoreLike, identity: Identity) -> Store:
+    """Prepare a folder for staging the scenes of a dataset; return its store.
 
     Raises
     ------
@@ -82,30 +81,34 @@ def open_work(out: Path, identity: Identity) -> Path:
         `out` is a file, holds something that is no dataset, or another configuration's dataset.
 
     """
-    work = work_dir(out)
-    if out.exists() and not out.is_dir():
-        raise UsageError(f"{out}: is a file: give a folder that is new, empty or a dataset")
-    if has_manifest(out):
-        _same(out, identity_of(read_manifest(out)), identity)
-    if (work / _IDENTITY).is_file():
-        _same(out, _read_identity(work), identity)
-    elif not has_manifest(out) and out.exists() and any(p.name != ".work" for p in out.iterdir()):
-        raise UsageError(f"{out}: holds something that is no dataset: give a new or empty folder")
-    write_atomically(work / _IDENTITY, (json.dumps(asdict(identity), indent=1) + "\n").encode())
-    return work
-
-
-def _read_identity(work: Path) -> Identity:
-    path = work / _IDENTITY
+    store = store_of(out)
+    place = store.at("")
     try:
-        return Identity(**json.loads(path.read_bytes()))
+        names = store.names()
+    except NotADirectoryError:
+        raise UsageError(
+            f"{place}: is a file: give a folder that is new, empty or a dataset"
+        ) from None
+    if has_manifest(store):
+        _same(place, identity_of(read_manifest(store)), identity)
+    if exists(store, _IDENTITY):
+        _same(place, _read_identity(store), identity)
+    elif not has_manifest(store) and any(not name.startswith(STAGING) for name in names):
+        raise UsageError(f"{place}: holds something that is no dataset: give a new or empty folder")
+    store.put(_IDENTITY, (json.dumps(asdict(identity), indent=1) + "\n").encode())
+    return store
+
+
+def _read_identity(store: Store) -> Identity:
+    try:
+        return Identity(**json.loads(store.read(_IDENTITY)))
     except (ValueError, TypeError) as error:
         raise CorruptDataError(
-            f"{path}: damaged ({error}): remove {work} and start anew"
+            f"{store.at(_IDENTITY)}: damaged ({error}): remove {store.at(STAGING)} and start anew"
         ) from error
 
 
-def _same(out: Path, there: Identity, wanted: Identity) -> None:
+def _same(out: str, there: Identity, wanted: Identity) -> None:
     old, new = (json.loads(json.dumps(asdict(i))) for i in (there, wanted))
     if difference := _first_difference(old, new, ""):
         raise UsageError(
@@ -124,39 +127,43 @@ def _first_difference(old: Any, new: Any, path: str) -> str:  # noqa: ANN401 - J
     return "" if old == new else f"{path}: there {old!r}, asked for {new!r}"
 
 
-def done_scenes(out: Path) -> frozenset[int]:
+def done_scenes(out: StoreLike) -> frozenset[int]:
     """Return the numbers of all scenes that need not be built again, quarantined ones included."""
-    done = set(finished_scenes(work_dir(out)))
-    if has_manifest(out):
-        done.update(range(read_manifest(out).scenes))
+    store = store_of(out)
+    done = set(staged_scenes(store))
+    if has_manifest(store):
+        done.update(range(read_manifest(store).scenes))
     return frozenset(done)
 
 
-def assemble(out: Path, identity: Identity, assets: Sequence[Asset], scenes: int) -> Manifest:
-    """Make the dataset of scenes 0 … scenes - 1 from finished work and what is there already.
+def assemble(out: StoreLike, identity: Identity, assets: Sequence[Asset], scenes: int) -> Manifest:
+    """Make the dataset of scenes 0 … scenes - 1 from staged scenes and what is there already.
 
     Raises
     ------
     CorruptDataError
-        A scene is neither in the dataset nor in the work folder, or a file is damaged.
+        A scene is neither in the dataset nor staged, or a file is damaged.
 
     """
-    work = work_dir(out)
-    old = read_manifest(out) if has_manifest(out) else None
-    _remove_stale(out, old)
-    scenes = max(scenes, old.scenes if old else 0)
-    states = finished_scenes(work, range(old.scenes if old else 0, scenes))
-    missing = [k for k in range(old.scenes if old else 0, scenes) if k not in states]
+    store = store_of(out)
+    old = read_manifest(store) if has_manifest(store) else None
+    _remove_stale(store, old)
+    first = old.scenes if old else 0
+    scenes = max(scenes, first)
+    states = staged_scenes(store, range(first, scenes))
+    missing = [k for k in range(first, scenes) if k not in states]
     if missing:
         raise CorruptDataError(
-            f"{out}: {len(missing)} scenes are not finished, first {missing[0]}: generate again"
+            f"{store.at('')}: {len(missing)} scenes are not finished, "
+            f"first {missing[0]}: generate again"
         )
-    source = SceneSource(out, old, states)
-    shutil.rmtree(work / "shards", ignore_errors=True)
-    built = write_shards(work / "shards", source, assets)
-    manifest = _manifest(identity, scenes, old, states, source, built)
-    _place(out, work / "shards", old, manifest)
-    shutil.rmtree(work)
+    source = SceneSource(store, old, states)
+    files = put_shards(store, source, assets)
+    manifest = _manifest(identity, scenes, old, states, source, files)
+    write_metadata(store, manifest)
+    write_manifest(store, manifest)
+    _remove_stale(store, manifest)
+    store.remove(STAGING)
     return manifest
 
 
@@ -199,38 +206,10 @@ def _manifest(
     )
 
 
-def _place(out: Path, shards: Path, old: Manifest | None, manifest: Manifest) -> None:
-    before = {f.path: f.sha256 for f in old.files} if old else {}
-    interim = {
-        f.path: _interim_name(f)
-        for f in manifest.files
-        if f.path in before and before[f.path] != f.sha256
-    }
-    for file in manifest.files:
-        target = out / interim.get(file.path, file.path)
-        if before.get(file.path) != file.sha256:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            (shards / PurePosixPath(file.path).relative_to("data")).replace(target)
-    if interim:
-        files = tuple(replace(f, path=interim.get(f.path, f.path)) for f in manifest.files)
-        write_manifest(out, replace(manifest, files=files))
-        for final, name in interim.items():
-            link_or_copy(out / name, out / final)
-    write_sidecars(out, manifest)
-    write_manifest(out, manifest)
-    _remove_stale(out, manifest)
-
-
-def _interim_name(file: DataFile) -> str:
-    return file.path.removesuffix(".parquet") + f".{file.sha256[:12]}.parquet"
-
-
-def _remove_stale(out: Path, manifest: Manifest | None) -> None:
+def _remove_stale(store: Store, manifest: Manifest | None) -> None:
     """Remove shards that the manifest in place does not name, and temporary files."""
     keep = {f.path for f in manifest.files} if manifest else set()
-    for path in sorted((out / "data").rglob("*")):
-        name = path.relative_to(out).as_posix()
-        if path.is_file() and name not in keep and path.suffix in {".parquet", ".tmp"}:
-            path.unlink()
-    for path in out.glob(f".{MANIFEST}.*.tmp"):
-        path.unlink()
+    for name in store.names():
+        unnamed = name.startswith("data/") and name.endswith(".parquet") and name not in keep
+        if unnamed or is_temporary(name):
+            store.remove(name)

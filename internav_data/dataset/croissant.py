@@ -64,7 +64,8 @@ def croissant(manifest: Manifest) -> dict[str, Any]:
         "by physics, block or lengthen an agent's way to its goal.",
         "conformsTo": "http://mlcommons.org/croissant/1.0",
         "version": f"{FORMAT_VERSION}.0.0",
-        "distribution": [_file(f) for f in manifest.files] + [_file_set(spec) for spec in tables],
+        "distribution": [_file(f) for f in manifest.files]
+        + [_file_set(spec, manifest) for spec in tables],
         "recordSet": [_record_set(spec) for spec in tables],
     }
 
@@ -81,13 +82,13 @@ def _file(file: DataFile) -> dict[str, Any]:
     }
 
 
-def _file_set(spec: TableSpec[Any]) -> dict[str, Any]:
+def _file_set(spec: TableSpec[Any], manifest: Manifest) -> dict[str, Any]:
     return {
         "@type": "cr:FileSet",
         "@id": f"{spec.name}-files",
         "name": f"{spec.name}-files",
         "encodingFormat": _PARQUET,
-        "includes": f"data/{spec.name}/*.parquet",
+        "includes": [file.path for file in manifest.of(spec.name)],
     }
 
 

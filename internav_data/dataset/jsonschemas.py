@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from internav_data.core.field_docs import descriptions
-from internav_data.core.files import write_atomically
+from internav_data.core.storage import StoreLike, store_of
 from internav_data.dataset.manifest import Manifest
 from internav_data.dataset.nodes import (
     Coordinates,
@@ -47,10 +47,11 @@ def schema_text(schema: dict[str, Any]) -> str:
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
 
-def write_schemas(folder: Path) -> None:
-    """Write every schema into a folder."""
+def write_schemas(root: StoreLike, prefix: str = "") -> None:
+    """Write every schema into a folder, below names that begin with `prefix`."""
+    store = store_of(root)
     for name, schema in schemas().items():
-        write_atomically(folder / name, schema_text(schema).encode())
+        store.put(f"{prefix}{name}", schema_text(schema).encode())
 
 
 def schema_folder() -> Path:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import functools
 import hashlib
 from collections import OrderedDict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast, overload
 
 import numpy as np
 
+from internav_data.core.storage import Store, StoreLike, store_of
 from internav_data.dataset.decode import from_table
 from internav_data.dataset.location import dataset_folder
-from internav_data.dataset.manifest import MANIFEST, Manifest, locate, open_file, read_manifest
+from internav_data.dataset.manifest import MANIFEST, Manifest, check_file, open_file, read_manifest
 from internav_data.dataset.parquet import read_all
 from internav_data.dataset.row_group_cache import RowGroupCache
 from internav_data.dataset.select import Filters, check_columns, matching_rows, read_columns
@@ -22,7 +24,6 @@ from internav_data.records.errors import CorruptDataError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
-    from pathlib import Path
 
     import pandas as pd  # type: ignore[import-untyped,unused-ignore]
     import pyarrow as pa
@@ -35,7 +36,7 @@ _RUN = 64
 
 
 def load_dataset(
-    path: str | Path | None = None,
+    path: StoreLike | None = None,
     split: str | None = None,
     filters: Filters | None = None,
     columns: Sequence[str] | None = None,
@@ -44,7 +45,7 @@ def load_dataset(
 
     Parameters
     ----------
-    path : str or Path, optional
+    path : str, Path or Store, optional
         Folder that `internav-gen generate` wrote; not given: the folder that the environment
         variable INTERNAV_DATASET names, else `internav-dataset` in the current directory.
     split : str, optional
@@ -63,24 +64,25 @@ def load_dataset(
         An unknown split, column or operator.
 
     """
-    return Dataset(dataset_folder(path), split, filters, columns)
+    store = path if isinstance(path, Store) else store_of(dataset_folder(path))
+    return Dataset(store, split, filters, columns)
 
 
 class Dataset(Generic[E]):
     """Episodes by number: `len(ds)`, `ds[i]`, `ds[a:b]`, iteration; houses by scene.
 
-    Pickled by path and opened again where it is unpickled, so it goes into DataLoader workers.
+    Pickled by its path and opened again where it is unpickled, so it goes into DataLoader workers.
     """
 
     def __init__(
         self,
-        path: Path,
+        path: StoreLike,
         split: str | None = None,
         filters: Filters | None = None,
         columns: Sequence[str] | None = None,
     ) -> None:
-        self.path = path
-        self.manifest: Manifest = read_manifest(path)
+        self.store = store = store_of(path)
+        self.manifest: Manifest = read_manifest(store)
         self.split, self.filters = split, filters
         self.columns = None if columns is None else tuple(columns)
         if split is not None and split not in self.manifest.counts:
@@ -89,19 +91,19 @@ class Dataset(Generic[E]):
             )
         if columns is not None:
             check_columns(columns, EPISODES)
-        self._digest = hashlib.sha256((path / MANIFEST).read_bytes()).hexdigest()
+        self._digest = hashlib.sha256(store.read(MANIFEST)).hexdigest()
         self._files = self.manifest.of("episodes", split)
-        self.shelf = RowGroupCache(path, self._files, EPISODES, self.columns)
+        self.shelf = RowGroupCache(store, self._files, EPISODES, self.columns)
         self._houses: OrderedDict[str, House] = OrderedDict()
         for file in (*self.manifest.of("scenes"), *self.manifest.of("assets")):
-            locate(path, file)
+            check_file(store, file)
         self._index: NDArray[np.int64] | None = None
         if filters is not None:
-            self._index = matching_rows(path, self._files, filters)
+            self._index = matching_rows(store, self._files, filters)
 
     def __getstate__(self) -> dict[str, Any]:
         return {
-            "path": self.path,
+            "path": self.store,
             "split": self.split,
             "filters": self.filters,
             "columns": self.columns,
@@ -117,6 +119,11 @@ class Dataset(Generic[E]):
     def __repr__(self) -> str:
         chosen = f", split={self.split!r}" if self.split else ""
         return f"Dataset({str(self.path)!r}{chosen}, {len(self)} episodes)"
+
+    @property
+    def path(self) -> Path:
+        """Folder of the dataset, as it was given."""
+        return Path(self.store.at(""))
 
     @property
     def fingerprint(self) -> str:
@@ -202,22 +209,22 @@ class Dataset(Generic[E]):
     def assets(self) -> Mapping[str, Asset]:
         """Every asset of the dataset by its id."""
         (file,) = self.manifest.of("assets")
-        with open_file(self.path, file, ASSETS) as opened:
-            table = read_all(self.path / file.path, opened, ASSETS)
+        with open_file(self.store, file, ASSETS) as opened:
+            table = read_all(self.store.at(file.path), opened, ASSETS)
         return {asset.asset_id: asset for asset in from_table(table, ASSETS)}
 
     @functools.cached_property
     def _scenes(self) -> tuple[RowGroupCache, dict[str, int]]:
         files = self.manifest.of("scenes")
-        shelf = RowGroupCache(self.path, files, SCENES, extra=lambda: {"assets": self.assets})
-        ids = read_columns(self.path, files, SCENES, ["scene_id"])["scene_id"].to_pylist()
+        shelf = RowGroupCache(self.store, files, SCENES, extra=lambda: {"assets": self.assets})
+        ids = read_columns(self.store, files, SCENES, ["scene_id"])["scene_id"].to_pylist()
         return shelf, {scene_id: row for row, scene_id in enumerate(ids)}
 
     @property
     def scene_ids(self) -> tuple[str, ...]:
         """The ids of all scenes of the split, in order."""
         files = self.manifest.of("scenes", self.split)
-        return tuple(read_columns(self.path, files, SCENES, ["scene_id"])["scene_id"].to_pylist())
+        return tuple(read_columns(self.store, files, SCENES, ["scene_id"])["scene_id"].to_pylist())
 
     def scene(self, scene_id: str) -> House:
         """Return a house with its assets.
@@ -242,7 +249,7 @@ class Dataset(Generic[E]):
         """Return the selected episodes as an Arrow table of the given (or all) columns."""
         names = columns or self.columns or EPISODES.schema.names
         check_columns(names, EPISODES)
-        table = read_columns(self.path, self._files, EPISODES, names)
+        table = read_columns(self.store, self._files, EPISODES, names)
         return table if self._index is None else table.take(self._index)
 
     def to_pandas(self, columns: Sequence[str] | None = None) -> pd.DataFrame:

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from internav_data.core.files import write_atomically
+from internav_data.core.storage import OutsideError, Store, StoreLike, exists, store_of
 from internav_data.dataset.location import making_command
 from internav_data.dataset.parquet import footer_sha256, open_parquet
+from internav_data.dataset.staging import STAGING
 from internav_data.dataset.tables import FORMAT_VERSION, TABLES
 from internav_data.records import Split  # noqa: TC001 - as above
 from internav_data.records.errors import CorruptDataError
@@ -109,17 +110,17 @@ class Manifest:
         return json.dumps(dataclasses.asdict(self), indent=1, ensure_ascii=False) + "\n"
 
 
-def write_manifest(root: Path, manifest: Manifest) -> None:
+def write_manifest(root: StoreLike, manifest: Manifest) -> None:
     """Put a manifest in place: from here on the folder is (another) dataset."""
-    write_atomically(root / MANIFEST, manifest.to_json().encode())
+    store_of(root).put(MANIFEST, manifest.to_json().encode())
 
 
-def has_manifest(root: Path) -> bool:
-    """Whether a folder holds a finished dataset."""
-    return (root / MANIFEST).is_file()
+def has_manifest(root: StoreLike) -> bool:
+    """Return whether a folder holds a finished dataset."""
+    return exists(store_of(root), MANIFEST)
 
 
-def read_manifest(root: Path) -> Manifest:
+def read_manifest(root: StoreLike) -> Manifest:
     """Return a dataset's manifest, checked: types, bounds, and paths inside the dataset.
 
     Raises
@@ -128,12 +129,12 @@ def read_manifest(root: Path) -> Manifest:
         Missing, damaged, of another format, or naming files outside the dataset.
 
     """
-    path = root / MANIFEST
+    store = store_of(root)
+    path = store.at(MANIFEST)
     try:
-        with path.open("rb") as stream:
-            text = stream.read(_MAX_BYTES + 1)
+        text = store.read(MANIFEST, stop=_MAX_BYTES + 1)
     except FileNotFoundError:
-        raise CorruptDataError(_absence(root)) from None
+        raise CorruptDataError(_absence(store)) from None
     except OSError as error:
         raise CorruptDataError(f"{path}: cannot be read: {error.strerror}") from error
     if len(text) > _MAX_BYTES:
@@ -147,12 +148,13 @@ def read_manifest(root: Path) -> Manifest:
     if len(manifest.files) > _MAX_FILES:
         raise CorruptDataError(f"{path}: names more than {_MAX_FILES} files: {_AGAIN}")
     for file in manifest.files:
-        _check_file(root, file)
+        _check_entry(path, file)
     return manifest
 
 
-def _absence(root: Path) -> str:
-    if (root / ".work").is_dir():
+def _absence(store: Store) -> str:
+    root = Path(store.at(""))
+    if store.names(STAGING):
         return (
             f"{root}: the dataset is not finished (no {MANIFEST}, but .work/): "
             "run `internav-gen generate` on it again to resume"
@@ -160,7 +162,7 @@ def _absence(root: Path) -> str:
     return f"{root}: no dataset here ({MANIFEST} is missing): `{making_command(root)}` makes one"
 
 
-def _check_version(path: Path, raw: Any) -> None:  # noqa: ANN401 - JSON
+def _check_version(path: str, raw: Any) -> None:  # noqa: ANN401 - JSON
     version = raw.get("format_version") if isinstance(raw, dict) else None
     if not isinstance(version, int) or isinstance(version, bool) or version < 1:
         raise CorruptDataError(
@@ -179,7 +181,7 @@ def _check_version(path: Path, raw: Any) -> None:  # noqa: ANN401 - JSON
         )
 
 
-def _parse(path: Path, raw: dict[str, Any]) -> Manifest:
+def _parse(path: str, raw: dict[str, Any]) -> Manifest:
     try:
         values = dict(raw)
         values["counts"] = {str(k): _made(Counts, v) for k, v in raw["counts"].items()}
@@ -212,8 +214,8 @@ def known_features() -> frozenset[str]:
     )
 
 
-def _check_file(root: Path, file: DataFile) -> None:
-    where = f"{root / MANIFEST}: file {file.path!r}"
+def _check_entry(manifest: str, file: DataFile) -> None:
+    where = f"{manifest}: file {file.path!r}"
     pure = PurePosixPath(file.path) if isinstance(file.path, str) else None
     if (
         pure is None
@@ -234,7 +236,7 @@ def _check_file(root: Path, file: DataFile) -> None:
             raise CorruptDataError(f"{where}: {name}: expected 0 … {most}, got {value!r}: {_AGAIN}")
 
 
-def open_file(root: Path, file: DataFile, spec: TableSpec[Any]) -> pq.ParquetFile:
+def open_file(root: StoreLike, file: DataFile, spec: TableSpec[Any]) -> pq.ParquetFile:
     """Open a file of the manifest; page checksums are verified as it is read.
 
     Raises
@@ -243,14 +245,17 @@ def open_file(root: Path, file: DataFile, spec: TableSpec[Any]) -> pq.ParquetFil
         Missing, truncated, edited, or of other columns.
 
     """
-    path = locate(root, file)
-    if footer_sha256(path) != file.footer_sha256:
-        raise CorruptDataError(f"{path}: the file's footer was damaged or edited: {_AGAIN}")
-    return open_parquet(path, spec)
+    store = store_of(root)
+    check_file(store, file)
+    if footer_sha256(store, file.path, file.bytes) != file.footer_sha256:
+        raise CorruptDataError(
+            f"{store.at(file.path)}: the file's footer was damaged or edited: {_AGAIN}"
+        )
+    return open_parquet(store.at(file.path), spec, store.source(file.path))
 
 
 def locate(root: Path, file: DataFile) -> Path:
-    """Return where a file of the manifest lies, after looking that it is the one meant.
+    """Return the path of a file of the manifest, checked as by `check_file`.
 
     Raises
     ------
@@ -258,17 +263,32 @@ def locate(root: Path, file: DataFile) -> Path:
         Missing, of another size, or a link out of the dataset.
 
     """
-    path = root / file.path
+    check_file(root, file)
+    return root / file.path
+
+
+def check_file(root: StoreLike, file: DataFile) -> None:
+    """Check that a file of the manifest is there and of the stated size.
+
+    Raises
+    ------
+    CorruptDataError
+        Missing, of another size, or a link out of the dataset.
+
+    """
+    store = store_of(root)
+    path = store.at(file.path)
     try:
-        size = path.stat().st_size
+        size = store.size(file.path)
+    except OutsideError:
+        raise CorruptDataError(
+            f"{path}: a link out of the dataset: put the file itself there"
+        ) from None
     except OSError as error:
         raise CorruptDataError(
             f"{path}: the file is missing ({error.strerror}): {_AGAIN}"
         ) from None
-    if not path.resolve().is_relative_to(root.resolve()):
-        raise CorruptDataError(f"{path}: a link out of the dataset: put the file itself there")
     if size != file.bytes:
         raise CorruptDataError(
             f"{path}: expected {file.bytes} bytes, got {size} (truncated or edited): {_AGAIN}"
         )
-    return path

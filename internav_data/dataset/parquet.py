@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -11,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from internav_data.core.files import file_sha256, write_with
+from internav_data.core.storage import Store, write_atomically
 from internav_data.dataset.compatibility import conformed, problems
 from internav_data.dataset.decode import one_array
 from internav_data.dataset.digest import logical_digest
@@ -21,6 +20,7 @@ from internav_data.records.errors import CorruptDataError
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
+    from typing import BinaryIO
 
     from internav_data.dataset.tables import TableSpec
 
@@ -38,7 +38,7 @@ MENDING = "fetch the file again from where it came, or generate the dataset anew
 
 @dataclass(frozen=True, slots=True)
 class FileInfo:
-    """What the manifest knows of one Parquet file."""
+    """Figures of one Parquet file that the manifest states."""
 
     path: str
     """Relative to the dataset's folder, with forward slashes."""
@@ -62,33 +62,43 @@ def write_parquet(path: Path, records: Sequence[R], spec: TableSpec[R]) -> FileI
 
 
 def write_table(path: Path, table: pa.Table, spec: TableSpec[Any]) -> FileInfo:
-    """Write a table of the spec's schema: atomically, and the same bytes for the same rows.
+    """Write a table of the spec's schema as a file, whole or not at all (see `parquet_bytes`)."""
+    data = parquet_bytes(table, spec)
+    write_atomically(path, data)
+    return file_info(path.name, data, table)
 
-    A row group ends only where a scene ends. The path in the result is the file's name.
+
+def parquet_bytes(table: pa.Table, spec: TableSpec[Any]) -> bytes:
+    """Return a table of the spec's schema as a Parquet file: the same bytes for the same rows.
+
+    A row group ends only where a scene ends.
     """
     table = table.combine_chunks()
+    sink = pa.BufferOutputStream()
+    with pq.ParquetWriter(
+        sink,
+        spec.schema,
+        compression="zstd",
+        compression_level=_ZSTD_LEVEL,
+        use_dictionary=True,
+        write_statistics=[*spec.filters],
+        write_page_checksum=True,
+    ) as writer:
+        for start, stop in group_bounds(table):
+            writer.write_table(table.slice(start, stop - start), row_group_size=stop - start)
+    return bytes(sink.getvalue())
 
-    def write(temporary: Path) -> None:
-        with pq.ParquetWriter(
-            temporary,
-            spec.schema,
-            compression="zstd",
-            compression_level=_ZSTD_LEVEL,
-            use_dictionary=True,
-            write_statistics=[*spec.filters],
-            write_page_checksum=True,
-        ) as writer:
-            for start, stop in group_bounds(table):
-                writer.write_table(table.slice(start, stop - start), row_group_size=stop - start)
 
-    write_with(path, write)
+def file_info(path: str, data: bytes, table: pa.Table) -> FileInfo:
+    """Return the figures of a Parquet file: its path, its bytes and the table in it."""
+    length = int.from_bytes(data[-_TAIL:-4], "little") + _TAIL
     return FileInfo(
-        path.name,
+        path,
         table.num_rows,
-        path.stat().st_size,
-        file_sha256(path),
-        footer_sha256(path),
-        logical_digest(table),
+        len(data),
+        hashlib.sha256(data).hexdigest(),
+        hashlib.sha256(data[-length:]).hexdigest(),
+        logical_digest(table.combine_chunks()),
     )
 
 
@@ -113,7 +123,7 @@ def group_bounds(table: pa.Table) -> list[tuple[int, int]]:
     return bounds
 
 
-def footer_sha256(path: Path) -> str:
+def footer_sha256(store: Store, name: str, size: int) -> str:
     """Return the sha256 of a Parquet file's footer, which page checksums don't cover.
 
     Raises
@@ -122,19 +132,26 @@ def footer_sha256(path: Path) -> str:
         Too short, or no Parquet file.
 
     """
-    with path.open("rb") as stream:
-        size = stream.seek(0, os.SEEK_END)
-        stream.seek(max(0, size - _TAIL))
-        tail = stream.read(_TAIL)
-        length = int.from_bytes(tail[:4], "little") + _TAIL
-        if tail[4:] != b"PAR1" or length > size:
-            raise damaged(path, ValueError("it does not end like a Parquet file"))
-        stream.seek(size - length)
-        return hashlib.sha256(stream.read(length)).hexdigest()
+    tail = store.read(name, max(0, size - _TAIL))
+    length = int.from_bytes(tail[:4], "little") + _TAIL
+    if tail[4:] != b"PAR1" or length > size:
+        raise damaged(store.at(name), ValueError("it does not end like a Parquet file"))
+    return hashlib.sha256(store.read(name, size - length)).hexdigest()
 
 
-def open_parquet(path: Path, spec: TableSpec[Any]) -> pq.ParquetFile:
+def open_parquet(
+    path: Path | str, spec: TableSpec[Any], source: Path | BinaryIO | None = None
+) -> pq.ParquetFile:
     """Open a Parquet file of the spec's columns.
+
+    Parameters
+    ----------
+    path
+        Place of the file, for error messages.
+    spec
+        Table of which it has the columns.
+    source
+        File to read; None: the one at `path`.
 
     Raises
     ------
@@ -143,7 +160,7 @@ def open_parquet(path: Path, spec: TableSpec[Any]) -> pq.ParquetFile:
 
     """
     try:
-        file = pq.ParquetFile(path, page_checksum_verification=True)
+        file = pq.ParquetFile(path if source is None else source, page_checksum_verification=True)
         schema = file.schema_arrow
     except FileNotFoundError:
         raise CorruptDataError(f"{path}: the file is missing: {MENDING}") from None
@@ -157,7 +174,7 @@ def open_parquet(path: Path, spec: TableSpec[Any]) -> pq.ParquetFile:
 
 
 def read_group(
-    path: Path,
+    path: Path | str,
     file: pq.ParquetFile,
     group: int,
     spec: TableSpec[Any],
@@ -194,7 +211,10 @@ def read_table(path: Path, spec: TableSpec[Any], columns: Sequence[str] | None =
 
 
 def read_all(
-    path: Path, file: pq.ParquetFile, spec: TableSpec[Any], columns: Sequence[str] | None = None
+    path: Path | str,
+    file: pq.ParquetFile,
+    spec: TableSpec[Any],
+    columns: Sequence[str] | None = None,
 ) -> pa.Table:
     """Return the table in an open file as columns of the spec.
 
@@ -233,7 +253,7 @@ def read_as_written(path: Path, spec: TableSpec[Any]) -> pa.Table:
     return table
 
 
-def damaged(path: Path, error: BaseException) -> CorruptDataError:
+def damaged(path: Path | str, error: BaseException) -> CorruptDataError:
     """Return the error to raise for a file that pyarrow cannot read."""
     reason = (str(error).splitlines() or [type(error).__name__])[0]
     return CorruptDataError(f"{path}: the file is damaged ({reason}): {MENDING}")

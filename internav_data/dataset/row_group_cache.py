@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from internav_data.dataset.decode import ColumnReader, RecordReader
-from internav_data.dataset.manifest import DataFile, locate, open_file
+from internav_data.dataset.manifest import DataFile, check_file, open_file
 from internav_data.dataset.parquet import read_group
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-    from pathlib import Path
 
     import pyarrow.parquet as pq
     from numpy.typing import NDArray
 
+    from internav_data.core.storage import Store
     from internav_data.dataset.tables import TableSpec
 
 V = TypeVar("V")
@@ -38,15 +38,15 @@ class RowGroupCache:
 
     def __init__(
         self,
-        root: Path,
+        store: Store,
         files: Sequence[DataFile],
         spec: TableSpec[Any],
         columns: Sequence[str] | None = None,
         extra: Callable[[], Mapping[str, Any]] | None = None,
     ) -> None:
         for file in files:
-            locate(root, file)
-        self._root, self._files, self._spec = root, tuple(files), spec
+            check_file(store, file)
+        self._store, self._files, self._spec = store, tuple(files), spec
         self._columns, self._extra = columns, extra
         self.starts: NDArray[np.int64] = np.cumsum([0, *[file.rows for file in files]])
         """(files + 1,) row number at which each file starts."""
@@ -67,7 +67,7 @@ class RowGroupCache:
         if self._process != os.getpid():
             self._forget()
         if number not in self._open:
-            self._open[number] = open_file(self._root, self._files[number], self._spec)
+            self._open[number] = open_file(self._store, self._files[number], self._spec)
             while len(self._open) > _OPEN_FILES:
                 self._open.popitem(last=False)[1].close()
         self._open.move_to_end(number)
@@ -106,7 +106,7 @@ class RowGroupCache:
         return first, end, held[1]
 
     def _read(self, number: int, group: int) -> tuple[int, Reader]:
-        path = self._root / self._files[number].path
+        path = self._store.at(self._files[number].path)
         table = read_group(path, self.file(number), group, self._spec, self._columns)
         if self._columns is not None:
             return table.nbytes, ColumnReader(table.select(list(self._columns)), self._spec)

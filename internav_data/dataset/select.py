@@ -18,9 +18,9 @@ from internav_data.dataset.tables import EPISODES, TableSpec
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from numpy.typing import NDArray
+
+    from internav_data.core.storage import Store
 
 Condition = tuple[str, str, Any]
 Filters = Sequence[Condition] | Sequence[Sequence[Condition]]
@@ -68,7 +68,7 @@ def check_columns(names: Sequence[str], spec: TableSpec[Any]) -> None:
 
 
 def read_columns(
-    root: Path, files: Sequence[DataFile], spec: TableSpec[Any], names: Sequence[str]
+    store: Store, files: Sequence[DataFile], spec: TableSpec[Any], names: Sequence[str]
 ) -> pa.Table:
     """Return some columns of all rows of the files, page checksums verified.
 
@@ -80,15 +80,15 @@ def read_columns(
     """
     tables = []
     for file in files:
-        with open_file(root, file, spec) as opened:
-            tables.append(read_all(root / file.path, opened, spec, names))
+        with open_file(store, file, spec) as opened:
+            tables.append(read_all(store.at(file.path), opened, spec, names))
     schema = pa.schema([spec.schema.field(name) for name in names])
     return pa.concat_tables(
         [schema.empty_table(), *(table.select(list(names)) for table in tables)]
     )
 
 
-def matching_rows(root: Path, files: Sequence[DataFile], filters: Filters) -> NDArray[np.int64]:
+def matching_rows(store: Store, files: Sequence[DataFile], filters: Filters) -> NDArray[np.int64]:
     """Return the numbers of the episodes for which the filters hold, ascending.
 
     Only the filters' columns are read; pyarrow evaluates the conditions.
@@ -100,7 +100,7 @@ def matching_rows(root: Path, files: Sequence[DataFile], filters: Filters) -> ND
 
     """
     names = _names(filters)
-    table = read_columns(root, files, EPISODES, names)
+    table = read_columns(store, files, EPISODES, names)
     rows = pa.array(np.arange(table.num_rows))
     try:
         expression = pq.filters_to_expression(_plain(filters))

@@ -1,52 +1,71 @@
-"""How a dataset's rows are cut into files."""
+"""Shards: the files that a dataset's rows are cut into, named by number and content.
+
+A shard is `train-00000-` and the first eight hexadecimal digits of its sha256. An extended dataset
+differs from the one before in its last shards only, and these get other names: nothing that the
+manifest in place names is ever written over.
+"""
 
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from internav_data.core.files import link_or_copy
 from internav_data.dataset.encode import to_table
-from internav_data.dataset.manifest import DataFile, Manifest, locate
-from internav_data.dataset.parquet import FileInfo, read_table, write_table
-from internav_data.dataset.staging import SceneState, read_scene_rows, work_dir
+from internav_data.dataset.manifest import DataFile, Manifest, check_file, open_file
+from internav_data.dataset.parquet import file_info, parquet_bytes, read_all
+from internav_data.dataset.staging import SceneState, read_staged_rows
 from internav_data.dataset.tables import ASSETS, EPISODES, SCENES, TableSpec
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from pathlib import Path
 
+    from internav_data.core.storage import Store
     from internav_data.records import Asset, Split
 
 SPLITS: tuple[Split, ...] = ("train", "val", "test")
 SCENES_PER_SHARD = {"episodes": 240, "scenes": 2400}
+_DIGITS = 8
+"""Hexadecimal digits of a shard's sha256 in its name."""
 
 
 class SceneSource:
-    """The rows of scenes, from an older version of the dataset or from finished work."""
+    """The rows of scenes, from an older version of the dataset or from staging."""
 
-    def __init__(self, out: Path, old: Manifest | None, states: Mapping[int, SceneState]) -> None:
-        self._out = out
+    def __init__(
+        self, store: Store, old: Manifest | None, states: Mapping[int, SceneState]
+    ) -> None:
+        self._store = store
         self._states = {s.scene_id: s for s in states.values() if not s.quarantined}
         self._old_files = old.files if old else ()
+        self._old_digests = {file.path: file.sha256 for file in self._old_files}
         self._held: dict[str, list[str]] = {}
         self._home: dict[tuple[str, str], DataFile] = {}
         self._last: tuple[str, pa.Table] | None = None
         self.scenes: dict[Split, list[str]] = {split: [] for split in SPLITS}
         for file in self._old_files:
             if file.table != "assets":
-                column = read_table(locate(out, file), _spec(file.table), ["scene_id"])["scene_id"]
+                column = self._read(file, _spec(file.table), ["scene_id"])["scene_id"]
                 self._held[file.path] = pc.unique(column).to_pylist()
                 self._home |= {(file.table, name): file for name in self._held[file.path]}
             if file.table == "scenes" and file.split is not None:
                 self.scenes[file.split] += self._held[file.path]
         for state in self._states.values():
             self.scenes[state.split].append(state.scene_id)
+
+    def _read(
+        self, file: DataFile, spec: TableSpec[Any], columns: Sequence[str] | None = None
+    ) -> pa.Table:
+        with open_file(self._store, file, spec) as opened:
+            return read_all(self._store.at(file.path), opened, spec, columns)
+
+    def in_place(self, path: str, sha256: str) -> bool:
+        """Return whether the older dataset has this very file."""
+        return self._old_digests.get(path) == sha256
 
     def unchanged(self, table: str, scenes: Sequence[str]) -> DataFile | None:
         """Return the older file that holds exactly these scenes, if there is one."""
@@ -67,30 +86,24 @@ class SceneSource:
 
     def _new_rows(self, spec: TableSpec[Any], scene_id: str) -> pa.Table:
         scene = self._states[scene_id].scene
-        return read_scene_rows(work_dir(self._out), scene, house=spec is SCENES)
+        return read_staged_rows(self._store, scene, house=spec is SCENES)
 
     def _old_rows(self, spec: TableSpec[Any], scene_id: str) -> pa.Table:
         file = self._home.get((spec.name, scene_id))
         if file is None:
             return spec.schema.empty_table()  # a scene without episodes
         if self._last is None or self._last[0] != file.path:
-            self._last = (file.path, read_table(locate(self._out, file), spec))
+            self._last = (file.path, self._read(file, spec))
         table = self._last[1]
         return table.filter(pc.equal(table["scene_id"], scene_id))
-
-    def old_path(self, file: DataFile) -> Path:
-        """Return where an older file lies."""
-        return locate(self._out, file)
 
 
 def _spec(table: str) -> TableSpec[Any]:
     return EPISODES if table == "episodes" else SCENES
 
 
-def write_shards(
-    folder: Path, source: SceneSource, assets: Sequence[Asset]
-) -> tuple[DataFile, ...]:
-    """Write all files of a dataset below `folder` and return them as they belong in the manifest.
+def put_shards(store: Store, source: SceneSource, assets: Sequence[Asset]) -> tuple[DataFile, ...]:
+    """Put all files of a dataset below `data/` and return them as they belong in the manifest.
 
     Episodes come in shards of 240 scenes and scenes in shards of 2,400, split by split, in order
     of scene and index.
@@ -98,38 +111,50 @@ def write_shards(
     files = []
     for spec in (EPISODES, SCENES):
         for split in SPLITS:
-            files += _write_split(folder, source, spec, split)
-    ordered = sorted(assets, key=lambda asset: asset.asset_id)
-    info = write_table(folder / "assets.parquet", to_table(ordered, ASSETS), ASSETS)
-    return (*files, _data_file(info, "data/assets.parquet", "assets", None))
+            files += _put_split(store, source, spec, split)
+    table = to_table(sorted(assets, key=lambda asset: asset.asset_id), ASSETS)
+    return (*files, _put(store, source, table, ASSETS, "assets", None))
 
 
-def _write_split(
-    folder: Path, source: SceneSource, spec: TableSpec[Any], split: Split
+def _put_split(
+    store: Store, source: SceneSource, spec: TableSpec[Any], split: Split
 ) -> list[DataFile]:
     scenes, size = source.scenes[split], SCENES_PER_SHARD[spec.name]
-    chunks = [scenes[k : k + size] for k in range(0, len(scenes), size)]
     files = []
-    for k, chunk in enumerate(chunks):
-        name = f"{spec.name}/{split}-{k:05d}-of-{len(chunks):05d}.parquet"
-        old = source.unchanged(spec.name, chunk)
-        if old is not None:
-            link_or_copy(source.old_path(old), folder / name)
-            files.append(replace(old, path=f"data/{name}"))
+    for number, start in enumerate(range(0, len(scenes), size)):
+        shard, stem = scenes[start : start + size], f"{spec.name}/{split}-{number:05d}"
+        old = source.unchanged(spec.name, shard)
+        if old is None:
+            files.append(_put(store, source, source.rows(spec, shard), spec, stem, split))
         else:
-            info = write_table(folder / name, source.rows(spec, chunk), spec)
-            files.append(_data_file(info, f"data/{name}", spec.name, split))
+            files.append(_renamed(store, old, stem))
     return files
 
 
-def _data_file(info: FileInfo, path: str, table: str, split: Split | None) -> DataFile:
-    return DataFile(
-        path,
-        table,
-        split,
-        info.rows,
-        info.bytes,
-        info.sha256,
-        info.footer_sha256,
-        info.logical_digest,
-    )
+def _put(
+    store: Store,
+    source: SceneSource,
+    table: pa.Table,
+    spec: TableSpec[Any],
+    stem: str,
+    split: Split | None,
+) -> DataFile:
+    data = parquet_bytes(table, spec)
+    info = file_info(stem, data, table)
+    path = _path(stem, info.sha256)
+    if not source.in_place(path, info.sha256):
+        store.put(path, data)
+    return DataFile(table=spec.name, split=split, **asdict(info) | {"path": path})
+
+
+def _renamed(store: Store, file: DataFile, stem: str) -> DataFile:
+    """Return an older file; one of another release's name is put in place under today's."""
+    check_file(store, file)
+    path = _path(stem, file.sha256)
+    if path != file.path:
+        store.put(path, store.read(file.path))
+    return replace(file, path=path)
+
+
+def _path(stem: str, sha256: str) -> str:
+    return f"data/{stem}-{sha256[:_DIGITS]}.parquet"

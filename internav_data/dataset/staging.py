@@ -1,7 +1,7 @@
-"""Unfinished work: one file a scene below `.work/scenes/`, each whole or not at all.
+"""Staging: one file a finished scene below `.work/scenes/`, each whole or not at all.
 
-Workers call `write_scene_work` or `write_quarantine` for every scene they finish; after a kill,
-`finished_scenes` says what need not be done again. A file is
+Workers call `stage_scene` or `stage_quarantine` for every scene they finish; after a kill,
+`staged_scenes` tells which need not be built again. A file is
 
     b"INWORK01"  sha256 of what follows (32 bytes)  u32 header length  header (JSON)
     u64 length  Arrow IPC stream of the scene row  u64 length  Arrow IPC stream of its episodes
@@ -18,65 +18,67 @@ from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
-from internav_data.core.files import write_atomically
+from internav_data.core.storage import StoreLike, exists, store_of
 from internav_data.dataset.encode import to_table
 from internav_data.dataset.tables import EPISODES, SCENES
 from internav_data.records.errors import CorruptDataError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
-    from pathlib import Path
 
+    from internav_data.core.storage import Store
     from internav_data.records import Episode, House, Split
 
-WORK = ".work"
+STAGING = ".work/"
+"""Prefix of all that is unfinished."""
+_SCENES = f"{STAGING}scenes/"
 _MAGIC = b"INWORK01"
 _HEAD = len(_MAGIC) + 32
 
 
 @dataclass(frozen=True, slots=True)
 class SceneState:
-    """How one scene ended."""
+    """Result of one scene: its number of episodes, or the reason of its quarantine."""
 
     scene: int
     scene_id: str
     split: Split
     episodes: int
     redraws: Mapping[str, int]
-    """How often something was drawn again, by reason."""
+    """Number of redraws by reason."""
     attempts: int
     quarantined: str
-    """Why the scene was given up; empty when it is good."""
+    """Reason for which the scene was given up; empty when it is good."""
 
 
 @dataclass(frozen=True, slots=True)
-class SceneWork:
-    """A finished scene's rows: one of SCENES (none if quarantined) and some of EPISODES."""
+class StagedScene:
+    """Rows of a finished scene: one of SCENES (none if quarantined) and some of EPISODES."""
 
     state: SceneState
     house: pa.Table
     episodes: pa.Table
 
 
-def work_dir(out: Path) -> Path:
-    """Return the folder of unfinished work in a dataset's folder."""
-    return out / WORK
+def scene_name(scene: int) -> str:
+    """Return the name of a scene's file: a thousand scenes a folder."""
+    return f"{_SCENES}{scene // 1000:06d}/scene-{scene:06d}.work"
 
 
-def scene_file(work: Path, scene: int) -> Path:
-    """Return where a scene's work lies: a thousand scenes a folder."""
-    return work / "scenes" / f"{scene // 1000:06d}" / f"scene-{scene:06d}.work"
+def any_staged(root: StoreLike) -> bool:
+    """Return whether a scene is staged, whole or not."""
+    return any(name.endswith(".work") for name in store_of(root).names(_SCENES))
 
 
-def write_scene_work(
-    work: Path,
+def stage_scene(
+    root: StoreLike,
     scene: int,
     house: House,
     episodes: Sequence[Episode],
     *,
     redraws: Mapping[str, int] | None = None,
     attempts: int = 1,
-) -> Path:
+) -> None:
     """Store a finished scene: its house and its episodes, in order of their index.
 
     Raises
@@ -87,41 +89,43 @@ def write_scene_work(
     """
     counts = dict(sorted((redraws or {}).items()))
     state = SceneState(scene, house.scene_id, house.split, len(episodes), counts, attempts, "")
-    return _write(work, SceneWork(state, to_table([house], SCENES), to_table(episodes, EPISODES)))
+    tables = to_table([house], SCENES), to_table(episodes, EPISODES)
+    _write(store_of(root), StagedScene(state, *tables))
 
 
-def write_quarantine(
-    work: Path,
+def stage_quarantine(
+    root: StoreLike,
     scene: int,
     reason: str,
     *,
     split: Split,
     attempts: int,
     redraws: Mapping[str, int] | None = None,
-) -> Path:
-    """Store that a scene was given up, and why (a reason must hold nothing of the machine)."""
+) -> None:
+    """Store a scene that was given up; its reason must hold nothing of the machine."""
     counts = dict(sorted((redraws or {}).items()))
     state = SceneState(scene, f"scene-{scene:06d}", split, 0, counts, attempts, reason or "unknown")
-    return _write(work, SceneWork(state, to_table([], SCENES), to_table([], EPISODES)))
+    _write(store_of(root), StagedScene(state, to_table([], SCENES), to_table([], EPISODES)))
 
 
-def finished_scenes(work: Path, scenes: Iterable[int] | None = None) -> dict[int, SceneState]:
-    """Return the scenes (all found, or of those asked for) whose work is stored and whole."""
+def staged_scenes(root: StoreLike, scenes: Iterable[int] | None = None) -> dict[int, SceneState]:
+    """Return the scenes (all, or of those asked for) that are staged undamaged, by number."""
+    store = store_of(root)
     if scenes is None:
-        paths = sorted((work / "scenes").glob("*/scene-*.work"))
+        names = [name for name in store.names(_SCENES) if name.endswith(".work")]
     else:
-        paths = [path for path in (scene_file(work, k) for k in scenes) if path.exists()]
+        names = [name for name in map(scene_name, scenes) if exists(store, name)]
     states = {}
-    for path in paths:
+    for name in names:
         try:
-            state = _state(path, path.read_bytes())
+            state = _state(store.at(name), store.read(name))
         except CorruptDataError:
             continue
         states[state.scene] = state
     return dict(sorted(states.items()))
 
 
-def read_scene_rows(work: Path, scene: int, *, house: bool) -> pa.Table:
+def read_staged_rows(root: StoreLike, scene: int, *, house: bool) -> pa.Table:
     """Return one of a scene's two tables, its house's or its episodes', without the other.
 
     Raises
@@ -130,41 +134,40 @@ def read_scene_rows(work: Path, scene: int, *, house: bool) -> pa.Table:
         Missing or damaged.
 
     """
-    _, houses, episodes = _parts(work, scene)
+    houses, episodes = _streams(store_of(root), scene)
     return _table(houses if house else episodes)
 
 
-def _parts(work: Path, scene: int) -> tuple[SceneState, pa.Buffer, pa.Buffer]:
-    """Check a scene's file and cut it into its state and its two streams."""
-    path = scene_file(work, scene)
+def _streams(store: Store, scene: int) -> tuple[pa.Buffer, pa.Buffer]:
+    """Check a scene's file and return its two streams."""
+    name = scene_name(scene)
+    place = store.at(name)
     try:
-        data = path.read_bytes()
+        data = store.read(name)
     except FileNotFoundError:
-        raise CorruptDataError(f"{path}: scene {scene} is not finished: generate again") from None
-    state = _state(path, data)
+        raise CorruptDataError(f"{place}: scene {scene} is not finished: generate again") from None
+    _state(place, data)
     start = _HEAD + 4 + int.from_bytes(data[_HEAD : _HEAD + 4], "little")
     streams = []
     for _ in range(2):
         length = int.from_bytes(data[start : start + 8], "little")
         streams.append(pa.py_buffer(data[start + 8 : start + 8 + length]))
         start += 8 + length
-    return state, streams[0], streams[1]
+    return streams[0], streams[1]
 
 
 def _table(stream: pa.Buffer) -> pa.Table:
     return pa.ipc.open_stream(stream).read_all()
 
 
-def _write(work: Path, scene: SceneWork) -> Path:
+def _write(store: Store, scene: StagedScene) -> None:
     header = json.dumps(asdict(scene.state)).encode()
     parts = [len(header).to_bytes(4, "little"), header]
     for table in (scene.house, scene.episodes):
         stream = _stream(table)
         parts += [len(stream).to_bytes(8, "little"), stream]
     body = b"".join(parts)
-    path = scene_file(work, scene.state.scene)
-    write_atomically(path, _MAGIC + hashlib.sha256(body).digest() + body)
-    return path
+    store.put(scene_name(scene.state.scene), _MAGIC + hashlib.sha256(body).digest() + body)
 
 
 def _stream(table: pa.Table) -> bytes:
@@ -175,9 +178,9 @@ def _stream(table: pa.Table) -> bytes:
     return bytes(sink.getvalue())
 
 
-def _state(path: Path, data: bytes) -> SceneState:
+def _state(place: str, data: bytes) -> SceneState:
     body = data[_HEAD:]
     if data[: len(_MAGIC)] != _MAGIC or hashlib.sha256(body).digest() != data[len(_MAGIC) : _HEAD]:
-        raise CorruptDataError(f"{path}: damaged: remove it and generate again")
+        raise CorruptDataError(f"{place}: damaged: remove it and generate again")
     length = int.from_bytes(body[:4], "little")
     return SceneState(**json.loads(body[4 : 4 + length]))

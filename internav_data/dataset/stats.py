@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from internav_data.core.storage import Store, StoreLike, store_of
 from internav_data.dataset.manifest import Manifest, open_file, read_manifest
 from internav_data.dataset.outcome_stats import (
     EXPERT_COLUMNS,
@@ -122,10 +123,10 @@ def compute_stats(dataset: Any, split: str | None = None) -> dict[str, Any]:  # 
 
     Parameters
     ----------
-    dataset : Dataset, str or Path
+    dataset : Dataset, str, Path or Store
         An open dataset (its split is taken; filters are not) or the folder of one.
     split : str, optional
-        Of this split only.
+        Split to which the statistics are confined.
 
     Raises
     ------
@@ -133,19 +134,20 @@ def compute_stats(dataset: Any, split: str | None = None) -> dict[str, Any]:  # 
         A file is missing or damaged.
 
     """
-    opened = not isinstance(dataset, str | Path)  # a str has a method of that name
-    root = Path(dataset.path if opened else dataset)
+    opened = not isinstance(dataset, str | Path | Store)  # a str has a method `split`
+    store = dataset.store if opened else store_of(dataset)
     chosen = split or (dataset.split if opened else None)
-    return asdict(stats_of(root, read_manifest(root), chosen))
+    return asdict(stats_of(store, read_manifest(store), chosen))
 
 
-def stats_of(root: Path, manifest: Manifest, split: str | None = None) -> Stats:
+def stats_of(root: StoreLike, manifest: Manifest, split: str | None = None) -> Stats:
     """Return the statistics of the files that a manifest names."""
     names = [*_SCALARS, *_OBSTACLES, *EXPERT_COLUMNS, *OUTCOME_COLUMNS]
+    store = store_of(root)
     tables, kinds, outcomes = [_no_rows()], [_no_obstacles()], OutcomeCounts()
     for file in manifest.of("episodes", split):
-        with open_file(root, file, EPISODES) as opened:
-            table = read_all(root / file.path, opened, EPISODES, names)
+        with open_file(store, file, EPISODES) as opened:
+            table = read_all(store.at(file.path), opened, EPISODES, names)
         tables.append(_flat_rows(table))
         for chunk in table.column("obstacles").chunks:
             kinds.append(_flat_obstacles(chunk))

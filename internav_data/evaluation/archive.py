@@ -9,7 +9,7 @@ from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Any, Final, get_args, get_type_hints
 
-from internav_data.core.files import write_atomically
+from internav_data.core.storage import write_atomically
 from internav_data.dataset import from_table, write_parquet
 from internav_data.dataset.parquet import open_parquet, read_all
 from internav_data.evaluation.metrics import RESULTS, EpisodeResult

@@ -9,7 +9,7 @@ import json
 import math
 from typing import TYPE_CHECKING, Any, Final
 
-from internav_data.core.files import write_atomically
+from internav_data.core.storage import write_atomically
 from internav_data.evaluation.metrics import GROUPS, MEASURES
 from internav_data.evaluation.statements import as_json as differences_json
 from internav_data.evaluation.statements import fairness, sentences

@@ -10,22 +10,22 @@ from __future__ import annotations
 import contextlib
 import math
 import os
-import shutil
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from internav_data.core.interrupts import InterruptedRunError, Interrupts
-from internav_data.core.lock import locked
+from internav_data.core.storage import FolderStore
 from internav_data.dataset import (
+    STAGING,
     Identity,
+    any_staged,
     assemble,
     done_scenes,
-    finished_scenes,
     has_manifest,
-    open_work,
+    open_staging,
     read_manifest,
-    work_dir,
-    write_quarantine,
+    stage_quarantine,
+    staged_scenes,
 )
 from internav_data.generation.messages import Done
 from internav_data.generation.progress import GenerationProgress
@@ -47,11 +47,14 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from internav_data.catalog import Catalogue
+    from internav_data.core.storage import Store
     from internav_data.dataset import Manifest
     from internav_data.generation.config import GenerationConfig
     from internav_data.records import Asset
 
 GENERATOR = "internav-gen"
+BUSY = f"another {GENERATOR} is writing this dataset; wait for it to end or choose another --out"
+"""Reason for which a second run in the same folder is refused."""
 MAX_SCENES = 1_000_000
 """Scene ids have six digits."""
 HOPELESS = 20
@@ -112,18 +115,18 @@ def generate(
     with _disk_errors(out):
         if out.exists() and not out.is_dir():
             raise UsageError(f"{out} is a file: give a folder that is new, empty or a dataset")
-        out.mkdir(parents=True, exist_ok=True)
-        with locked(out):
-            _forget_idle_work(out)
-            work = open_work(out, identity)
-            done = _done_before(out, scenes)
+        store = FolderStore(out)
+        with store.lock(BUSY):
+            _forget_idle_staging(store)
+            open_staging(store, identity)
+            done = _done_before(store, scenes)
             plan = _Plan(config, scenes, tuple(k for k in range(scenes) if k not in done))
-            recipe = Recipe(setup, ScenePayload(config, assets, str(work)))
+            recipe = Recipe(setup, ScenePayload(config, assets, store))
             with Interrupts() as stop, WorkerPool(workers or cores(), recipe, stop) as crew:
-                _make(crew, plan, progress, work)
+                _make(crew, plan, progress, store)
                 if stop():
                     raise InterruptedRunError(_interruption(out, progress), stop.signum)
-            manifest = _assembled(out, identity, assets, scenes, progress)
+            manifest = _assembled(store, identity, assets, scenes, progress)
     return report_of(out, manifest, progress)
 
 
@@ -178,14 +181,14 @@ def identity_for(config: GenerationConfig, assets: Catalogue) -> Identity:
     )
 
 
-def _done_before(out: Path, scenes: int) -> frozenset[int]:
-    done = done_scenes(out)
-    held = read_manifest(out).scenes if has_manifest(out) else 0
+def _done_before(store: Store, scenes: int) -> frozenset[int]:
+    done = done_scenes(store)
+    held = read_manifest(store).scenes if has_manifest(store) else 0
     most = max(done, default=-1) + 1
     if scenes < most and most > held:
         raise UsageError(
-            f"{out}: scenes up to {most - 1} are finished there and would be lost: ask for "
-            f"--scenes {most} or more, or remove {work_dir(out)} first"
+            f"{store.at('')}: scenes up to {most - 1} are finished there and would be lost: ask "
+            f"for --scenes {most} or more, or remove {store.at(STAGING)} first"
         )
     return done
 
@@ -213,7 +216,7 @@ class _Plan:
         return [*self.todo[:cut], *tail]
 
 
-def _make(crew: WorkerPool, plan: _Plan, progress: GenerationProgress, work: Path) -> None:
+def _make(crew: WorkerPool, plan: _Plan, progress: GenerationProgress, store: Store) -> None:
     """Have the scenes made; those that cannot be are stored as quarantined."""
     before = plan.scenes - len(plan.todo)
     progress.begin(plan.scenes, before, sum(plan.expected(scene) for scene in plan.todo))
@@ -225,47 +228,46 @@ def _make(crew: WorkerPool, plan: _Plan, progress: GenerationProgress, work: Pat
             progress.say(f"scene-{scene:06d} is quarantined: {result.reason}")
             split = split_of_scene(scene)
             attempts = result.attempts
-            write_quarantine(work, scene, result.reason, split=split, attempts=attempts)
+            stage_quarantine(store, scene, result.reason, split=split, attempts=attempts)
         progress.scene(episodes, expected=plan.expected(scene))
         if not before and progress.quarantined == progress.scenes >= HOPELESS:
-            raise _hopeless(work.parent, progress.scenes, result.reason)
+            raise _hopeless(store, progress.scenes, result.reason)
     progress.end()
 
 
 def _assembled(
-    out: Path, identity: Identity, assets: Catalogue, scenes: int, progress: GenerationProgress
+    store: Store,
+    identity: Identity,
+    assets: Catalogue,
+    scenes: int,
+    progress: GenerationProgress,
 ) -> Manifest:
-    if has_manifest(out) and not _work_files(out):
-        held = read_manifest(out)
+    if has_manifest(store) and not any_staged(store):
+        held = read_manifest(store)
         if held.scenes >= scenes:
-            shutil.rmtree(work_dir(out))
+            store.remove(STAGING)
             return held
-    if not has_manifest(out):
-        states = finished_scenes(work_dir(out))
+    if not has_manifest(store):
+        states = staged_scenes(store)
         if all(state.quarantined for state in states.values()):
-            raise _hopeless(out, len(states), next(iter(states.values())).quarantined)
-    progress.say(f"writing {scenes} scenes into {out}")
-    return assemble(out, identity, tuple(assets.assets.values()), scenes)
+            raise _hopeless(store, len(states), next(iter(states.values())).quarantined)
+    progress.say(f"writing {scenes} scenes into {store.at('')}")
+    return assemble(store, identity, tuple(assets.assets.values()), scenes)
 
 
-def _work_files(out: Path) -> bool:
-    """Whether a scene is stored in the work folder, whole or not."""
-    return next((work_dir(out) / "scenes").glob("*/*.work"), None) is not None
-
-
-def _forget_idle_work(out: Path) -> None:
-    """Remove the work folder of a run that ended before its first scene did.
+def _forget_idle_staging(store: Store) -> None:
+    """Remove what is staged by a run that ended before its first scene did.
 
     It would bind the folder to that run's config, which the user may just be mending.
     """
-    if not has_manifest(out) and work_dir(out).is_dir() and not _work_files(out):
-        shutil.rmtree(work_dir(out))
+    if not has_manifest(store) and not any_staged(store):
+        store.remove(STAGING)
 
 
-def _hopeless(out: Path, count: int, reason: str) -> QuarantineError:
-    """Return the error for a config that no scene can be made by; its work is forgotten."""
-    if not has_manifest(out):
-        shutil.rmtree(work_dir(out))
+def _hopeless(store: Store, count: int, reason: str) -> QuarantineError:
+    """Return the error for a config that no scene can be made by; what it staged is forgotten."""
+    if not has_manifest(store):
+        store.remove(STAGING)
     return QuarantineError(f"none of {count} scenes could be made: {reason}; nothing was written")
 
 

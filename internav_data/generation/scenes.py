@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from internav_data.catalog import Catalogue
+    from internav_data.core.storage import Store
     from internav_data.generation.config import GenerationConfig
     from internav_data.records import Asset, Episode, House, Split
 
@@ -38,8 +39,8 @@ class ScenePayload:
     config: GenerationConfig
     assets: Catalogue
     """Built once, by the parent: a user's own meshes take a while to cut into parts."""
-    work: str
-    """Folder of unfinished work."""
+    store: Store
+    """Store of the dataset, in which scenes are staged."""
 
 
 def build_scene(
@@ -81,15 +82,15 @@ def obstacle_pool(catalogue: Catalogue, config: GenerationConfig, split: Split) 
 
 def scene_maker(payload: ScenePayload) -> Callable[[int], int]:
     """Set a worker up: return what makes and stores a scene and says how many episodes it has."""
-    from internav_data.dataset.staging import write_scene_work  # noqa: PLC0415 - workers only
+    from internav_data.dataset.staging import stage_scene  # noqa: PLC0415 - workers only
 
-    config, assets, work = payload.config, payload.assets, Path(payload.work)
+    config, assets, store = payload.config, payload.assets, payload.store
     gc.freeze()  # the catalogue stays: no collection need look at it again
 
     def make(scene: int) -> int:
         built = build_scene(scene, config, assets)
-        write_scene_work(
-            work,
+        stage_scene(
+            store,
             scene,
             built.house,
             built.episodes,

@@ -49,7 +49,7 @@ def check_obstacles(
     for number, obstacle in enumerate(episode.obstacles):
         what = f"obstacle {number} ({obstacle.asset_id})"
         known = obstacle.asset_id in layout.shapes.assets
-        if not expect(known, "obstacle.asset", f"{what} in assets.parquet", "no such asset"):
+        if not expect(known, "obstacle.asset", f"{what} in the assets", "no such asset"):
             return None
         _check_asset(layout, obstacle, what, expect)
         expect(

@@ -37,7 +37,7 @@ def check_scene(
         Episodes of that house. The finely cut visibility graph is built for the one in the
         middle of them.
     shapes
-        Shapes of the assets in `assets.parquet`; share them between scenes.
+        Shapes of the assets of the dataset; share them between scenes.
     file
         Path of the episodes' file, for findings.
     physics
@@ -69,7 +69,7 @@ def _check_house(house: House, shapes: Shapes, report: FindingCollector) -> Chec
     rooms = check_rooms(house, report)
     check_doors(house, rooms, report)
     check_walls(house, rooms, report)
-    if not report.expect(not unknown, "object.asset", "assets in assets.parquet", unknown):
+    if not report.expect(not unknown, "object.asset", "assets in the assets", unknown):
         return None
     if len(rooms) < len(house.rooms) or "house.outline-polygon" in report.by_predicate:
         return None  # nothing can be measured in a house without proper rooms

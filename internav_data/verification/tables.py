@@ -168,7 +168,7 @@ def _check_links(house: House, keys: DatasetKeys, report: FindingCollector) -> N
     expect(
         "object-asset",
         sorted({t.asset_id for t in house.objects} - keys.assets),
-        "assets of assets.parquet",
+        "assets of the assets table",
     )
     names = {material.name for material in house.materials}
     used = {n for room in house.rooms for n in (room.floor_material, room.wall_material)}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import cv2
 
-from internav_data.core.files import write_atomically
+from internav_data.core.storage import write_atomically
 from internav_data.records.errors import InternavError
 
 if TYPE_CHECKING:

@@ -131,7 +131,7 @@ def test_damaged_evaluations_exit_with_5(call, dataset, tmp_path):
 def test_a_dataset_without_experts_says_so(call, tmp_path_factory, dataset):
     from dataclasses import replace
 
-    from internav_data.dataset import Identity, assemble, load_dataset, open_work, write_scene_work
+    from internav_data.dataset import Identity, assemble, load_dataset, open_staging, stage_scene
 
     whole = load_dataset(dataset)
     out = tmp_path_factory.mktemp("bare") / "data"
@@ -139,7 +139,7 @@ def test_a_dataset_without_experts_says_so(call, tmp_path_factory, dataset):
     for scene in range(3):
         scene_id = f"scene-{scene:06d}"
         episodes = [replace(e, expert=None) for e in whole if e.scene_id == scene_id]
-        write_scene_work(open_work(out, identity), scene, whole.scene(scene_id), episodes)
+        stage_scene(open_staging(out, identity), scene, whole.scene(scene_id), episodes)
     assemble(out, identity, tuple(whole.assets.values()), 3)
     code, text, err = call("expert", out, "--split", "val")
     assert (code, text) == (2, "")

@@ -6,28 +6,29 @@ import contextlib
 import hashlib
 import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import strategies
 
-from internav_data.core import files
+from internav_data.core import storage
 from internav_data.dataset import (
     Identity,
     assemble,
-    commit,
     done_scenes,
-    finished_scenes,
     has_manifest,
     load_dataset,
-    open_work,
+    open_staging,
     read_manifest,
-    read_scene_rows,
+    read_staged_rows,
     shards,
-    write_quarantine,
-    write_scene_work,
+    stage_quarantine,
+    stage_scene,
+    staged_scenes,
+    write_manifest,
 )
-from internav_data.dataset.staging import scene_file
+from internav_data.dataset.staging import scene_name
 from internav_data.records import Asset, Episode, House
 from internav_data.records.errors import CorruptDataError, UsageError
 
@@ -38,7 +39,7 @@ ASSETS = [strategies.plain(Asset, asset_id=name) for name in ("b", "a")]
 @pytest.fixture(autouse=True)
 def without_waiting_for_the_disk(request, monkeypatch):
     if "full_disk" not in request.node.name:
-        monkeypatch.setattr(files, "sync", lambda _: None)
+        monkeypatch.setattr(storage, "sync", lambda _: None)
 
 
 def split_of(scene):
@@ -46,11 +47,11 @@ def split_of(scene):
 
 
 def build(out, scenes, episodes=2, identity=IDENTITY, quarantined=()):
-    work = open_work(out, identity)
+    store = open_staging(out, identity)
     for scene in scenes:
         split, scene_id = split_of(scene), f"scene-{scene:06d}"
         if scene in quarantined:
-            write_quarantine(work, scene, "too small", split=split, attempts=3)
+            stage_quarantine(store, scene, "too small", split=split, attempts=3)
             continue
         house = strategies.plain(House, scene_id=scene_id, scene=scene, split=split)
         rows = [
@@ -64,7 +65,7 @@ def build(out, scenes, episodes=2, identity=IDENTITY, quarantined=()):
             )
             for index in range(episodes)
         ]
-        write_scene_work(work, scene, house, rows, redraws={"spot": 1})
+        stage_scene(store, scene, house, rows, redraws={"spot": 1})
 
 
 def tree(folder):
@@ -83,16 +84,16 @@ def few_scenes_a_shard(monkeypatch):
 def test_shards_are_of_the_stated_sizes_and_names(tmp_path):
     build(tmp_path, range(300), 1)
     manifest = assemble(tmp_path, IDENTITY, ASSETS, 300)
-    rows = {f.path: f.rows for f in manifest.files}
+    rows = {f.path.removesuffix(f"-{f.sha256[:8]}.parquet"): f.rows for f in manifest.files}
     assert rows == {
-        "data/episodes/train-00000-of-00002.parquet": 240,
-        "data/episodes/train-00001-of-00002.parquet": 54,
-        "data/episodes/val-00000-of-00001.parquet": 3,
-        "data/episodes/test-00000-of-00001.parquet": 3,
-        "data/scenes/train-00000-of-00001.parquet": 294,
-        "data/scenes/val-00000-of-00001.parquet": 3,
-        "data/scenes/test-00000-of-00001.parquet": 3,
-        "data/assets.parquet": 2,
+        "data/episodes/train-00000": 240,
+        "data/episodes/train-00001": 54,
+        "data/episodes/val-00000": 3,
+        "data/episodes/test-00000": 3,
+        "data/scenes/train-00000": 294,
+        "data/scenes/val-00000": 3,
+        "data/scenes/test-00000": 3,
+        "data/assets": 2,
     }
     assert not (tmp_path / ".work").exists()
     for file in manifest.files:
@@ -130,7 +131,7 @@ def test_extending_in_different_steps_to_the_same_scenes_is_the_same(tmp_path):
     build(tmp_path, range(60))
     assemble(tmp_path, IDENTITY, ASSETS, 60)
     before = tree(tmp_path)
-    open_work(tmp_path, IDENTITY)
+    open_staging(tmp_path, IDENTITY)
     assemble(tmp_path, IDENTITY, ASSETS, 60)
     assert tree(tmp_path) == before
 
@@ -159,7 +160,7 @@ def test_killed_anywhere_readers_are_safe_and_the_next_call_finishes(tmp_path, m
             ids = [episode.episode_id for episode in load_dataset(out)]
             assert len(ids) in {2 * first, 40}
             assert len(set(ids)) == len(ids)
-        open_work(out, IDENTITY)
+        open_staging(out, IDENTITY)
         assert done_scenes(out) == frozenset(range(20))
         assemble(out, IDENTITY, ASSETS, 20)
         assert tree(out) == tree(wanted)
@@ -205,17 +206,16 @@ def test_scene_without_episodes_is_kept(tmp_path):
 
 def test_damaged_work_counts_as_not_done(tmp_path):
     build(tmp_path, range(4))
-    work = tmp_path / ".work"
-    assert set(finished_scenes(work)) == set(range(4))
-    path = scene_file(work, 2)
+    assert set(staged_scenes(tmp_path)) == set(range(4))
+    path = tmp_path / scene_name(2)
     data = path.read_bytes()
     for at in range(0, len(data), 97):
         path.write_bytes(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :])
-        assert set(finished_scenes(work)) == {0, 1, 3}
+        assert set(staged_scenes(tmp_path)) == {0, 1, 3}
         with pytest.raises(CorruptDataError):
-            read_scene_rows(work, 2, house=False)
+            read_staged_rows(tmp_path, 2, house=False)
     path.write_bytes(data[:-5])
-    assert set(finished_scenes(work, range(3))) == {0, 1}
+    assert set(staged_scenes(tmp_path, range(3))) == {0, 1}
 
 
 @pytest.mark.parametrize(
@@ -230,11 +230,11 @@ def test_another_configuration_is_refused(tmp_path, change, named):
     other = Identity(**{**{f: getattr(IDENTITY, f) for f in IDENTITY.__slots__}, **change})
     build(tmp_path, range(2))
     with pytest.raises(UsageError, match=named):
-        open_work(tmp_path, other)
+        open_staging(tmp_path, other)
     assemble(tmp_path, IDENTITY, ASSETS, 2)
     before = tree(tmp_path)
     with pytest.raises(UsageError, match=named):
-        open_work(tmp_path, other)
+        open_staging(tmp_path, other)
     assert tree(tmp_path) == before
 
 
@@ -243,39 +243,46 @@ def test_tuples_in_a_configuration_are_lists_on_disk(tmp_path):
     same = Identity(**{**values, "config": {"house": {"scale": 1.5}, "list": (1, 2)}})
     build(tmp_path, range(2))
     assemble(tmp_path, IDENTITY, ASSETS, 2)
-    open_work(tmp_path, same)
+    open_staging(tmp_path, same)
 
 
 def test_foreign_folder_and_file_are_refused_untouched(tmp_path):
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(UsageError, match="no dataset"):
-        open_work(tmp_path, IDENTITY)
+        open_staging(tmp_path, IDENTITY)
     assert tree(tmp_path).keys() == {"thesis.tex"}
     with pytest.raises(UsageError, match="is a file"):
-        open_work(tmp_path / "thesis.tex", IDENTITY)
+        open_staging(tmp_path / "thesis.tex", IDENTITY)
 
 
 def test_full_disk_leaves_the_old_file(tmp_path, monkeypatch):
     path = tmp_path / "x"
-    files.write_atomically(path, b"old")
+    storage.write_atomically(path, b"old")
 
     def full(_):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OSError, match="No space"):
-        files.write_atomically(path, b"new")
+        storage.write_atomically(path, b"new")
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_link_or_copy_where_links_are_not_allowed(tmp_path, monkeypatch):
-    source, target = tmp_path / "a", tmp_path / "b"
-    source.write_bytes(b"1")
-
-    def refuse(*_):
-        raise OSError(1, "Operation not permitted")
-
-    monkeypatch.setattr(os, "link", refuse)
-    commit.link_or_copy(source, target)
-    assert target.read_bytes() == b"1"
+@pytest.mark.usefixtures("few_scenes_a_shard")
+def test_shards_of_another_release_are_extended_under_todays_names(tmp_path):
+    """Releases before this one named shards by their number and count."""
+    grown, once = tmp_path / "grown", tmp_path / "once"
+    build(grown, range(60))
+    manifest = assemble(grown, IDENTITY, ASSETS, 60)
+    files = []
+    for file in manifest.files:
+        name = f"{file.path.rsplit('-', 1)[0]}-of-00009.parquet"
+        (grown / file.path).rename(grown / name)
+        files.append(replace(file, path=name))
+    write_manifest(grown, replace(manifest, files=tuple(files)))
+    assert len(load_dataset(grown)) == 120
+    for out, scenes in ((grown, range(60, 70)), (once, range(70))):
+        build(out, scenes)
+        assemble(out, IDENTITY, ASSETS, 70)
+    assert tree(grown) == tree(once)

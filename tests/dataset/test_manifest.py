@@ -141,5 +141,6 @@ def test_unfinished_and_absent_are_told_apart(tmp_path):
     with pytest.raises(CorruptDataError, match="no dataset here"):
         load_dataset(tmp_path)
     (tmp_path / ".work").mkdir()
+    (tmp_path / ".work" / "identity.json").write_text("{}")
     with pytest.raises(CorruptDataError, match="resume"):
         load_dataset(tmp_path)

@@ -103,10 +103,10 @@ def test_stats_file_is_what_compute_stats_says(dataset_folder):
 
 
 def test_statistics_of_nothing(tmp_path):
-    from internav_data.dataset import Identity, assemble, open_work
+    from internav_data.dataset import Identity, assemble, open_staging
 
     identity = Identity("test", "1", 0, 1, "0", {})
-    open_work(tmp_path, identity)
+    open_staging(tmp_path, identity)
     assemble(tmp_path, identity, [], 0)
     stats = compute_stats(tmp_path)
     assert stats["episodes"] == 0
@@ -120,16 +120,17 @@ def test_card_names_every_file_and_column(dataset_folder):
     _, front, body = text.split("---\n", 2)
     configs = yaml.safe_load(front)["configs"]
     assert [c["config_name"] for c in configs if c.get("default")] == ["episodes"]
+    manifest = read_manifest(dataset_folder)
     for config in configs:
         files = config["data_files"]
-        if isinstance(files, str):
-            assert (dataset_folder / files).is_file()
+        if config["config_name"] == "assets":
+            assert files == [f.path for f in manifest.of("assets")]
             continue
-        assert {f["split"] for f in files} == {"train", "val", "test"}
+        assert [f["split"] for f in files] == ["train", "val", "test"]
         for entry in files:
-            found = sorted(p.name for p in dataset_folder.glob(entry["path"]))
-            named = read_manifest(dataset_folder).of(config["config_name"], entry["split"])
-            assert found == [f.path.rsplit("/")[-1] for f in named]
+            named = manifest.of(config["config_name"], entry["split"])
+            assert entry["path"] == [f.path for f in named]
+    assert "*" not in front
     for spec in TABLES[:2]:
         assert all(f"| `{name}` |" in body for name in spec.schema.names)
 
@@ -140,6 +141,10 @@ def test_croissant_names_every_file_and_only_known_columns(dataset_folder):
     manifest = read_manifest(dataset_folder)
     assert {f.path: f.sha256 for f in manifest.files} == {
         name: f["sha256"] for name, f in files.items()
+    }
+    sets = {f["@id"]: f["includes"] for f in said["distribution"] if f["@type"] == "cr:FileSet"}
+    assert sets == {
+        f"{table}-files": [f.path for f in manifest.of(table)] for table in ("episodes", "scenes")
     }
     for record_set, spec in zip(said["recordSet"], TABLES, strict=False):
         columns = [f["name"] for f in record_set["field"]]

@@ -6,10 +6,9 @@ import json
 import os
 import signal
 import time
-from pathlib import Path
 from types import SimpleNamespace
 
-from internav_data.dataset import write_scene_work
+from internav_data.dataset import STAGING, stage_scene
 from internav_data.records import Asset, Episode, Goal, House, Obstacle, Part, Physics, Room, Start
 from internav_data.records.errors import QuarantineError
 from internav_data.records.splits import split_of_scene
@@ -88,10 +87,10 @@ def episode(home, index):
 
 def stub(payload):
     """Make scenes as `stub.json` beside the dataset says: how long, and what fails."""
-    work = Path(payload.work)
-    path = work.parent.parent / "stub.json"
+    folder = payload.store.root.parent
+    path = folder / "stub.json"
     orders = json.loads(path.read_text()) if path.exists() else {}
-    journal = work.parent.parent / "journal"
+    journal = folder / "journal"
 
     def make(scene):
         with journal.open("a") as file:
@@ -107,10 +106,10 @@ def stub(payload):
         if scene in orders.get("quarantine", ()) or orders.get("hopeless"):
             raise QuarantineError("nothing can be blocked")
         if orders.get("full") == scene:
-            raise OSError(28, "No space left on device", str(work))
+            raise OSError(28, "No space left on device", payload.store.at(STAGING))
         home = house(payload.config.seed, scene)
         count = payload.config.episodes_of(home.split)
-        write_scene_work(work, scene, home, [episode(home, k) for k in range(count)])
+        stage_scene(payload.store, scene, home, [episode(home, k) for k in range(count)])
         return count
 
     return make

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from scene_stubs import CATALOGUE, stub
 
-from internav_data.core.lock import LockedError, locked
+from internav_data.core.storage import FolderStore, LockedError
 from internav_data.dataset import read_manifest
 from internav_data.generation.config import GenerationConfig, load_config
 from internav_data.generation.run import generate
@@ -166,7 +166,10 @@ def test_a_folder_of_something_else_is_refused_and_left_alone(tmp_path):
 
 def test_two_generators_do_not_meet(tmp_path):
     (tmp_path / "d").mkdir()
-    with locked(tmp_path / "d"), pytest.raises(LockedError, match="another internav-gen"):
+    with (
+        FolderStore(tmp_path / "d").lock(""),
+        pytest.raises(LockedError, match="another internav-gen"),
+    ):
         made(tmp_path / "d", 3)
     assert made(tmp_path / "d", 3).scenes == 3
 

@@ -9,7 +9,7 @@ import pytest
 import scene_stubs
 
 from internav_data.catalog import catalogue, split_of_asset
-from internav_data.dataset import write_scene_work
+from internav_data.dataset import stage_scene
 from internav_data.generation import generate, generate_episodes, generate_house, load_config
 from internav_data.generation.reproduce import scene_again
 from internav_data.generation.run import identity_for
@@ -52,7 +52,7 @@ def test_redraws_of_all_scenes_are_in_manifest_and_report(dataset, tmp_path):
 
 
 def test_unsolvable_episodes_are_kept_on_demand(monkeypatch, tmp_path):
-    from internav_data.dataset import assemble, compute_stats, load_dataset, open_work
+    from internav_data.dataset import assemble, compute_stats, load_dataset, open_staging
     from internav_data.episodes import build
 
     # An expert that never finds a plan: which episodes it truly solves is for its own tests.
@@ -63,8 +63,8 @@ def test_unsolvable_episodes_are_kept_on_demand(monkeypatch, tmp_path):
     config = dataclasses.replace(CONFIG, episodes=episodes)
     made = build_scene(0, config, catalogue())
     identity = identity_for(config, catalogue())
-    work = open_work(tmp_path, identity)
-    write_scene_work(work, 0, made.house, made.episodes, redraws=made.redraws)
+    store = open_staging(tmp_path, identity)
+    stage_scene(store, 0, made.house, made.episodes, redraws=made.redraws)
     manifest = assemble(tmp_path, identity, tuple(catalogue().assets.values()), 1)
     held = list(load_dataset(tmp_path))
     assert [episode.expert for episode in held] == [None, None]

@@ -7,7 +7,7 @@ from collections import deque
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from internav_data.dataset import Identity, assemble, open_work, write_scene_work
+from internav_data.dataset import Identity, assemble, open_staging, stage_scene
 from internav_data.records import (
     Asset,
     Door,
@@ -419,7 +419,7 @@ IDENTITY = Identity(
 def write_dataset(root, scenes, assets=None, config=None):
     """Write scenes as a dataset, by the same road as the generator."""
     identity = replace(IDENTITY, config={**IDENTITY.config, **(config or {})})
-    work = open_work(root, identity)
+    store = open_staging(root, identity)
     for number, (house, episodes) in enumerate(scenes):
-        write_scene_work(work, number, house, episodes)
+        stage_scene(store, number, house, episodes)
     return assemble(root, identity, list((assets or ASSETS).values()), len(scenes))

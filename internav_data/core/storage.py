@@ -1,0 +1,262 @@
+"""Stores: named blobs that are there whole or not at all, and the folder of files that is one.
+
+Linking, renaming, locking and waiting for the disk happen here and nowhere else, so that a bucket
+or a test's dictionary can stand in for a folder.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
+
+from internav_data.records.errors import InternavError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from contextlib import AbstractContextManager
+    from typing import BinaryIO
+
+_BLOCK = 1 << 20
+TEMPORARY = ".tmp"
+"""Suffix of files under way in a folder; a kill leaves one behind."""
+
+
+class LockedError(InternavError):
+    """Another process holds the lock of the store."""
+
+
+class OutsideError(OSError):
+    """A link leads out of the store."""
+
+
+@runtime_checkable
+class Store(Protocol):
+    """Named blobs. Names are relative paths with forward slashes.
+
+    A store travels pickled to worker processes. Reading what is not there raises
+    FileNotFoundError, any other failure another OSError.
+    """
+
+    def at(self, name: str) -> str:
+        """Return the place of a blob for error messages."""
+        ...
+
+    def size(self, name: str) -> int:
+        """Return the number of bytes of a blob.
+
+        Raises
+        ------
+        FileNotFoundError
+            There is no such blob.
+        OutsideError
+            It is a link out of the store.
+
+        """
+        ...
+
+    def read(self, name: str, start: int = 0, stop: int | None = None) -> bytes:
+        """Return the bytes start … stop - 1 of a blob; less where it ends earlier."""
+        ...
+
+    def source(self, name: str) -> Path | BinaryIO:
+        """Return a blob as a path, or as a file that can be read and sought."""
+        ...
+
+    def put(self, name: str, data: bytes) -> None:
+        """Store a blob whole and durably: readers see the old one or the new one."""
+        ...
+
+    def names(self, prefix: str = "") -> list[str]:
+        """Return the names that begin with `prefix` (empty, or ending in a slash), sorted."""
+        ...
+
+    def remove(self, name: str) -> None:
+        """Remove a blob, or all below a name that ends in a slash; nothing if there is none."""
+        ...
+
+    def lock(self, busy: str) -> AbstractContextManager[None]:
+        """Hold the store's only lock.
+
+        Raises
+        ------
+        LockedError
+            Another process holds it; `busy` says what to do.
+
+        """
+        ...
+
+
+StoreLike: TypeAlias = "str | Path | Store"
+"""A store, or the folder that is one."""
+
+
+def store_of(root: StoreLike) -> Store:
+    """Return a store, that of a folder where a path is given."""
+    return root if isinstance(root, Store) else FolderStore(Path(root))
+
+
+def is_temporary(name: str) -> bool:
+    """Return whether a name is that of a file that was under way."""
+    return name.endswith(TEMPORARY) and name.rsplit("/", 1)[-1].startswith(".")
+
+
+def exists(store: Store, name: str) -> bool:
+    """Return whether a store has a blob of this name."""
+    try:
+        store.size(name)
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    return True
+
+
+@dataclass(frozen=True, slots=True)
+class FolderStore:
+    """A folder as a store: a file is a blob."""
+
+    root: Path
+    """Folder; made when something is first put into it."""
+
+    def at(self, name: str) -> str:
+        """Return the path of a file."""
+        return str(self.root / name)
+
+    def size(self, name: str) -> int:
+        """Return the number of bytes of a file inside the folder.
+
+        Raises
+        ------
+        FileNotFoundError
+            There is no such file.
+        OutsideError
+            It is a link out of the folder.
+
+        """
+        path = self.root / name
+        size = path.stat().st_size
+        if not path.resolve().is_relative_to(self.root.resolve()):
+            raise OutsideError(f"{path}: a link out of {self.root}")
+        return size
+
+    def read(self, name: str, start: int = 0, stop: int | None = None) -> bytes:
+        """Return the bytes start … stop - 1 of a file; less where it ends earlier."""
+        with (self.root / name).open("rb") as stream:
+            stream.seek(start)
+            return stream.read(-1 if stop is None else stop - start)
+
+    def source(self, name: str) -> Path:
+        """Return the path of a file."""
+        return self.root / name
+
+    def put(self, name: str, data: bytes) -> None:
+        """Write a file whole and durably."""
+        write_atomically(self.root / name, data)
+
+    def names(self, prefix: str = "") -> list[str]:
+        """Return the names of the files below a folder, links to folders too, sorted.
+
+        Raises
+        ------
+        NotADirectoryError
+            The store itself is a file.
+
+        """
+        if self.root.exists() and not self.root.is_dir():
+            raise NotADirectoryError(f"{self.root} is a file")
+        found = (self.root / prefix).rglob("*")
+        files = (path for path in found if not path.is_dir() or path.is_symlink())
+        return sorted(path.relative_to(self.root).as_posix() for path in files)
+
+    def remove(self, name: str) -> None:
+        """Remove a file, or a folder whose name ends in a slash."""
+        if name.endswith("/"):
+            with contextlib.suppress(FileNotFoundError):
+                shutil.rmtree(self.root / name)
+        else:
+            (self.root / name).unlink(missing_ok=True)
+
+    @contextlib.contextmanager
+    def lock(self, busy: str) -> Iterator[None]:
+        """Hold the folder's lock, which the kernel opens when its holder dies.
+
+        The folder is made if it is missing; nothing is written into it.
+
+        Raises
+        ------
+        LockedError
+            Another process holds it; `busy` says what to do.
+
+        """
+        import fcntl  # noqa: PLC0415 - POSIX only; readers need no lock
+
+        self.root.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(self.root, os.O_RDONLY)
+        try:
+            # Some network file systems cannot lock folders: there we trust the user.
+            with contextlib.suppress(OSError):
+                try:
+                    fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except BlockingIOError:
+                    raise LockedError(f"{self.root}: {busy}") from None
+            yield
+        finally:
+            os.close(descriptor)
+
+
+def write_atomically(path: Path, data: bytes) -> None:
+    """Write a file by way of a temporary one beside it: readers see the old or the new one.
+
+    Whatever goes wrong (a full disk, an interrupt), the temporary file is removed and `path` is
+    as it was.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}{TEMPORARY}")
+    try:
+        temporary.write_bytes(data)
+        sync(temporary)
+        temporary.replace(path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        raise
+    sync(path.parent)
+
+
+def write_folder_atomically(folder: Path, fill: Callable[[Path], object]) -> None:
+    """Let `fill` write into a temporary folder beside `folder`, which must be new, then rename it.
+
+    Whatever goes wrong, nothing stays behind.
+    """
+    temporary = folder.with_name(f".{folder.name}.{os.getpid()}{TEMPORARY}")
+    shutil.rmtree(temporary, ignore_errors=True)
+    temporary.mkdir(parents=True)
+    try:
+        fill(temporary)
+        sync(temporary)
+        temporary.rename(folder)
+    except BaseException:
+        shutil.rmtree(temporary, ignore_errors=True)
+        raise
+    sync(folder.parent)
+
+
+def sync(path: Path) -> None:
+    """Wait until a file or folder is on the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def file_sha256(path: Path) -> str:
+    """Return the sha256 of a file's bytes, 64 hexadecimal digits."""
+    digest = hashlib.sha256()
+    with path.open("rb") as stream:
+        while block := stream.read(_BLOCK):
+            digest.update(block)
+    return digest.hexdigest()

@@ -1,0 +1,173 @@
+"""Datasets in any store; the folder as a store."""
+
+import multiprocessing
+import os
+import pickle
+
+import pytest
+from memory_store import KilledError, MemoryStore
+from test_commit import ASSETS, IDENTITY, build
+
+from internav_data.core import storage
+from internav_data.core.storage import FolderStore, LockedError, OutsideError, Store, exists
+from internav_data.dataset import (
+    assemble,
+    compute_stats,
+    done_scenes,
+    has_manifest,
+    load_dataset,
+    open_staging,
+    read_manifest,
+    shards,
+)
+from internav_data.records.errors import CorruptDataError, UsageError
+
+
+@pytest.fixture(params=["folder", "memory"])
+def store(request, tmp_path):
+    return FolderStore(tmp_path / "store") if request.param == "folder" else MemoryStore()
+
+
+def test_both_are_stores(store):
+    assert isinstance(store, Store)
+
+
+def test_blobs_are_put_read_listed_and_removed(store):
+    assert store.names() == []
+    for name, data in (("a", b"0123"), ("b/c", b"x"), ("b/d", b""), ("a", b"456")):
+        store.put(name, data)
+    assert store.names() == ["a", "b/c", "b/d"]
+    assert store.names("b/") == ["b/c", "b/d"]
+    assert store.read("a") == b"456"
+    assert store.read("a", 1) == b"56"
+    assert store.read("a", 0, 2) == b"45"
+    assert store.size("a") == 3
+    assert (exists(store, "b/c"), exists(store, "b/e"), exists(store, "a/b")) == (1, 0, 0)
+    for reading in (store.read, store.size):
+        with pytest.raises(FileNotFoundError):
+            reading("b/e")
+    store.remove("b/e")
+    store.remove("b/c")
+    store.remove("e/")
+    assert store.names() == ["a", "b/d"]
+    store.remove("b/")
+    assert store.names() == ["a"]
+
+
+def test_a_dataset_in_memory_is_that_in_a_folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(shards, "SCENES_PER_SHARD", {"episodes": 8, "scenes": 20})
+    memory, folder = MemoryStore(), FolderStore(tmp_path)
+    for store in (memory, folder):
+        for low, high in ((0, 10), (10, 30)):
+            build(store, range(low, high), quarantined={5})
+            assemble(store, IDENTITY, ASSETS, high)
+    assert memory.blobs == {name: folder.read(name) for name in folder.names()}
+    dataset = load_dataset(memory, "train")
+    assert list(dataset) == list(load_dataset(tmp_path, "train"))
+    assert dataset.scene("scene-000004").scene == 4
+    assert compute_stats(memory) == compute_stats(tmp_path) == compute_stats(load_dataset(memory))
+    again = pickle.loads(pickle.dumps(dataset))  # noqa: S301 - our own
+    assert again[3] == dataset[3]
+    with pytest.raises(UsageError, match="another configuration"):
+        open_staging(memory, type(IDENTITY)("other", "1", 0, 1, "0", {}))
+    with pytest.raises(CorruptDataError, match="no dataset here"):
+        read_manifest(MemoryStore())
+
+
+@pytest.mark.parametrize("first", [0, 10])
+def test_killed_before_any_change_readers_are_safe_and_the_next_call_finishes(monkeypatch, first):
+    monkeypatch.setattr(shards, "SCENES_PER_SHARD", {"episodes": 8, "scenes": 20})
+    begun = MemoryStore()
+    if first:
+        build(begun, range(first))
+        assemble(begun, IDENTITY, ASSETS, first)
+    build(begun, range(first, 20))
+    whole = MemoryStore(begun.blobs)
+    assemble(whole, IDENTITY, ASSETS, 20)
+    assert whole.changes > 20
+    for deadline in range(whole.changes):
+        store = MemoryStore(begun.blobs, deadline)
+        with pytest.raises(KilledError):
+            assemble(store, IDENTITY, ASSETS, 20)
+        left = MemoryStore(store.blobs)
+        assert has_manifest(left) or not first
+        if has_manifest(left):
+            assert len({e.episode_id for e in load_dataset(left)}) in {2 * first, 40}
+        open_staging(left, IDENTITY)
+        assert done_scenes(left) == frozenset(range(20))
+        assemble(left, IDENTITY, ASSETS, 20)
+        assert left.blobs == whole.blobs
+
+
+def test_nothing_that_the_old_manifest_names_changes_before_the_new_one_is_there(monkeypatch):
+    monkeypatch.setattr(shards, "SCENES_PER_SHARD", {"episodes": 8, "scenes": 20})
+    store = MemoryStore()
+    build(store, range(10))
+    named = {file.path for file in assemble(store, IDENTITY, ASSETS, 10).files}
+    build(store, range(10, 30))
+    store.log.clear()
+    new = {file.path for file in assemble(store, IDENTITY, ASSETS, 30).files}
+    at = store.log.index(("put", "manifest.json"))
+    assert not named & {name for _, name in store.log[:at]}
+    assert {name for kind, name in store.log if kind == "remove"} >= named - new
+    assert named & new, "finished shards stay"
+    assert named - new, "the last ones are replaced"
+
+
+def test_a_folder_finds_links_that_lead_out(tmp_path):
+    store = FolderStore(tmp_path / "store")
+    store.put("a", b"inside")
+    (tmp_path / "b").write_bytes(b"outside")
+    (store.root / "b").symlink_to(tmp_path / "b")
+    (store.root / "c").symlink_to(store.root / "a")
+    assert store.size("c") == 6
+    with pytest.raises(OutsideError):
+        store.size("b")
+
+
+def _try(store, pipe):
+    try:
+        with store.lock("busy"):
+            pipe.send("locked")
+    except LockedError as error:
+        pipe.send(str(error))
+
+
+def test_a_folder_is_locked_once(tmp_path):
+    store = FolderStore(tmp_path / "store")
+    context = multiprocessing.get_context("spawn")
+    for held, said in ((True, f"{store.root}: come back later"), (False, None)):
+        if held:
+            with store.lock("busy"), pytest.raises(LockedError) as caught:
+                store.lock("come back later").__enter__()
+            assert str(caught.value) == said
+        ours, theirs = context.Pipe()
+        process = context.Process(target=_try, args=(store, theirs))
+        process.start()
+        assert ours.recv() == "locked", "released when the block ended"
+        process.join()
+    assert store.names() == [], "nothing is written"
+
+
+def test_only_the_store_links_renames_and_locks():
+    import re
+    from pathlib import Path
+
+    package = Path(storage.__file__).parents[1]
+    calls = re.compile(r"os\.(link|rename|replace)\(|\.rename\(|\.hardlink_to\(|flock\(")
+    found = {
+        path.relative_to(package).as_posix()
+        for path in package.rglob("*.py")
+        if calls.search(path.read_text())
+    }
+    assert found == {"core/storage.py"}
+
+
+def test_a_full_disk_leaves_the_old_folder(tmp_path, monkeypatch):
+    def full(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space"):
+        storage.write_folder_atomically(tmp_path / "x", lambda folder: (folder / "a").touch())
+    assert list(tmp_path.iterdir()) == []
