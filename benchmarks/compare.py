@@ -28,7 +28,7 @@ from internav_data.catalog import catalogue
 from internav_data.episodes import EpisodeConfig, SpawnSite, build_episodes
 from internav_data.geometry import Polygons, footprint
 from internav_data.houses import HouseConfig, build_house
-from internav_data.physics import settle
+from internav_data.physics import Body, settle
 from internav_data.records import Pose
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def _start(house: House, pool: tuple[Asset, ...], config: EpisodeConfig) -> None
     """Do what a worker does once in its life: load kernels, let every asset fall alone."""
     build_episodes(house, 2, pool, config)
     for asset in pool:
-        settle(asset, Pose(0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 1.0)), math.inf, tuple)
+        settle(Body.of(asset, Pose(0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 1.0))), math.inf, tuple)
 
 
 def _timed(work: Callable[[], Any]) -> tuple[Any, float]:

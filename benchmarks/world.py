@@ -85,10 +85,10 @@ def free_pushes() -> tuple[dict[str, float], dict[str, float]]:
     """Free pushes of pushable assets on open ground: solved in Bullet, then from the cache."""
     pool = [asset for asset in catalogue().spawnable if asset.pushable][::3]
     pose = Pose(3.0, 4.0, 0.001, yaw_quaternion(30))
-    push(pool[0], pose, 3, lambda _: ())  # compiles
+    push(Body.of(pool[0], pose), 3, lambda _: ())  # compiles
 
     def once(asset: Asset) -> float:
-        return timed(lambda: push(asset, pose, 1, lambda _: ()))
+        return timed(lambda: push(Body.of(asset, pose), 1, lambda _: ()))
 
     simulated = [once(asset) for asset in pool]
     # Best of a few: what else the machine did does not count.
@@ -99,9 +99,7 @@ def free_pushes() -> tuple[dict[str, float], dict[str, float]]:
 def kept_pushes(folder: Path) -> dict[str, float]:
     """Free pushes that another process has solved and kept on disk."""
     pool = [asset for asset in catalogue().spawnable if asset.pushable][::3]
-    asked = [
-        PhysicsScene((Body(asset, Pose(0.0, 0.0, 0.001, UPRIGHT), moves=True),)) for asset in pool
-    ]
+    asked = [PhysicsScene((Body.of(asset, Pose(0.0, 0.0, 0.001, UPRIGHT)),)) for asset in pool]
     first = CachedEngine(bullet(), ResultCache(folder), "here")
     for scene in asked:
         first.push(scene, PUSH_SPECS["force"])

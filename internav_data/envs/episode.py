@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 
     from internav_data.envs.source import LoadedHouse
     from internav_data.navigation import Lattice
-    from internav_data.physics import PushModel
-    from internav_data.records import Asset, Episode
+    from internav_data.records import Asset, Episode, PushModel
     from internav_data.world import StepResult
 
 

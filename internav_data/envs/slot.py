@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from internav_data.dataset import Dataset
     from internav_data.envs.episode import TaskStep
     from internav_data.envs.order import EpisodeOrder
-    from internav_data.physics import PushModel
-    from internav_data.records import Episode
+    from internav_data.records import Episode, PushModel
 
 
 class Arguments(TypedDict, total=False):

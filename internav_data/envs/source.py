@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.dataset import Dataset
-    from internav_data.physics import PushModel
-    from internav_data.records import Episode, House
+    from internav_data.records import Episode, House, PushModel
 
 
 FIELDS_KEPT: Final = 64

@@ -17,7 +17,7 @@ from internav_data.episodes.site import SpawnSite
 from internav_data.episodes.spawn import EpisodeDraft, spawn
 from internav_data.geometry import round_m
 from internav_data.navigation import SPACING_M, node_paths
-from internav_data.physics import engine_of_this_process
+from internav_data.physics import DEFAULT_ENGINE, Body, get_engine
 from internav_data.planner.search import solve
 from internav_data.records import (
     Episode,
@@ -62,6 +62,7 @@ def build_episodes(
     *,
     first: int = 0,
     attempt: int = 0,
+    engine: str = DEFAULT_ENGINE,
 ) -> tuple[Episode, ...]:
     """Make the episodes first … first + count - 1 of a house.
 
@@ -79,14 +80,19 @@ def build_episodes(
         Settings; the calibrated defaults where None.
     attempt
         Sub-seed: 0 unless an earlier attempt at the scene failed.
+    engine
+        Name of the physics engine.
 
     Raises
     ------
+    UsageError
+        No engine has this name.
     QuarantineError
         An episode cannot be made within the stated bounds.
 
     """
-    return build_batch(house, count, pool, config, first=first, attempt=attempt).episodes
+    batch = build_batch(house, count, pool, config, first=first, attempt=attempt, engine=engine)
+    return batch.episodes
 
 
 def build_batch(
@@ -97,10 +103,11 @@ def build_batch(
     *,
     first: int = 0,
     attempt: int = 0,
+    engine: str = DEFAULT_ENGINE,
 ) -> EpisodeBatch:
     """Make episodes as `build_episodes` does, and say how often something was drawn again."""
     config = config or EpisodeConfig()
-    site = SpawnSite.of(house)
+    site = SpawnSite.of(house, engine)
     redraws: Counter[Redraw] = Counter()
     episodes = []
     for index in range(first, first + count):
@@ -151,10 +158,11 @@ def _draw(
     yaw_deg = QUARTER_TURNS[int(place.integers(4))]
     world = World(
         site.model,
-        [(o.asset, o.settled.pose) for o in draft.obstacles],
+        [Body.of(o.asset, o.settled.pose) for o in draft.obstacles],
         (*draft.start, yaw_deg // 90),
         draft.goal,
         config.push_model,
+        site.engine,
     )
     # The expert comes first: what it cannot solve needs no outcomes.
     expert = solve(world)
@@ -262,6 +270,7 @@ def _recorded(draft: EpisodeDraft, index: int, world: World, expert: Expert | No
 
 def _obstacle(spawned: Spawned, outcomes: tuple[Outcome, ...]) -> Obstacle:
     asset, pose = spawned.asset, spawned.settled.pose
+    dynamics = asset.dynamics
     return Obstacle(
         asset_id=asset.asset_id,
         type=asset.type,
@@ -269,10 +278,10 @@ def _obstacle(spawned: Spawned, outcomes: tuple[Outcome, ...]) -> Obstacle:
         y=pose.y,
         z=pose.z,
         quaternion=pose.quaternion,
-        mass_kg=asset.mass_kg,
-        friction=asset.friction,
-        pushable=asset.pushable,
-        pickable=asset.pickable,
+        mass_kg=dynamics.mass_kg,
+        friction=dynamics.friction,
+        pushable=dynamics.pushable,
+        pickable=dynamics.pickable,
         segment=spawned.segment,
         settle_s=spawned.settled.seconds,
         settle_penetration_m=spawned.settled.penetration_m,
@@ -281,7 +290,7 @@ def _obstacle(spawned: Spawned, outcomes: tuple[Outcome, ...]) -> Obstacle:
 
 
 def _physics(draft: EpisodeDraft) -> Physics:
-    engine = engine_of_this_process()
+    engine = get_engine(draft.site.engine)
     return Physics(
         engine=engine.name,
         build=engine.build,

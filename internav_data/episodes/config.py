@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 from internav_data.records.errors import UsageError
-
-PUSH_MODELS = ("force", "kick")
+from internav_data.records.physics import PUSH_SPECS, PushModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +34,7 @@ class EpisodeConfig:
     """Starts and goals tried for one episode."""
     keep_unsolvable: bool = False
     """Keep episodes for which the expert finds no plan, their `expert` null; else draw again."""
-    push_model: Literal["force", "kick"] = "force"
+    push_model: PushModel = "force"
     """Of outcomes, expert and environments: 200 N up to 2 m/s, or 2 m/s at once for every mass."""
     unseen_assets: bool = False
     """Each split draws its obstacles from its own share of the assets (2/3, 1/6, 1/6)."""
@@ -62,8 +61,8 @@ class EpisodeConfig:
             ),
             (self.max_redraws < 1, f"max_redraws: expected at least 1, got {self.max_redraws}"),
             (
-                self.push_model not in PUSH_MODELS,
-                f"push_model: expected one of {', '.join(PUSH_MODELS)}, got {self.push_model!r}",
+                self.push_model not in PUSH_SPECS,
+                f"push_model: expected one of {', '.join(PUSH_SPECS)}, got {self.push_model!r}",
             ),
         ]
         for wrong, message in problems:

@@ -91,7 +91,7 @@ class _Lifted:
 
 
 def _pushed(world: World, index: int, heading: int, before: Distances, lifted: _Lifted) -> Outcome:
-    if not world.items[index].asset.pushable:
+    if not world.items[index].dynamics.pushable:
         return _failed(PUSHES[heading], "not pushable", before)
     pushed = world.simulate_push(index, heading, agent=False)
     if not pushed.success:
@@ -115,7 +115,7 @@ def _pushed(world: World, index: int, heading: int, before: Distances, lifted: _
 
 
 def _picked(world: World, index: int, before: Distances, lifted: _Lifted) -> Outcome:
-    if not world.items[index].asset.pickable:
+    if not world.items[index].dynamics.pickable:
         return _failed(PICK, "not pickable", before)
     if carries(world, index):
         return _failed(PICK, "something rests on it", before)

@@ -122,7 +122,7 @@ def _try_spot(draft: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> Non
     shifted = Polygons(standing.vertices + np.array([pose.x, pose.y]), standing.offsets)
     if _distance(draft, shifted, gap) < gap:
         return
-    settled = settle(asset, pose, gap, lambda: _near(draft, shifted))
+    settled = settle(Body.of(asset, pose), gap, lambda: _near(draft, shifted), draft.site.engine)
     if settled.refusal:
         return
     exact = footprint(asset, settled.pose)
@@ -173,12 +173,12 @@ def _near(draft: EpisodeDraft, here: Polygons) -> list[Body]:
     """Things, obstacles and walls near a spot, as fixed bodies."""
     house = draft.site.house
     bodies = [
-        Body(house.assets[thing.asset_id], thing.pose, moves=False)
+        Body.of(house.assets[thing.asset_id], thing.pose, moves=False)
         for thing in house.objects
         if _is_near(here, footprint(house.assets[thing.asset_id], thing.pose))
     ]
     bodies += [
-        Body(other.asset, other.settled.pose, moves=False)
+        Body.of(other.asset, other.settled.pose, moves=False)
         for other in draft.obstacles
         if _is_near(here, other.footprint)
     ]

@@ -142,11 +142,14 @@ def _catalogue(config: GenerationConfig) -> Catalogue:
 
 def check_standing(assets: Iterable[Asset]) -> None:
     """Raise UsageError for meshes that do not stay where they are put: none would be spawned."""
-    from internav_data.physics import settle  # noqa: PLC0415 - pybullet, for users with meshes
+    from internav_data.physics import Body, settle  # noqa: PLC0415 - pybullet, for users with meshes
     from internav_data.physics.scene import UPRIGHT  # noqa: PLC0415 - as above
 
     origin = Pose(0.0, 0.0, 0.0, UPRIGHT)
-    rests = ((asset.asset_id, settle(asset, origin, math.inf, tuple).refusal) for asset in assets)
+    rests = (
+        (asset.asset_id, settle(Body.of(asset, origin), math.inf, tuple).refusal)
+        for asset in assets
+    )
     fallen = [f"{asset_id} {refusal}" for asset_id, refusal in rests if refusal]
     if fallen:
         raise UsageError(

@@ -27,14 +27,15 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from internav_data.physics.result_cache import ResultCache
-    from internav_data.physics.scene import Engine, PhysicsScene, PushSpec
-    from internav_data.records import Asset
+    from internav_data.physics.scene import Engine, PhysicsScene
+    from internav_data.records import Asset, PushSpec
 
 _PACKAGE: Final = "internav_data"
 _SOLVERS: Final = ("internav_data.geometry", "internav_data.physics")
 """Packages that solutions come from: none is believed once a file that they import has changed."""
-_LIBRARIES: Final = ("pybullet", "numpy", "numba", "llvmlite")
-"""Libraries that they come from; an installed one's RECORD holds the digests of all its files."""
+_LIBRARIES: Final = ("numpy", "numba", "llvmlite")
+"""Libraries behind every engine's results, besides its own; the RECORD of an installed library
+holds the digests of all its files."""
 _SETTLE: Final = struct.Struct("<7d3d?")
 """Pose; seconds, penetration, reach; at rest."""
 _PUSH: Final = struct.Struct("<d?H")
@@ -62,6 +63,21 @@ class CachedEngine:
         """Version and build of the engine."""
         return self.engine.build
 
+    @property
+    def rules(self) -> int:
+        """Number of the engine's rules."""
+        return self.engine.rules
+
+    @property
+    def libraries(self) -> tuple[str, ...]:
+        """Installed distributions that the engine's results come from."""
+        return self.engine.libraries
+
+    @property
+    def contact_margin_m(self) -> float:
+        """Distance at which two bodies of the engine may already touch, metres."""
+        return self.engine.contact_margin_m
+
     def settle(self, scene: PhysicsScene) -> SettleSolution:
         """Let the first body of the setting fall until it rests."""
         if not self.result_cache.is_open:
@@ -85,14 +101,18 @@ class CachedEngine:
         return known
 
     def _key(self, what: str, scene: PhysicsScene) -> bytes:
-        bodies = ((_digest(b.asset), b.pose, b.moves) for b in scene.bodies)
+        bodies = (
+            (_digest(b.asset), b.dynamics.mass_kg, b.dynamics.friction, b.pose, b.moves)
+            for b in scene.bodies
+        )
         asked = (self.origin, what, scene.agent, *bodies)
         return hashlib.sha256(repr(asked).encode()).digest()
 
 
 @lru_cache(maxsize=8192)
 def _digest(asset: Asset) -> str:
-    return hashlib.sha256(repr(asset).encode()).hexdigest()
+    """Digest of the geometry: its parts are all that an engine sees of an asset."""
+    return hashlib.sha256(repr(asset.parts).encode()).hexdigest()
 
 
 def _numbers(pose: Pose) -> tuple[float, ...]:
@@ -217,16 +237,17 @@ _CODE: Final = code_digest(Path(__file__).parents[2])
 """Of the files as they were imported: they may change while a process lives."""
 
 
-@lru_cache(maxsize=1)
-def origin(build: str) -> str | None:
+@lru_cache(maxsize=8)
+def origin(engine: Engine) -> str | None:
     """Return what answers depend on besides the question; None where that cannot be told.
 
     Another build of a library, and a processor with other instructions, may round otherwise.
     """
     from llvmlite.binding import get_host_cpu_features, get_host_cpu_name  # noqa: PLC0415 - heavy
 
+    named = (*engine.libraries, *_LIBRARIES)
     try:
-        libraries = [metadata.distribution(name).read_text("RECORD") for name in _LIBRARIES]
+        libraries = [metadata.distribution(name).read_text("RECORD") for name in named]
     except metadata.PackageNotFoundError:
         return None
     if None in libraries:
@@ -234,4 +255,4 @@ def origin(build: str) -> str | None:
     records = hashlib.sha256("".join(map(str, libraries)).encode()).hexdigest()
     system = f"{platform.system()} {'-'.join(platform.libc_ver())} {platform.python_version()}"
     processor = f"{platform.machine()} {get_host_cpu_name()} {get_host_cpu_features().flatten()}"
-    return f"{build}, {_CODE}, {records}, {system}, {processor}"
+    return f"{engine.name} {engine.build}, {_CODE}, {records}, {system}, {processor}"

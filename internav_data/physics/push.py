@@ -1,9 +1,9 @@
-"""Push: where a thing and what it meets come to rest when somebody pushes it."""
+"""Push: the poses at which an object, and all that it runs into, come to rest after a push."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final, Literal
 
@@ -12,17 +12,16 @@ from internav_data.physics.displacement import is_still, shift_m, tilt_deg
 from internav_data.physics.frames import Frame
 from internav_data.physics.kdop import grown
 from internav_data.physics.narrow_phase import met_on_path, prisms_of, prisms_of_collider
-from internav_data.physics.registry import engine_of_this_process
+from internav_data.physics.registry import DEFAULT_ENGINE, get_engine
 from internav_data.physics.scene import (
     AGENT_HEIGHT_M,
     AGENT_LOW_M,
     AgentCollider,
     Body,
     PhysicsScene,
-    PushSpec,
 )
 from internav_data.physics.sweep import extent_of
-from internav_data.records import Pose
+from internav_data.records import PUSH_SPECS, Pose
 from internav_data.records.agent import AGENT
 
 if TYPE_CHECKING:
@@ -30,39 +29,33 @@ if TYPE_CHECKING:
 
     from internav_data.physics.kdop import Dop8
     from internav_data.physics.scene import Engine, PushSolution
-    from internav_data.records import Asset, Quaternion, Vec2
+    from internav_data.records import Asset, PushSpec, Quaternion, Vec2
 
     Near = Callable[[Dop8], Sequence[tuple[int, Body]]]
-    """Bodies, with their keys in ascending order, that reach into an octagon of the house."""
+    """Function from an 8-DOP of the house to the bodies that reach into it, with their keys in
+    ascending order; the pushed object is not among them."""
     Movers = tuple[tuple[int, Body], ...]
-    """Bodies that move besides what is pushed, with their keys."""
+    """Bodies that move besides the pushed one, with their keys."""
 
-PushModel = Literal["force", "kick"]
-PUSH_SPECS: Final[dict[PushModel, PushSpec]] = {
-    "force": PushSpec(force_n=200.0, speed_m_s=2.0, seconds=0.5),
-    "kick": PushSpec(force_n=math.inf, speed_m_s=2.0, seconds=0.5),
-}
-"""The paper's constant force, and the released code's 2 m/s for every mass."""
 SUCCESS_M: Final = 0.05
-"""What moved less was not pushed."""
+"""Least displacement of a successful push."""
 TOPPLED_DEG: Final = 45.0
-TOUCH_M: Final = 0.005
-"""Bodies this near may touch: the engine's hulls are thicker by a margin of 1 mm."""
-MEET_M: Final = 0.012
-"""What a body's kept poses come this near of may touch it: poses lie up to 1 cm apart, so what lies
-between them is missed by half of that at most."""
+SWEEP_GAP_M: Final = 0.011
+"""Margin round the recorded poses of a moving body. Poses lie up to 1 cm apart, so a body between
+two of them is missed by half of this at most; the engine's contact margin comes on top."""
 AGENT_M: Final = AGENT.collider_radius_m
-"""Radius of the agent's column: nothing ends inside its disc of 0.2 m."""
+"""Radius of the agent's collider: no object ends inside the agent's disc of 0.2 m."""
 AGENT_MIN_M: Final = 0.2005
-"""What already stands nearer than the column is not pressed away by it."""
+"""Least radius of the collider. It shrinks to the nearest movable object, so that the agent does
+not press away an object that already stands closer than `AGENT_M`."""
 MAX_ROUNDS: Final = 8
-"""What was reached though it was left out joins the next round; the last one takes all within
-`FAR_M`."""
+"""Objects hit but not simulated are added and the push is solved again, at most 8 times; the last
+try includes everything within `FAR_M`."""
 FAR_M: Final = 4.0
-ON_M: Final = 0.2
-"""How far round what is met more may be met: a guess of how many things will move."""
+CROWD_MARGIN_M: Final = 0.2
+"""Margin within which a struck object may strike another; used to estimate how many will move."""
 _HEIGHT_DIGITS: Final = 3
-"""What settled lies 0.9 or 1.0 mm high: one solution serves both."""
+"""Settled objects lie 0.9 or 1.0 mm above the floor: one solution serves both."""
 _START_DIGITS: Final = 4
 """Orientations of a free push are rounded to 0.1 mrad, which moves a corner by less than the 0.1 mm
 of stored positions: nearly equal ones share their solution."""
@@ -74,15 +67,16 @@ Failure = Literal["", "too heavy", "something is in the way", "the agent is in t
 
 @dataclass(frozen=True, slots=True)
 class PushResult:
-    """Where everything lies after a push, rounded as it will be stored.
+    """Poses after a push in the house's frame, rounded as they are stored.
 
-    It is the whole truth also where the push failed: whoever applies it decides what stays.
+    A failed push may have moved objects too: the caller decides whether to apply the poses.
     """
 
     pose: Pose
     displacement_m: float
-    """How far the thing's centre of mass moved in the plane."""
+    """Distance that the pushed object's centre of mass moved in the plane."""
     seconds: float
+    """Simulated time until everything was at rest."""
     toppled: bool
     moved: tuple[tuple[int, Pose], ...]
     """Neighbours that moved: their keys, ascending, and new poses."""
@@ -92,127 +86,155 @@ class PushResult:
     """False when something still rolled after five seconds."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Problem:
+    """A push in the pushed object's own frame."""
+
+    frame: Frame
+    pushed: Body
+    spec: PushSpec
+    near: Near
+    solver: Engine
+
+    @staticmethod
+    def of(body: Body, heading: int, near: Near, spec: PushSpec, engine: str) -> _Problem:
+        frame = Frame(body.pose.x, body.pose.y, heading)
+        turn = _coarse(frame.enter(body.pose).quaternion)
+        start = Pose(0.0, 0.0, round(body.pose.z, _HEIGHT_DIGITS), turn)
+        pushed = Body(body.asset, start, body.dynamics)
+        return _Problem(frame, pushed, spec, near, get_engine(engine))
+
+    @property
+    def margin_m(self) -> float:
+        """Distance from recorded poses within which a body may be touched."""
+        return SWEEP_GAP_M + self.solver.contact_margin_m
+
+
 def push(
-    asset: Asset,
-    pose: Pose,
+    body: Body,
     heading: int,
     near: Near,
+    spec: PushSpec = PUSH_SPECS["force"],
     agent: Vec2 | None = None,
     *,
     agent_gap_m: float = math.inf,
-    model: PushModel = "force",
+    engine: str = DEFAULT_ENGINE,
 ) -> PushResult:
-    """Push a thing along one of the house's four headings.
+    """Push an object along one of the house's four headings.
 
-    Solved in its own frame: the thing at the origin, the push along +x. Where nothing reaches into
-    what it sweeps on free ground, the free solution (once per asset, orientation relative to the
-    push and height) is moved into place.
+    The problem is solved in the object's own frame: the object at the origin, the push along +x.
+    Where nothing reaches into the object's sweep on free ground, the free solution (one for each
+    asset, dynamics, height and orientation relative to the push) is moved into place.
 
     Parameters
     ----------
-    asset, pose
-        What is pushed, and where it lies.
+    body
+        Object to push, at its pose in the house.
     heading
         0, 1, 2, 3: along +x, +y, -x, -y.
     near
-        Gathers what else reaches into an octagon, without the thing itself.
+        Gathers all other bodies that reach into an 8-DOP of the house.
+    spec
+        Force, speed limit and duration.
     agent
-        Where the agent stands; None without it.
+        Position of the agent, metres; None for a push without it.
     agent_gap_m
         Least distance from the agent's axis to anything that can move.
-    model
-        "force" or "kick".
+    engine
+        Name of the physics engine.
+
+    Raises
+    ------
+    UsageError
+        No engine has this name.
 
     """
-    spec = PUSH_SPECS[model]
-    frame = Frame(pose.x, pose.y, heading)
-    start = _start(frame, pose)
-    solution = free = _push_alone(asset, start, spec, engine_of_this_process())
+    problem = _Problem.of(body, heading, near, spec, engine)
+    solution = free = _push_alone(problem.pushed, spec, problem.solver)
     movers: Movers = ()
     failure: Failure = "too heavy"
 
     def moves() -> bool:
-        return shift_m(asset, pose, frame.leave(solution.poses[0])) >= SUCCESS_M
+        return shift_m(body.asset, body.pose, problem.frame.leave(solution.poses[0])) >= SUCCESS_M
 
-    # What is too heavy alone is not lighter among others, nor freer beside the agent.
-    known = _met(frame, near, (asset,), free) if moves() else {}
+    # An object that is too heavy alone is not lighter among others, nor freer beside the agent.
+    known = _met(problem, (body.asset,), free) if moves() else {}
     if known:
         failure = "something is in the way"
-        solution, movers = _push_among(asset, start, frame, near, None, spec, known)
-    collider = _collider(frame, agent, agent_gap_m)
-    if collider is not None and moves() and _meets(collider, (asset, *_assets(movers)), solution):
-        # Only now: what never comes near the agent is solved once, wherever it stands.
+        solution, movers = _push_among(problem, None, known)
+    collider = _collider(problem.frame, agent, agent_gap_m)
+    moving = (body.asset, *_assets(movers))
+    if collider is not None and moves() and _meets(problem, collider, moving, solution):
+        # Only now: a push that never comes near the agent has one solution, wherever it stands.
         failure = "the agent is in the way"
-        solution, movers = _push_among(asset, start, frame, near, collider, spec, known)
-    return _judged(asset, pose, frame, solution, movers, failure)
+        solution, movers = _push_among(problem, collider, known)
+    return _judged(body, problem.frame, solution, movers, failure)
 
 
 def count_movers(
-    asset: Asset, pose: Pose, heading: int, near: Near, model: PushModel = "force"
+    body: Body,
+    heading: int,
+    near: Near,
+    spec: PushSpec = PUSH_SPECS["force"],
+    engine: str = DEFAULT_ENGINE,
 ) -> int:
-    """Count the things that may be moved besides what is pushed: what a push will cost to solve.
+    """Estimate how many objects a push may move besides the pushed one: its cost to solve.
 
-    Parameters as in `push`.
+    Parameters as in `push`. Only the free push is solved; 0 where it does not move the object.
+
+    Raises
+    ------
+    UsageError
+        No engine has this name.
+
     """
-    frame = Frame(pose.x, pose.y, heading)
-    free = _push_alone(asset, _start(frame, pose), PUSH_SPECS[model], engine_of_this_process())
-    if shift_m(asset, pose, frame.leave(free.poses[0])) < SUCCESS_M:
+    problem = _Problem.of(body, heading, near, spec, engine)
+    free = _push_alone(problem.pushed, spec, problem.solver)
+    if shift_m(body.asset, body.pose, problem.frame.leave(free.poses[0])) < SUCCESS_M:
         return 0
 
     def loose(dop8: Dop8) -> list[tuple[int, Body]]:
         return [pair for pair in near(dop8) if pair[1].moves]
 
-    known = _met(frame, loose, (asset,), free)
-    for body in list(known.values()):
-        known.update(loose(grown(extent_of(body.asset, body.pose).dop8, ON_M)))
+    known = _met(replace(problem, near=loose), (body.asset,), free)
+    for other in list(known.values()):
+        known.update(loose(grown(extent_of(other.asset, other.pose).dop8, CROWD_MARGIN_M)))
     return len(known)
 
 
-def _start(frame: Frame, pose: Pose) -> Pose:
-    return Pose(0.0, 0.0, round(pose.z, _HEIGHT_DIGITS), _coarse(frame.enter(pose).quaternion))
-
-
 @lru_cache(maxsize=32768)
-def _push_alone(asset: Asset, start: Pose, spec: PushSpec, engine: Engine) -> PushSolution:
-    return engine.push(PhysicsScene((Body(asset, start, moves=True),)), spec)
+def _push_alone(pushed: Body, spec: PushSpec, solver: Engine) -> PushSolution:
+    return solver.push(PhysicsScene((pushed,)), spec)
 
 
 @lru_cache(maxsize=4096)
-def _push_in(scene: PhysicsScene, spec: PushSpec, engine: Engine) -> PushSolution:
-    """Push in a scene; what failed changed nothing and is likely to be tried again."""
-    return engine.push(scene, spec)
+def _push_in(scene: PhysicsScene, spec: PushSpec, solver: Engine) -> PushSolution:
+    """Push in a scene; a failed push changed nothing and is likely to be tried again."""
+    return solver.push(scene, spec)
 
 
 def _push_among(
-    asset: Asset,
-    start: Pose,
-    frame: Frame,
-    near: Near,
-    collider: AgentCollider | None,
-    spec: PushSpec,
-    known: dict[int, Body],
+    problem: _Problem, collider: AgentCollider | None, known: dict[int, Body]
 ) -> tuple[PushSolution, Movers]:
-    """Push among what is touched: solved anew until nothing left out is.
+    """Push among the bodies that are touched: solved anew until none is left out.
 
-    What turns out to be touched joins `known`.
+    Bodies that turn out to be touched join `known`.
     """
-    engine = engine_of_this_process()
+    frame = problem.frame
     for left in reversed(range(MAX_ROUNDS)):
         around = [(key, known[key]) for key in sorted(known)]
         movers = tuple(pair for pair in around if pair[1].moves)
         others = [pair for pair in around if not pair[1].moves]
-        bodies = (
-            Body(body.asset, frame.enter(body.pose), body.moves) for _, body in (*movers, *others)
-        )
-        scene = PhysicsScene((Body(asset, start, moves=True), *bodies), collider)
-        solution = _push_in(scene, spec, engine)
-        met = _met(frame, near, (asset, *_assets(movers)), solution, known)
+        bodies = (replace(body, pose=frame.enter(body.pose)) for _, body in (*movers, *others))
+        scene = PhysicsScene((problem.pushed, *bodies), collider)
+        solution = _push_in(scene, problem.spec, problem.solver)
+        met = _met(problem, (problem.pushed.asset, *_assets(movers)), solution, known)
         if not met:
             break
         known.update(met)
         if left == 1:
             for sweep in solution.sweeps:
-                known.update(near(grown(frame.leave_dop8(sweep), FAR_M)))
+                known.update(problem.near(grown(frame.leave_dop8(sweep), FAR_M)))
     return solution, movers
 
 
@@ -221,45 +243,41 @@ def _assets(movers: Movers) -> tuple[Asset, ...]:
 
 
 def _met(
-    frame: Frame,
-    near: Near,
+    problem: _Problem,
     moving: Sequence[Asset],
     solution: PushSolution,
     known: Container[int] = (),
 ) -> dict[int, Body]:
-    """Gather what is not known yet and may be touched by what moves."""
+    """Gather the bodies, unless known already, that moving assets may touch."""
     found: dict[int, Body] = {}
+    frame, margin = problem.frame, problem.margin_m
     for asset, sweep, path in zip(moving, solution.sweeps, solution.paths, strict=True):
-        around = near(grown(frame.leave_dop8(sweep), MEET_M))
+        # 8-DOPs first: they leave out most of the house.
+        around = problem.near(grown(frame.leave_dop8(sweep), margin))
         asked = [pair for pair in around if pair[0] not in known and pair[0] not in found]
         prisms = [prisms_of(body.asset, body.pose) for _, body in asked]
-        met = met_on_path(asset, path, frame, prisms, MEET_M)
+        met = met_on_path(asset, path, frame, prisms, margin)
         found.update(pair for pair, touched in zip(asked, met, strict=True) if touched)
     return found
 
 
 def _judged(
-    asset: Asset,
-    pose: Pose,
-    frame: Frame,
-    solution: PushSolution,
-    movers: Movers,
-    failure: Failure,
+    body: Body, frame: Frame, solution: PushSolution, movers: Movers, failure: Failure
 ) -> PushResult:
-    """Move a motion from the thing's own frame into the house, round it, and judge it."""
+    """Move a solution from the object's own frame into the house, round it, and judge it."""
     end = frame.leave(solution.poses[0])
-    far = round_m(shift_m(asset, pose, end))
+    far = round_m(shift_m(body.asset, body.pose, end))
     moved = []
-    for (key, body), after in zip(movers, solution.poses[1:], strict=True):
+    for (key, other), after in zip(movers, solution.poses[1:], strict=True):
         there = frame.leave(after)
-        if not is_still(body.pose, there):
+        if not is_still(other.pose, there):
             moved.append((key, there))
     success = far >= SUCCESS_M
     return PushResult(
         pose=end,
         displacement_m=far,
         seconds=round(solution.seconds, 6),
-        toppled=tilt_deg(pose.quaternion, end.quaternion) > TOPPLED_DEG,
+        toppled=tilt_deg(body.pose.quaternion, end.quaternion) > TOPPLED_DEG,
         moved=tuple(moved),
         success=success,
         reason="" if success else failure,
@@ -279,12 +297,13 @@ def _collider(frame: Frame, agent: Vec2 | None, gap: float) -> AgentCollider | N
     return AgentCollider(x, y, min(AGENT_M, max(AGENT_MIN_M, round_m(gap))))
 
 
-def _meets(collider: AgentCollider, moving: Sequence[Asset], solution: PushSolution) -> bool:
-    """Whether anything that moves comes near the agent's column."""
-    agent = prisms_of_collider(
-        collider.x, collider.y, collider.radius_m, AGENT_LOW_M, AGENT_HEIGHT_M
-    )
+def _meets(
+    problem: _Problem, collider: AgentCollider, moving: Sequence[Asset], solution: PushSolution
+) -> bool:
+    """Whether anything that moves comes near the agent's collider."""
+    x, y, radius_m = collider.x, collider.y, collider.radius_m
+    agent = prisms_of_collider(x, y, radius_m, AGENT_LOW_M, AGENT_HEIGHT_M)
     return any(
-        any(met_on_path(asset, path, _OWN, [agent], MEET_M))
+        any(met_on_path(asset, path, _OWN, [agent], problem.margin_m))
         for asset, path in zip(moving, solution.paths, strict=True)
     )

@@ -4,23 +4,41 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from internav_data.physics.cache import CachedEngine, origin
 from internav_data.physics.result_cache import ResultCache, result_cache
+from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from internav_data.physics.scene import Engine
+
+DEFAULT_ENGINE: Final = "bullet"
+"""Name of the engine that is taken where none is named."""
+
+
+def _bullet() -> Engine:
+    from internav_data.physics.engines.bullet import bullet  # noqa: PLC0415 - pybullet is imported when used
+
+    return bullet()
+
+
+ENGINES: Final[dict[str, Callable[[], Engine]]] = {"bullet": _bullet}
+"""Function by engine name that returns this process's engine; it must return the same object
+every time, for results are cached by engine. Another engine is added here.
+
+The result cache believes no entry once a source file of this package has changed, or a library
+that the engine names. An engine from elsewhere must change its `build` with its results."""
 
 _cache_off = False
 
 
 @contextmanager
 def cache_disabled() -> Iterator[None]:
-    """Ask the engine itself for everything: what other processes left on disk is not believed."""
-    global _cache_off  # noqa: PLW0603 - belongs to the process, as the engine does
+    """Solve every problem anew: entries of the result cache are not believed inside."""
+    global _cache_off  # noqa: PLW0603 - belongs to the process, as the engines do
     before, _cache_off = _cache_off, True
     try:
         yield
@@ -28,15 +46,24 @@ def cache_disabled() -> Iterator[None]:
         _cache_off = before
 
 
-def engine_of_this_process() -> Engine:
-    """Return the physics engine, connected at first use."""
-    from internav_data.physics.engines.bullet import bullet  # noqa: PLC0415 - pybullet is imported when used
+def get_engine(name: str = DEFAULT_ENGINE) -> Engine:
+    """Return a physics engine, connected at first use.
 
-    engine = bullet()
+    The engine reads and fills the user's result cache, except inside `cache_disabled`.
+
+    Raises
+    ------
+    UsageError
+        No engine has this name.
+
+    """
+    if name not in ENGINES:
+        raise UsageError(f"no physics engine is called {name!r}; known are {', '.join(ENGINES)}")
+    engine = ENGINES[name]()
     return engine if _cache_off else _cached(engine, result_cache())
 
 
-@lru_cache(maxsize=1)
+@lru_cache(maxsize=8)
 def _cached(engine: Engine, known: ResultCache) -> Engine:
-    where = origin(engine.build)
+    where = origin(engine)
     return engine if where is None else CachedEngine(engine, known, where)

@@ -9,8 +9,10 @@ from internav_data.records import Asset, Part, Pose
 from internav_data.records.agent import AGENT
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from internav_data.physics.kdop import Dop8
-    from internav_data.records import Quaternion, Wall
+    from internav_data.records import Dynamics, Obstacle, PushSpec, Quaternion, Wall
 
 UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
 AGENT_LOW_M: Final = 0.022
@@ -21,11 +23,24 @@ AGENT_HEIGHT_M: Final = AGENT.height_m
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """An asset at a pose; a body that does not move weighs nothing to the engine."""
+    """An object in a scene: its geometry, its pose and its own dynamics."""
 
     asset: Asset
+    """Source of the geometry alone; the mass and friction that count are those of `dynamics`."""
     pose: Pose
-    moves: bool
+    dynamics: Dynamics
+    moves: bool = True
+    """False for a body that stays where it is, whatever hits it."""
+
+    @staticmethod
+    def of(asset: Asset, pose: Pose, *, moves: bool = True) -> Body:
+        """Return an object with the dynamics of its asset: furniture, or a new obstacle."""
+        return Body(asset, pose, asset.dynamics, moves)
+
+    @staticmethod
+    def of_obstacle(obstacle: Obstacle, assets: Mapping[str, Asset], *, moves: bool = True) -> Body:
+        """Return an episode's obstacle with the dynamics that are stored in the episode."""
+        return Body(assets[obstacle.asset_id], obstacle.pose, obstacle.dynamics, moves)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +82,7 @@ def wall_body(wall: Wall) -> Body:
         parts=(part,),
     )
     middle = ((wall.x_min + wall.x_max) / 2.0, (wall.y_min + wall.y_max) / 2.0)
-    return Body(solid, Pose(*middle, wall.z_min, UPRIGHT), moves=False)
+    return Body.of(solid, Pose(*middle, wall.z_min, UPRIGHT), moves=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,19 +98,6 @@ class SettleSolution:
     """Deepest contact at the end."""
     reach_m: float
     """Farthest that any of its corners ever was from where it began, in the plane."""
-
-
-@dataclass(frozen=True, slots=True)
-class PushSpec:
-    """How the first body of a setting is pushed, along +x at its centre of mass.
-
-    A constant force until the body has the speed (the last impulse is scaled so that it has
-    exactly that) or the time is over; then it is let go. An infinite force gives the speed at once.
-    """
-
-    force_n: float
-    speed_m_s: float
-    seconds: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +128,23 @@ class Engine(Protocol):
 
     @property
     def build(self) -> str:
-        """Version and build of the engine, as stored in certificates."""
+        """Version of the engine and number of its rules, as stored in certificates."""
+
+    @property
+    def rules(self) -> int:
+        """Number of the rules by which scenes are built and solved; part of `build`.
+
+        Raised with every change of results, so that datasets made by other rules are told from
+        wrong ones and no cached result outlives its rules.
+        """
+
+    @property
+    def libraries(self) -> tuple[str, ...]:
+        """Installed distributions that results come from, besides numpy and numba."""
+
+    @property
+    def contact_margin_m(self) -> float:
+        """Distance at which two bodies of this engine may already touch, metres."""
 
     def settle(self, scene: PhysicsScene) -> SettleSolution:
         """Let the first body of the setting fall until it rests; the others stay."""

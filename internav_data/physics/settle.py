@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from internav_data.geometry import multiply, rotation_matrix, round_m, round_quaternion
-from internav_data.physics.registry import engine_of_this_process
+from internav_data.physics.registry import DEFAULT_ENGINE, get_engine
 from internav_data.physics.scene import UPRIGHT, Body, PhysicsScene
 from internav_data.records import Pose
 
@@ -16,15 +16,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from internav_data.physics.scene import Engine, SettleSolution
-    from internav_data.records import Asset
 
 DROP_M = 0.01
 """Height above the floor from which a thing is let go."""
 MAX_SHIFT_M = 0.05
 MAX_TILT_DEG = 5.0
 MAX_PENETRATION_M = 0.002
-MARGIN_M = 0.001
-"""What counts as out of reach keeps this much more distance than the thing ever moved."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,10 +36,10 @@ class SettleResult:
 
 
 def settle(
-    asset: Asset,
-    pose: Pose,
+    body: Body,
     clearance_m: float,
     neighbours: Callable[[], Sequence[Body]],
+    engine: str = DEFAULT_ENGINE,
 ) -> SettleResult:
     """Let a thing fall 1 cm onto the floor at an upright pose.
 
@@ -52,33 +49,36 @@ def settle(
 
     Parameters
     ----------
-    asset, pose
-        What to let go, and where; z is the floor it will stand on.
+    body
+        Object to let go at an upright pose; z is the floor that it will stand on.
     clearance_m
         Distance in the plane from its footprint to everything else, metres.
     neighbours
         Gathers what can be touched, things and walls; called only when the free fall reaches
-        farther than the clearance.
+        farther than the clearance and the engine's contact margin.
+    engine
+        Name of the physics engine.
 
     """
-    engine = engine_of_this_process()
-    solution = _settle_alone(asset, engine)
-    if solution.reach_m + MARGIN_M > clearance_m:
-        solution = engine.settle(_scene(asset, pose, neighbours()))
-    return _judged(pose, solution)
+    solver = get_engine(engine)
+    falling = Body(body.asset, _START, body.dynamics)
+    solution = _settle_alone(falling, solver)
+    if solution.reach_m + solver.contact_margin_m > clearance_m:
+        solution = solver.settle(_scene(falling, body.pose, neighbours()))
+    return _judged(body.pose, solution)
 
 
 @lru_cache(maxsize=8192)
-def _settle_alone(asset: Asset, engine: Engine) -> SettleSolution:
-    return engine.settle(PhysicsScene((Body(asset, _START, moves=True),)))
+def _settle_alone(falling: Body, engine: Engine) -> SettleSolution:
+    return engine.settle(PhysicsScene((falling,)))
 
 
 _START = Pose(0.0, 0.0, DROP_M, UPRIGHT)
 
 
-def _scene(asset: Asset, pose: Pose, neighbours: Sequence[Body]) -> PhysicsScene:
-    bodies = (Body(b.asset, _seen_from(pose, b.pose), moves=False) for b in neighbours)
-    return PhysicsScene((Body(asset, _START, moves=True), *bodies))
+def _scene(falling: Body, frame: Pose, neighbours: Sequence[Body]) -> PhysicsScene:
+    fixed = (replace(b, pose=_seen_from(frame, b.pose), moves=False) for b in neighbours)
+    return PhysicsScene((falling, *fixed))
 
 
 def _seen_from(frame: Pose, pose: Pose) -> Pose:

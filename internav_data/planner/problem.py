@@ -69,7 +69,7 @@ class PlanningProblem:
         movable: list[int] = []
         lasting: list[int] = []
         for k, item in enumerate(world.items):
-            able = item.asset.pushable or item.asset.pickable
+            able = item.dynamics.pushable or item.dynamics.pickable
             (movable if able else lasting).append(k)
         ends = (world.position, world.goal_point)
         first = len(world.model.items)
@@ -102,7 +102,7 @@ class PlanningProblem:
         full = DROP_PRICE if world.held >= 0 else 0
         furniture = len(world.model.items)
         for bit, k in enumerate(self.objects):
-            pickable = world.items[k].asset.pickable
+            pickable = world.items[k].dynamics.pickable
             prices[bit] = PICK_PRICE + full if pickable else PUSH_PRICE
             # It stands in groups and against walls, where pushes are slow to solve and seldom help.
             prices[bit] += FURNITURE_PRICE if k < furniture else 0

@@ -11,7 +11,6 @@ from internav_data.geometry.headings import HEADINGS
 from internav_data.navigation import SPACING_M, grid
 from internav_data.navigation.grid import EAST, NODE, NORTH
 from internav_data.physics.kdop import dop8_of_rectangle, grown
-from internav_data.physics.push import PUSH_SPECS
 from internav_data.records.agent import CLEARANCE_M
 
 if TYPE_CHECKING:
@@ -27,9 +26,9 @@ GRAVITY: Final = 9.81
 
 def slide_m(world: World, thing: int) -> float:
     """How far a thing slides on free ground when pushed, metres: Coulomb's law."""
-    asset, spec = world.items[thing].asset, PUSH_SPECS[world.push_model]
-    brake = asset.friction * GRAVITY
-    gain = spec.force_n / asset.mass_kg - brake
+    dynamics, spec = world.items[thing].dynamics, world.push_spec
+    brake = dynamics.friction * GRAVITY
+    gain = spec.force_n / dynamics.mass_kg - brake
     if gain <= 0.0:
         return 0.0
     speed = min(spec.speed_m_s, gain * spec.seconds)

@@ -37,8 +37,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from internav_data.core.typing import Costs, Ints
-    from internav_data.physics import PushModel
-    from internav_data.records import Asset, Episode, Pose
+    from internav_data.records import Asset, Episode, Pose, PushModel
     from internav_data.world import HouseModel
 
 
@@ -219,7 +218,8 @@ class _BestFirstSearch:
     ) -> None:
         """Take up a world, unless it was reached as cheaply before."""
         poses = tuple(coarse_position(world.items[k].pose) for k in self.problem.objects)
-        key = (world.i, world.j, world.quarter, world.horizon_deg, world.held, poses)
+        agent = (world.i, world.j, world.quarter, world.horizon_deg)
+        key = (*agent, world.held, world.interaction, poses)
         if self.known.get(key, FAR) <= len(actions):
             return
         self.known[key] = len(actions)
@@ -259,9 +259,9 @@ class _BestFirstSearch:
         for bit in bits:
             if not state.proposed >> bit & 1:
                 state.proposed |= 1 << bit
-                asset = state.world.items[problem.objects[bit]].asset
-                wanted |= asset.pickable
-                if asset.pushable or not full:
+                dynamics = state.world.items[problem.objects[bit]].dynamics
+                wanted |= dynamics.pickable
+                if dynamics.pushable or not full:
                     self._propose(node, bit, reach, back, path)
         if full and wanted:
             first = int(np.flatnonzero(entered)[0])
@@ -296,7 +296,7 @@ class _BestFirstSearch:
         now = HORIZONS_DEG.index(state.world.horizon_deg)
         looks = np.abs(np.arange(len(HORIZONS_DEG)) - now)
         found = viewpoints(points, reach, problem.ny, _VIEWS, looks, after)
-        pick = item.asset.pickable
+        pick = item.dynamics.pickable
         probe = state.world.copy()
         places: list[tuple[int, int, int]] = []
         for place in zip(*(f[:MAX_VIEWPOINTS].tolist() for f in found), strict=True):
@@ -346,7 +346,7 @@ class _BestFirstSearch:
         state, problem = node.state, self.problem
         prices = state.prices.copy()
         for bit, thing in enumerate(problem.objects):
-            if state.world.items[thing].asset.pickable:
+            if state.world.items[thing].dynamics.pickable:
                 prices[bit] = PICK_PRICE
         after = problem.costs(state.masks, node.banned, prices)
         horizon = HORIZONS_DEG.index(state.world.horizon_deg)
@@ -408,55 +408,21 @@ def solve(world: World, limit: int = MAX_STEPS) -> Expert | None:
     return None if actions is None else replay(world.copy(), actions)
 
 
-def expert_of(
-    model: HouseModel,
-    obstacles: Iterable[tuple[Asset, Pose]],
-    start: tuple[int, int, int],
-    goal: tuple[int, int],
-    push_model: PushModel = "force",
-    limit: int = MAX_STEPS,
-) -> Expert | None:
-    """Solve an episode from its parts, and replay the plan in a fresh world.
-
-    Parameters
-    ----------
-    stage
-        The house, once for all of its episodes.
-    obstacles
-        Settled, rounded poses, in the episode's order.
-    start
-        Node i, j and quarter turn.
-    goal
-        Node i, j.
-    push_model, limit
-        As in `World`, as in `solve`.
-
-    """
-    objects = tuple(obstacles)
-    actions = search(World(model, objects, start, goal, push_model), limit)
-    return (
-        None if actions is None else replay(World(model, objects, start, goal, push_model), actions)
-    )
-
-
 def expert_of_episode(
     model: HouseModel,
     episode: Episode,
     assets: Mapping[str, Asset],
     push_model: PushModel = "force",
 ) -> Expert | None:
-    """Solve an episode.
+    """Solve an episode from its start; parameters as in `World.of_episode`, result as in `solve`.
 
     Raises
     ------
     UsageError
-        The stage is of another house.
+        The model is of another house.
 
     """
-    actions = search(World.of_episode(model, episode, assets, push_model), MAX_STEPS)
-    if actions is None:
-        return None
-    return replay(World.of_episode(model, episode, assets, push_model), actions)
+    return solve(World.of_episode(model, episode, assets, push_model))
 
 
 def replay(world: World, actions: Sequence[int]) -> Expert | None:

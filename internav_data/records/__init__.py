@@ -27,6 +27,7 @@ from internav_data.records.houses import (
     Wall,
     Window,
 )
+from internav_data.records.physics import PUSH_SPECS, Dynamics, PushModel, PushSpec
 from internav_data.records.poses import Pose, Quaternion, Vec2, Vec3
 from internav_data.records.seeds import (
     EvaluationStream,
@@ -41,10 +42,12 @@ from internav_data.records.seeds import (
 
 __all__ = [
     "OUTSIDE",
+    "PUSH_SPECS",
     "RGB",
     "Asset",
     "Door",
     "DoorKind",
+    "Dynamics",
     "Episode",
     "EvaluationStream",
     "Expert",
@@ -64,6 +67,8 @@ __all__ = [
     "Pose",
     "ProgrammeStream",
     "Purpose",
+    "PushModel",
+    "PushSpec",
     "Quaternion",
     "Redraw",
     "Room",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from internav_data.records.physics import Dynamics
 from internav_data.records.poses import Quaternion, Vec3
 
 Shape = Literal["box", "cylinder", "sphere", "hull"]
@@ -57,6 +58,11 @@ class Asset:
     blocks: bool
     """False for what an agent walks over (rugs) or under: it has no footprint."""
     parts: tuple[Part, ...]
+
+    @property
+    def dynamics(self) -> Dynamics:
+        """Dynamics of an object of this asset, unless the object has its own."""
+        return Dynamics(self.mass_kg, self.friction, self.pushable, self.pickable)
 
     def __hash__(self) -> int:
         """Assets key many caches; their id tells them apart, equality settles the rest."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from internav_data.records.houses import Split
+from internav_data.records.physics import Dynamics
 from internav_data.records.poses import Pose, Quaternion, Vec2
 
 Mode = Literal["blocked", "lengthened"]
@@ -85,6 +86,11 @@ class Obstacle:
     settle_penetration_m: float
     """Certificate of the settle check: deepest contact at rest."""
     outcomes: tuple[Outcome, ...] | None
+
+    @property
+    def dynamics(self) -> Dynamics:
+        """Dynamics of this obstacle, which may differ from those of its asset."""
+        return Dynamics(self.mass_kg, self.friction, self.pushable, self.pickable)
 
     @property
     def pose(self) -> Pose:

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from internav_data.core.typing import Image
-    from internav_data.physics import PushModel
-    from internav_data.records import RGB, Asset, Episode, House
+    from internav_data.records import RGB, Asset, Episode, House, PushModel
 
     Panel = Callable[["Moment"], Image]
 

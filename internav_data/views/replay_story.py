@@ -15,8 +15,7 @@ from internav_data.world.actions import INTERACTION_KINDS
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from internav_data.physics import PushModel
-    from internav_data.records import Asset, Episode, Quaternion, Vec2
+    from internav_data.records import Asset, Episode, PushModel, Quaternion, Vec2
     from internav_data.world import StepResult
 
 

@@ -32,8 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from internav_data.core.typing import Floats, Image
-    from internav_data.physics import PushModel
-    from internav_data.records import RGB, Asset, Episode, House, Pose, Vec2
+    from internav_data.records import RGB, Asset, Episode, House, Pose, PushModel, Vec2
     from internav_data.views.canvas import Canvas
     from internav_data.views.replay_story import Story
 

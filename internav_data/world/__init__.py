@@ -1,6 +1,13 @@
 """A house being acted in: its movable objects, the twelve actions, what the agent can see."""
 
-from internav_data.world.actions import ACTION_COUNT, ACTIONS, Action, Reason, StepResult
+from internav_data.world.actions import (
+    ACTION_COUNT,
+    ACTIONS,
+    Action,
+    Interaction,
+    Reason,
+    StepResult,
+)
 from internav_data.world.house_model import HouseModel, MovableObject
 from internav_data.world.world import World
 
@@ -9,6 +16,7 @@ __all__ = [
     "ACTION_COUNT",
     "Action",
     "HouseModel",
+    "Interaction",
     "MovableObject",
     "Reason",
     "StepResult",

@@ -150,6 +150,17 @@ Reason = Literal[
 
 
 @dataclass(frozen=True, slots=True)
+class Interaction:
+    """An interaction that has begun and takes further steps."""
+
+    action: Action
+    target: int
+    """Index of the object acted on."""
+    steps: int
+    """Number of steps taken so far."""
+
+
+@dataclass(frozen=True, slots=True)
 class StepResult:
     """Result of one action. A failed action changes nothing."""
 
@@ -165,3 +176,5 @@ class StepResult:
     toppled: bool = False
     moved: tuple[tuple[int, Pose], ...] = ()
     """Objects that lie elsewhere now, ascending by index, and their poses. A held one has none."""
+    ongoing: bool = False
+    """The interaction takes further steps; it is `World.interaction` until its last one."""

@@ -20,6 +20,8 @@ from internav_data.geometry.headings import TURNS, turned
 from internav_data.geometry.planar import segment_polygon_distance
 from internav_data.navigation import CLEARANCE_M
 from internav_data.physics.kdop import dop8_of_square
+from internav_data.physics.registry import DEFAULT_ENGINE
+from internav_data.physics.scene import Body
 from internav_data.physics.settle import settle
 from internav_data.records import Pose
 from internav_data.records.agent import AGENT
@@ -30,9 +32,9 @@ if TYPE_CHECKING:
 
     from internav_data.core.typing import Floats, Ints
     from internav_data.physics.kdop import Dop8
-    from internav_data.physics.scene import Body
     from internav_data.physics.settle import SettleResult
     from internav_data.records import Asset, Vec2
+    from internav_data.world.house_model import MovableObject
 
 GAPS_M: Final = tuple(round(0.05 * k, 2) for k in range(1, 11))
 """Distances from the agent's disc, nearest first."""
@@ -56,21 +58,26 @@ class DropObstructions(NamedTuple):
 
 
 def drop(
-    asset: Asset, agent: Vec2, heading: int, obstructions: DropObstructions
+    held: MovableObject,
+    agent: Vec2,
+    heading: int,
+    obstructions: DropObstructions,
+    engine: str = DEFAULT_ENGINE,
 ) -> SettleResult | None:
-    """Try gap after gap at bearing after bearing; None where there is no room.
+    """Find room for a held object: gap after gap at bearing after bearing; None without room.
 
-    The thing stands upright, turned as the agent is.
+    The object stands upright, turned as the agent is.
     """
     turn = round_quaternion(TURNS[heading])
-    plan = _standing(asset, heading)
+    plan = _standing(held.asset, heading)
     for gap in GAPS_M:
         for ahead in _AHEAD:
             ux, uy = turned(heading, *ahead)
             spot = _spot(plan, agent, ux, uy, gap)
             pose = Pose(*spot, 0.0, turn)
             if _fits(plan, spot, agent, obstructions):
-                settled = _let_go(asset, pose, agent, obstructions)
+                body = Body(held.asset, pose, held.dynamics)
+                settled = _let_go(body, agent, obstructions, engine)
                 if settled is not None:
                     return settled
     return None
@@ -107,11 +114,12 @@ def _crosses(ax: float, ay: float, bx: float, by: float, vertices: Floats, offse
 
 
 def _let_go(
-    asset: Asset, pose: Pose, agent: Vec2, obstructions: DropObstructions
+    body: Body, agent: Vec2, obstructions: DropObstructions, engine: str
 ) -> SettleResult | None:
+    asset, pose = body.asset, body.pose
     reach = math.hypot(asset.size[0], asset.size[1]) / 2.0 + NEAR_M
     around = dop8_of_square(pose.x, pose.y, reach)
-    settled = settle(asset, pose, ROOM_M, lambda: obstructions.bodies(around))
+    settled = settle(body, ROOM_M, lambda: obstructions.bodies(around), engine)
     if settled.refusal:
         return None
     exact = footprint(asset, settled.pose)

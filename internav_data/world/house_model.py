@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from internav_data.core.typing import Floats
     from internav_data.physics.kdop import Dop8
-    from internav_data.records import Asset, House, Pose, Vec2
+    from internav_data.records import Asset, Dynamics, House, Pose, Vec2
 
 MAX_TANGENT_GRAPHS: Final = 16
 """Any-angle graphs kept a house: one for each set of furniture that was moved."""
@@ -26,30 +26,39 @@ MAX_TANGENT_GRAPHS: Final = 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MovableObject:
-    """A thing that can move: where it lies, or that it is held."""
+    """An object that can move: its dynamics and its pose, or that it is held."""
 
     asset: Asset
     pose: Pose | None
     """None while it is held."""
+    dynamics: Dynamics
+    """Mass, friction and abilities of this object; those of the asset do not count."""
     footprint: Polygons
     dop8: Dop8
     low_m: float
     high_m: float
 
     @staticmethod
-    def at(asset: Asset, pose: Pose | None) -> MovableObject:
-        """Put an asset somewhere, or into a hand."""
-        if pose is None:
-            return MovableObject(asset, None, Polygons.of([]), EMPTY, np.inf, -np.inf)
-        extent = extent_of(asset, pose)
+    def of(body: Body) -> MovableObject:
+        """Return an object at the pose of a body."""
+        asset, pose, extent = body.asset, body.pose, extent_of(body.asset, body.pose)
         return MovableObject(
-            asset, pose, footprint(asset, pose), extent.dop8, extent.low_m, extent.high_m
+            *(asset, pose, body.dynamics, footprint(asset, pose)),
+            *(extent.dop8, extent.low_m, extent.high_m),
         )
+
+    def moved(self, pose: Pose | None) -> MovableObject:
+        """Return the object at another pose, or (None) in a hand."""
+        if pose is not None:
+            return MovableObject.of(Body(self.asset, pose, self.dynamics))
+        nowhere = (Polygons.of([]), EMPTY, np.inf, -np.inf)
+        return MovableObject(self.asset, None, self.dynamics, *nowhere)
 
 
 def is_movable(asset: Asset) -> bool:
     """Things of the obstacle types that can be pushed or picked up, furniture included."""
-    return asset.spawnable and (asset.pushable or asset.pickable)
+    dynamics = asset.dynamics
+    return asset.spawnable and (dynamics.pushable or dynamics.pickable)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,10 +93,10 @@ class HouseModel:
         for thing in house.objects:
             asset = house.assets[thing.asset_id]
             if is_movable(asset):
-                items.append(MovableObject.at(asset, thing.pose))
+                items.append(MovableObject.of(Body.of(asset, thing.pose)))
                 object_ids.append(thing.object_id)
             elif asset.blocks:
-                bodies.append(Body(asset, thing.pose, moves=False))
+                bodies.append(Body.of(asset, thing.pose, moves=False))
                 dop8s.append(extent_of(asset, thing.pose).dop8)
                 plans.append(footprint(asset, thing.pose))
         footprints = Polygons.joined(plans)

@@ -10,12 +10,14 @@ import math
 import struct
 from typing import TYPE_CHECKING, Final
 
-from internav_data.geometry import Polygons, clearance, round_m
+from internav_data.geometry import Polygons, clearance, footprint, round_m
 from internav_data.geometry.headings import HEADINGS
 from internav_data.navigation import CLEARANCE_M, SPACING_M
 from internav_data.physics.kdop import dop8_of_square, grown, touching
-from internav_data.physics.push import AGENT_M, TOUCH_M, count_movers, push
+from internav_data.physics.push import AGENT_M, count_movers, push
+from internav_data.physics.registry import DEFAULT_ENGINE
 from internav_data.physics.scene import Body
+from internav_data.records import PUSH_SPECS
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import (
     HORIZONS_DEG,
@@ -38,14 +40,17 @@ if TYPE_CHECKING:
 
     from internav_data.navigation import Lattice, TangentGraph
     from internav_data.physics.kdop import Dop8
-    from internav_data.physics.push import PushModel, PushResult
-    from internav_data.records import Asset, Episode, Pose, Vec2
+    from internav_data.physics.push import PushResult
+    from internav_data.records import Asset, Episode, Pose, PushModel, PushSpec, Vec2
+    from internav_data.world.actions import Interaction
 
 
 GOAL_M: Final = 0.2
 """Done succeeds within this of the goal."""
 REST_M: Final = 0.01
 """What begins this much above another thing's lowest point, and not above its top, rests on it."""
+TOUCH_M: Final = 0.005
+"""Distance within which two objects count as touching."""
 MAX_DROP_M: Final = 2.5
 """No drop reaches farther: the widest gap, the largest thing that can be picked up, and room."""
 
@@ -118,7 +123,7 @@ def _push(world: World, action: Action) -> StepResult:
 def _lies_on_agent(world: World, moved: tuple[tuple[int, Pose], ...]) -> bool:
     x, y = world.position
     return any(
-        axis_distance(x, y, MovableObject.at(world.items[k].asset, pose).footprint) < CLEARANCE_M
+        axis_distance(x, y, footprint(world.items[k].asset, pose)) < CLEARANCE_M
         for k, pose in moved
     )
 
@@ -163,7 +168,7 @@ def _drop(world: World, action: Action) -> StepResult:
         return [body for _, body in world.near(dop8)]
 
     obstructions = DropObstructions(world.model.walls, solid, bodies)
-    settled = drop(world.items[target].asset, world.position, world.quarter, obstructions)
+    settled = drop(world.items[target], world.position, world.quarter, obstructions, world.engine)
     if settled is None:
         return StepResult(action, success=False, reason="no room to drop it", target=target)
     moved = ((target, settled.pose),)
@@ -200,38 +205,45 @@ _BEHAVIOURS: Final[dict[ActionKind, Callable[[World, Action], StepResult]]] = {
 
 
 class World:
-    """A house, its movable things and an agent on the lattice.
+    """State of a house being acted in: the agent, the movable objects, the hand.
 
-    The state is small and plain: the agent's node, quarter turn and horizon, each thing's pose, and
-    what is held. `step` is a function of it and the action alone, to the last bit.
+    `step` is a function of the state and the action alone, to the last bit.
 
-    Things are numbered: the house's movable furniture first (`model.items`), then obstacles.
+    Items are numbered: the house's movable furniture first (`model.items`), then obstacles.
 
     Attributes
     ----------
-    stage : Stage
-        What never changes.
+    model : HouseModel
+        Parts of the house that never change, shared by all its worlds.
     i, j, quarter, horizon_deg : int
-        The agent: node, quarter turns counter-clockwise from +x, how far it looks down.
+        The agent's lattice node, quarter turns counter-clockwise from +x, and the camera's angle
+        below the horizontal.
     held : int
-        Index of the thing in its hand, or -1.
-    items : tuple of Item
-        All things that can move; replaced, never changed.
+        Index of the item in the hand, or -1.
+    items : tuple of MovableObject
+        All objects that can move; replaced, never changed.
     lattice : Lattice
-        Of everything as it lies; replaced, never changed.
+        Lattice among all objects as they lie; replaced, never changed.
     goal : (int, int)
-        Node to reach.
-    model : str
-        "force" or "kick".
+        Lattice node to reach.
+    push_model : str
+        "force" or "kick", a key of `PUSH_SPECS`.
+    engine : str
+        Name of the physics engine.
+    interaction : Interaction or None
+        Interaction that goes on: begun by an earlier step and not yet ended. The twelve actions
+        end in the step that begins them.
     """
 
     __slots__ = (
         "_dop8s",
         "_handles",
+        "engine",
         "goal",
         "held",
         "horizon_deg",
         "i",
+        "interaction",
         "items",
         "j",
         "lattice",
@@ -249,13 +261,14 @@ class World:
     def __init__(
         self,
         model: HouseModel,
-        obstacles: Iterable[tuple[Asset, Pose]],
+        obstacles: Iterable[Body],
         start: tuple[int, int, int],
         goal: tuple[int, int],
         push_model: PushModel = "force",
+        engine: str = DEFAULT_ENGINE,
     ) -> None:
         """Put obstacles and an agent (node i, j and quarter turn) into a house."""
-        extra = [MovableObject.at(asset, pose) for asset, pose in obstacles]
+        extra = [MovableObject.of(body) for body in obstacles]
         self.model = model
         self.lattice = model.lattice.copy()
         self._handles = model.handles + tuple(self.lattice.add(e.footprint) for e in extra)
@@ -266,6 +279,8 @@ class World:
         self.held = -1
         self.goal = goal
         self.push_model: PushModel = push_model
+        self.engine = engine
+        self.interaction: Interaction | None = None
 
     @staticmethod
     def of_episode(
@@ -273,26 +288,42 @@ class World:
         episode: Episode,
         assets: Mapping[str, Asset],
         push_model: PushModel = "force",
+        engine: str | None = None,
     ) -> World:
-        """Set up an episode at its start.
+        """Set up an episode at its start, its obstacles with their stored dynamics.
+
+        Parameters
+        ----------
+        model
+            Model of the episode's house.
+        episode
+            Episode to set up.
+        assets
+            Assets by id, those of the obstacles among them.
+        push_model
+            "force" or "kick".
+        engine
+            Name of the physics engine; None for the one that the episode was made with.
 
         Raises
         ------
         UsageError
-            The stage is of another house.
+            The model is of another house.
+
         """
         if model.house.scene_id != episode.scene_id:
             raise UsageError(
                 f"World.of_episode: episode {episode.episode_id} belongs to {episode.scene_id}, "
-                f"got the house {model.house.scene_id}; build the stage of its own house"
+                f"got the house {model.house.scene_id}; build the model of its own house"
             )
         start, goal = episode.start, episode.goal
         return World(
             model,
-            [(assets[o.asset_id], o.pose) for o in episode.obstacles],
+            [Body.of_obstacle(obstacle, assets) for obstacle in episode.obstacles],
             (start.i, start.j, start.yaw_deg // 90),
             (goal.i, goal.j),
             push_model,
+            engine or episode.physics.engine,
         )
 
     def copy(self) -> World:
@@ -369,14 +400,12 @@ class World:
         near = touching(self._dop8s, round_here)
         wanted = []
         for k in near:
-            asset = self.items[k].asset
-            if asset.pickable if pick else asset.pushable:
+            dynamics = self.items[k].dynamics
+            if dynamics.pickable if pick else dynamics.pushable:
                 wanted.append((self.distance_to(k, x, y), k))
         if not wanted:
             return -1
-        shapes = [
-            placed_occlusion_shape(item.asset, pose) for k in near for item, pose in [self._at(k)]
-        ]
+        shapes = [placed_occlusion_shape(body.asset, body.pose) for body in map(self.body, near)]
         fixed = [self.model.fixed[k] for k in touching(self.model.dop8s, round_here)]
         occluders = Occluders(
             shapes + [placed_occlusion_shape(body.asset, body.pose) for body in fixed]
@@ -389,27 +418,29 @@ class World:
 
     def simulate_push(self, index: int, heading: int, *, agent: bool = True) -> PushResult:
         """Answer what pushing a thing along a heading of the house (0 … 3) would do."""
-        item, pose = self._at(index)
         gap = math.inf
         if agent:
             x, y = self.position
             loose = touching(self._dop8s, dop8_of_square(x, y, AGENT_M))
             gap = min((self.distance_to(k, x, y) for k in loose), default=math.inf)
         return push(
-            item.asset,
-            pose,
+            self.body(index),
             heading,
             lambda dop8: self.near(dop8, index),
+            self.push_spec,
             self.position if agent else None,
             agent_gap_m=gap,
-            model=self.push_model,
+            engine=self.engine,
         )
 
     def count_movers(self, index: int, heading: int) -> int:
-        """Count the things that pushing one along a heading may move besides it."""
-        item, pose = self._at(index)
+        """Estimate how many objects a push along a heading may move besides the pushed one."""
         return count_movers(
-            item.asset, pose, heading, lambda o: self.near(o, index), self.push_model
+            self.body(index),
+            heading,
+            lambda dop8: self.near(dop8, index),
+            self.push_spec,
+            self.engine,
         )
 
     def put(self, changes: Iterable[tuple[int, Pose | None]]) -> None:
@@ -422,21 +453,28 @@ class World:
                 lattice.remove(handles[k])
             home = self.model.items[k] if k < len(self.model.items) else None
             back = home is not None and home.pose == pose
-            items[k] = home if back and home is not None else MovableObject.at(items[k].asset, pose)
+            items[k] = home if back and home is not None else items[k].moved(pose)
             dop8s[k] = items[k].dop8
             handles[k] = -1 if pose is None else lattice.add(items[k].footprint)
         self.lattice, self.items = lattice, tuple(items)
         self._handles, self._dop8s = tuple(handles), dop8s
 
+    @property
+    def push_spec(self) -> PushSpec:
+        """Parameters of a push by the agent."""
+        return PUSH_SPECS[self.push_model]
+
     def digest(self) -> str:
-        """Sha256 of the state: equal for equal worlds, whatever happened before."""
-        goal, push_model = self.goal, self.push_model.encode()
-        parts = [self.model.house.scene_id.encode(), push_model]
-        parts.append(
-            struct.pack("<7i", self.i, self.j, self.quarter, self.horizon_deg, self.held, *goal)
-        )
+        """Return the SHA-256 (hex) of the state: equal for equal worlds, whatever their history."""
+        node = (self.i, self.j, self.quarter, self.horizon_deg, self.held, *self.goal)
+        parts = [self.model.house.scene_id.encode(), self.push_model.encode(), self.engine.encode()]
+        parts += [struct.pack("<7i", *node), repr(self.interaction).encode()]
         for item in self.items:
+            own = item.dynamics
             parts.append(item.asset.asset_id.encode())
+            parts.append(
+                struct.pack("<2d2?", own.mass_kg, own.friction, own.pushable, own.pickable)
+            )
             if item.pose is not None:
                 p = item.pose
                 parts.append(struct.pack("<7d", p.x, p.y, p.z, *p.quaternion))
@@ -453,13 +491,21 @@ class World:
         """Where the goal is, metres."""
         return SPACING_M * self.goal[0], SPACING_M * self.goal[1]
 
-    def _at(self, index: int) -> tuple[MovableObject, Pose]:
+    def body(self, index: int) -> Body:
+        """Return an item as physics takes it: geometry, pose and dynamics.
+
+        Raises
+        ------
+        UsageError
+            The item is held.
+
+        """
         item = self.items[index]
         if item.pose is None:
             raise UsageError(
-                f"World: thing {index} ({item.asset.asset_id}) is held, it has no pose"
+                f"World: object {index} ({item.asset.asset_id}) is held, it has no pose"
             )
-        return item, item.pose
+        return Body(item.asset, item.pose, item.dynamics)
 
     def distance_to(self, index: int, x: float, y: float) -> float:
         """Distance from the agent's axis to a thing's footprint (its box, where it has none)."""
@@ -471,11 +517,7 @@ class World:
 
     def near(self, dop8: Dop8, skip: int = -1) -> list[tuple[int, Body]]:
         """Bodies that reach into an octagon: items by their index, then what is fixed."""
-        bodies = []
-        for k in touching(self._dop8s, dop8):
-            if k != skip:
-                item, pose = self._at(k)
-                bodies.append((k, Body(item.asset, pose, moves=True)))
+        bodies = [(k, self.body(k)) for k in touching(self._dop8s, dop8) if k != skip]
         first = len(self.items)
         bodies += [(first + k, self.model.fixed[k]) for k in touching(self.model.dop8s, dop8)]
         return bodies

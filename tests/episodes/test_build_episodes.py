@@ -15,7 +15,7 @@ from internav_data.episodes.outcomes import outcomes_of
 from internav_data.episodes.spawn import NEAR_M
 from internav_data.geometry import asset_corners, footprint, house_footprints, transform
 from internav_data.houses import HouseConfig, build_house
-from internav_data.physics import Body, PhysicsScene, engine_of_this_process, wall_body
+from internav_data.physics import Body, PhysicsScene, get_engine, wall_body
 from internav_data.physics.result_cache import ResultCache
 from internav_data.physics.scene import UPRIGHT
 from internav_data.planner.search import replay
@@ -173,7 +173,7 @@ def test_same_episode_in_a_fresh_process(episodes):
 
 def test_obstacles_stay_at_rest_in_a_whole_scene_of_bullet(houses, episodes):
     # The generator lets each thing fall as if alone; here each falls among all that is near it.
-    engine = engine_of_this_process()
+    engine = get_engine()
     assets = {**houses[1].assets, **catalogue().assets}
     for episode in episodes[1][:4]:
         for k, obstacle in enumerate(episode.obstacles):
@@ -183,7 +183,7 @@ def test_obstacles_stay_at_rest_in_a_whole_scene_of_bullet(houses, episodes):
             others = [o for j, o in enumerate(episode.obstacles) if j != k]
             things = [t for t in houses[1].objects if assets[t.asset_id].blocks]
             near = [
-                Body(assets[t.asset_id], t.pose, moves=False)
+                Body.of(assets[t.asset_id], t.pose, moves=False)
                 for t in (*things, *others)
                 if shapely.union_all(
                     [shapely.Polygon(p) for p in footprint(assets[t.asset_id], t.pose)]
@@ -192,7 +192,7 @@ def test_obstacles_stay_at_rest_in_a_whole_scene_of_bullet(houses, episodes):
             ]
             walls = [wall_body(w) for w in houses[1].walls]
             lifted = Pose(obstacle.x, obstacle.y, obstacle.z + 0.005, obstacle.quaternion)
-            body = Body(assets[obstacle.asset_id], lifted, moves=True)
+            body = Body.of(assets[obstacle.asset_id], lifted)
             rest = engine.settle(PhysicsScene((body, *near, *walls)))
             assert rest.at_rest
             assert (
@@ -310,11 +310,9 @@ def test_settings_that_cannot_be_meant_are_refused(field, value):
 
 
 def test_all_spawnable_assets_settle(pool):
-    engine = engine_of_this_process()
+    engine = get_engine()
     for asset in pool[::7]:
-        rest = engine.settle(
-            PhysicsScene((Body(asset, Pose(0.0, 0.0, 0.01, UPRIGHT), moves=True),))
-        )
+        rest = engine.settle(PhysicsScene((Body.of(asset, Pose(0.0, 0.0, 0.01, UPRIGHT)),)))
         assert rest.at_rest, asset.asset_id
         assert math.hypot(rest.pose.x, rest.pose.y) < 0.05, asset.asset_id
         assert rest.penetration_m <= 0.002, asset.asset_id

@@ -9,8 +9,7 @@ from internav_data.geometry import yaw_quaternion
 from internav_data.physics import AgentCollider, Body, PhysicsScene, wall_body
 from internav_data.physics.engines.bullet import Bullet, bullet
 from internav_data.physics.engines.bullet_scene import SCENES_PER_WORLD, Builder, pybullet
-from internav_data.physics.push import PUSH_SPECS
-from internav_data.records import Asset, Part, Pose, Wall
+from internav_data.records import PUSH_SPECS, Asset, Part, Pose, Wall
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
@@ -46,10 +45,10 @@ def scenes(count):
     for k in range(count):
         thing = THINGS[k % len(THINGS)]
         around = [
-            Body(
+            Body.of(
                 THINGS[rng.integers(len(THINGS))],
                 Pose(0.75 * (n + 1), rng.uniform(-0.2, 0.2), 0.001, yaw_quaternion(15 * k)),
-                bool(rng.random() < 0.7),
+                moves=bool(rng.random() < 0.7),
             )
             for n in range(rng.integers(3))
         ]
@@ -57,7 +56,7 @@ def scenes(count):
             around.append(wall_body(Wall(1.5, -2.0, 1.62, 2.0, 0.0, 2.6)))
         collider = AgentCollider(0.1, 0.85, 0.21) if rng.random() < 0.3 else None
         start = Pose(0.0, 0.0, 0.001 if k % 5 else 0.01, yaw_quaternion(15 * (k % 24)))
-        made.append((PhysicsScene((Body(thing, start, moves=True), *around), collider), k % 5 == 0))
+        made.append((PhysicsScene((Body.of(thing, start), *around), collider), k % 5 == 0))
     return made
 
 
@@ -107,7 +106,7 @@ def test_a_world_is_given_up_before_it_leaks_much(monkeypatch):
     real = Builder._begin
     monkeypatch.setattr(Builder, "_begin", lambda self: begun.append(real(self)))
     engine = bullet()
-    lone = PhysicsScene((Body(THINGS[2], Pose(0.0, 0.0, 0.001, UPRIGHT), moves=True),))
+    lone = PhysicsScene((Body.of(THINGS[2], Pose(0.0, 0.0, 0.001, UPRIGHT)),))
     for _ in range(3 * SCENES_PER_WORLD):
         engine._builder.build(lone)
     assert len(begun) == 3

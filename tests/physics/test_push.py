@@ -10,9 +10,9 @@ from internav_data.geometry import asset_corners, footprint, transform, yaw_quat
 from internav_data.physics import Body, push, wall_body
 from internav_data.physics.engines.bullet import pybullet
 from internav_data.physics.kdop import overlap
-from internav_data.physics.push import AGENT_MIN_M, PUSH_SPECS
+from internav_data.physics.push import AGENT_MIN_M
 from internav_data.physics.sweep import extent_of
-from internav_data.records import Asset, Part, Pose, Wall
+from internav_data.records import PUSH_SPECS, Asset, Part, Pose, Wall
 from internav_data.world.visibility import axis_distance
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -63,14 +63,14 @@ STANDING = Pose(3.0, 4.0, 0.001, UPRIGHT)
 @pytest.mark.parametrize("friction", [0.4, 0.6, 0.8])
 @pytest.mark.parametrize("mass_kg", [0.3, 2.0, 12.0])
 def test_free_slides_go_as_far_as_coulomb_says(mass_kg, friction):
-    kicked = push(low_box(mass_kg, friction), STANDING, 0, alone, model="kick")
+    kicked = push(Body.of(low_box(mass_kg, friction), STANDING), 0, alone, PUSH_SPECS["kick"])
     assert kicked.displacement_m == pytest.approx(2.0**2 / (2 * friction * GRAVITY), rel=0.05)
     assert not kicked.toppled
     # Pushed by a force, it covers v^2 / 2a more until it is let go at v.
     acceleration = 200.0 / mass_kg - friction * GRAVITY
     speed = min(2.0, acceleration * PUSH_SPECS["force"].seconds)
     expected = speed**2 / (2 * acceleration) + speed**2 / (2 * friction * GRAVITY)
-    forced = push(low_box(mass_kg, friction), STANDING, 0, alone)
+    forced = push(Body.of(low_box(mass_kg, friction), STANDING), 0, alone)
     if mass_kg > 1.0:  # lighter ones have their speed within one step: less than theory's way
         assert forced.displacement_m == pytest.approx(expected, rel=0.05)
     else:
@@ -80,8 +80,8 @@ def test_free_slides_go_as_far_as_coulomb_says(mass_kg, friction):
 @pytest.mark.parametrize("friction", [0.4, 0.6, 0.8])
 def test_friction_decides_who_is_too_heavy(friction):
     threshold = 200.0 / (friction * GRAVITY)
-    light = push(low_box(round(0.8 * threshold, 1), friction), STANDING, 0, alone)
-    heavy = push(low_box(round(1.05 * threshold, 1), friction), STANDING, 0, alone)
+    light = push(Body.of(low_box(round(0.8 * threshold, 1), friction), STANDING), 0, alone)
+    heavy = push(Body.of(low_box(round(1.05 * threshold, 1), friction), STANDING), 0, alone)
     assert light.success
     assert not heavy.success
     assert heavy.reason == "too heavy"
@@ -91,18 +91,18 @@ def test_friction_decides_who_is_too_heavy(friction):
 def test_a_thing_against_a_wall_stays():
     # Pushed at its middle, 5 mm before a wall as high as itself.
     wall = wall_body(Wall(3.305, 0.0, 3.425, 8.0, 0.0, 2.6))
-    pushed = push(low_box(10.0, 0.5), STANDING, 0, among(wall))
+    pushed = push(Body.of(low_box(10.0, 0.5), STANDING), 0, among(wall))
     assert not pushed.success
     assert pushed.reason == "something is in the way"
     assert pushed.displacement_m < 0.01
-    assert push(low_box(10.0, 0.5), STANDING, 2, among(wall)).success
+    assert push(Body.of(low_box(10.0, 0.5), STANDING), 2, among(wall)).success
 
 
 def test_a_push_north_is_a_push_east_turned():
     for heading in range(4):
         pose = Pose(3.0, 4.0, 0.001, yaw_quaternion(90 * heading))
-        there = push(chair(), pose, heading, alone)
-        east = push(chair(), STANDING, 0, alone)
+        there = push(Body.of(chair(), pose), heading, alone)
+        east = push(Body.of(chair(), STANDING), 0, alone)
         assert there.displacement_m == pytest.approx(east.displacement_m, abs=2e-4)
         assert there.seconds == east.seconds
         far = (there.pose.x - 3.0, there.pose.y - 4.0)
@@ -112,47 +112,48 @@ def test_a_push_north_is_a_push_east_turned():
 
 def test_a_free_push_is_the_one_in_a_scene_that_nothing_touches():
     wall = wall_body(Wall(3.0, 5.2, 6.0, 5.32, 0.0, 2.6))
-    free = push(chair(), STANDING, 0, alone)
+    free = push(Body.of(chair(), STANDING), 0, alone)
     # The wall is gathered by hand though it is out of reach: Bullet must say the same.
-    beside = push(chair(), STANDING, 0, lambda _: [(0, wall)])
+    beside = push(Body.of(chair(), STANDING), 0, lambda _: [(0, wall)])
     assert beside.displacement_m == pytest.approx(free.displacement_m, abs=1e-3)
-    assert push(chair(), STANDING, 0, among(wall)) == free
+    assert push(Body.of(chair(), STANDING), 0, among(wall)) == free
 
 
 def test_what_is_met_is_pushed_too():
-    other = Body(low_box(2.0, 0.5), Pose(3.8, 4.1, 0.001, UPRIGHT), moves=True)
-    pushed = push(low_box(12.0, 0.5), STANDING, 0, among(other))
+    other = Body.of(low_box(2.0, 0.5), Pose(3.8, 4.1, 0.001, UPRIGHT))
+    pushed = push(Body.of(low_box(12.0, 0.5), STANDING), 0, among(other))
     assert pushed.success
     ((key, pose),) = pushed.moved
     assert key == 0
     assert pose.x > 3.85
     # The same thing fixed ends the way at its face.
-    stuck = push(low_box(12.0, 0.5), STANDING, 0, among(Body(other.asset, other.pose, moves=False)))
+    stuck = push(
+        Body.of(low_box(12.0, 0.5), STANDING),
+        0,
+        among(Body.of(other.asset, other.pose, moves=False)),
+    )
     assert stuck.pose.x < 3.0 + 0.2 + 0.01
     assert stuck.moved == ()
 
 
 def test_what_a_neighbour_runs_into_takes_part():
     # A row of three: the wall behind the last one lies far outside the first one's own reach.
-    row = [
-        Body(low_box(3.0, 0.4), Pose(3.62 + 0.62 * k, 4.0, 0.001, UPRIGHT), moves=True)
-        for k in range(3)
-    ]
+    row = [Body.of(low_box(3.0, 0.4), Pose(3.62 + 0.62 * k, 4.0, 0.001, UPRIGHT)) for k in range(3)]
     wall = wall_body(Wall(5.2, 0.0, 5.32, 8.0, 0.0, 2.6))
-    pushed = push(low_box(3.0, 0.4), STANDING, 0, among(*row, wall))
+    pushed = push(Body.of(low_box(3.0, 0.4), STANDING), 0, among(*row, wall))
     for k, pose in pushed.moved:
         assert extent_of(row[k].asset, pose).dop8[0] <= 5.2 + 0.002
 
 
 def test_what_only_a_neighbour_reaches_takes_part_too():
     # Neither the first one's way nor what lies round the second one reaches the wall.
-    other = Body(low_box(1.0, 0.4), Pose(3.62, 4.0, 0.001, UPRIGHT), moves=True)
+    other = Body.of(low_box(1.0, 0.4), Pose(3.62, 4.0, 0.001, UPRIGHT))
     wall = wall_body(Wall(4.2, 0.0, 4.32, 8.0, 0.0, 2.6))
-    free = push(low_box(12.0, 0.4), STANDING, 0, alone)
+    free = push(Body.of(low_box(12.0, 0.4), STANDING), 0, alone)
     assert free.pose.x + 0.3 < 4.1
-    ((_, pose),) = push(low_box(12.0, 0.4), STANDING, 0, among(other)).moved
+    ((_, pose),) = push(Body.of(low_box(12.0, 0.4), STANDING), 0, among(other)).moved
     assert pose.x + 0.3 > 4.25
-    ((_, pose),) = push(low_box(12.0, 0.4), STANDING, 0, among(other, wall)).moved
+    ((_, pose),) = push(Body.of(low_box(12.0, 0.4), STANDING), 0, among(other, wall)).moved
     assert pose.x + 0.3 < 4.2 + 0.002
 
 
@@ -160,7 +161,7 @@ def test_what_only_a_neighbour_reaches_takes_part_too():
 def test_nothing_pulled_ends_inside_the_agent(distance):
     thing = low_box(5.0, 0.5)
     agent = (3.0 - 0.3 - distance, 4.0)
-    pulled = push(thing, STANDING, 2, alone, agent, agent_gap_m=distance)
+    pulled = push(Body.of(thing, STANDING), 2, alone, agent=agent, agent_gap_m=distance)
     assert axis_distance(*agent, footprint(thing, pulled.pose)) >= min(distance, AGENT_MIN_M) - 2e-3
     assert pulled.pose.x >= 3.0 - (distance - 0.2) - 2e-3
 
@@ -171,11 +172,11 @@ def test_slides_in_a_mirrored_house_are_mirrored(yaw):
         wall = wall_body(
             Wall(3.2, min(sign * 4.6, sign * 4.72), 4.6, max(sign * 4.6, sign * 4.72), 0.0, 2.6)
         )
-        other = Body(
-            low_box(3.0, 0.5), Pose(3.75, sign * 4.25, 0.001, yaw_quaternion(sign * 20)), moves=True
+        other = Body.of(
+            low_box(3.0, 0.5), Pose(3.75, sign * 4.25, 0.001, yaw_quaternion(sign * 20))
         )
         pose = Pose(3.0, sign * 4.0, 0.001, yaw_quaternion(sign * yaw))
-        return push(low_box(6.0, 0.5), pose, 0, among(wall, other))
+        return push(Body.of(low_box(6.0, 0.5), pose), 0, among(wall, other))
 
     left, right = scene(1), scene(-1)
     assert not left.toppled
@@ -209,13 +210,13 @@ def test_energy_never_appears_from_nothing(monkeypatch):
         "tall", [part("box", (0.0, 0.0, 0.6), (0.25, 0.25, 1.2))], mass_kg=8.0, friction=0.6
     )
     wall = wall_body(Wall(4.2, 0.0, 4.32, 8.0, 0.0, 2.6))
-    other = Body(low_box(3.0, 0.5), Pose(3.7, 4.0, 0.001, UPRIGHT), moves=True)
+    other = Body.of(low_box(3.0, 0.5), Pose(3.7, 4.0, 0.001, UPRIGHT))
     scenes = [(alone, 0.002), (among(other, wall), 0.003)]
     for thing, (near, height) in itertools.product((low_box(5.0, 0.5), chair(), tall), scenes):
         # Heights (to the millimetre) that no other test uses: cached answers have no steps.
-        push(thing, Pose(3.0, 4.0, height, UPRIGHT), 0, alone, model="kick")
+        push(Body.of(thing, Pose(3.0, 4.0, height, UPRIGHT)), 0, alone, PUSH_SPECS["kick"])
         alone_steps = len(energies)
-        push(thing, Pose(3.0, 4.0, height, UPRIGHT), 0, near, model="kick")
+        push(Body.of(thing, Pose(3.0, 4.0, height, UPRIGHT)), 0, near, PUSH_SPECS["kick"])
         runs = [energies[:alone_steps], energies[alone_steps:]]
         energies.clear()
         assert runs[0]
@@ -232,7 +233,7 @@ def test_a_tall_thing_topples_and_lies_on_the_floor():
     tall = asset(
         "tall", [part("box", (0.0, 0.0, 0.6), (0.25, 0.25, 1.2))], mass_kg=8.0, friction=0.8
     )
-    pushed = push(tall, STANDING, 0, alone, model="kick")
+    pushed = push(Body.of(tall, STANDING), 0, alone, PUSH_SPECS["kick"])
     assert pushed.toppled
     corners, _ = asset_corners(tall)
     heights = transform(corners, pushed.pose)[:, 2]
@@ -248,7 +249,7 @@ def test_what_slides_free_slides_straight():
     for thing in catalogue().spawnable[::9]:
         if not thing.pushable:
             continue
-        done = push(thing, STANDING, 0, alone)
+        done = push(Body.of(thing, STANDING), 0, alone)
         if done.toppled or done.displacement_m < 0.2:
             continue
         x, y, z, w = done.pose.quaternion

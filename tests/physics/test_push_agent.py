@@ -44,7 +44,7 @@ def scene(heading):
     dx, dy = AHEAD[heading]
     other = Pose(3.0 + 0.7 * dx - 0.05 * dy, 4.0 + 0.7 * dy + 0.05 * dx, 0.001, UPRIGHT)
     wall = wall_body(Wall(5.5, 0.0, 5.6, 8.0, 0.0, 2.6))
-    return Pose(3.0, 4.0, 0.001, yaw_quaternion(20)), among(Body(SMALL, other, moves=True), wall)
+    return Pose(3.0, 4.0, 0.001, yaw_quaternion(20)), among(Body.of(SMALL, other), wall)
 
 
 @pytest.fixture
@@ -64,24 +64,27 @@ def solved(monkeypatch):
 @pytest.mark.parametrize("heading", range(4))
 def test_a_push_that_never_comes_near_the_agent_is_the_same_without_it(heading, solved):
     pose, near = scene(heading)
-    without = push(CRATE, pose, heading, near)
+    without = push(Body.of(CRATE, pose), heading, near)
     assert without.success
     assert without.moved
     solved.clear()
     dx, dy = AHEAD[heading]
     for back, aside in itertools.product((0.6, 0.9, 1.2), (-0.6, 0.0, 0.6)):
         agent = (3.0 - back * dx - aside * dy, 4.0 - back * dy + aside * dx)
-        assert push(CRATE, pose, heading, near, agent, agent_gap_m=back - 0.3) == without
+        assert (
+            push(Body.of(CRATE, pose), heading, near, agent=agent, agent_gap_m=back - 0.3)
+            == without
+        )
     assert solved == [], "no agent, no other scene"
 
 
 def test_an_agent_that_something_comes_near_takes_part(solved):
     pose, near = scene(0)
-    without = push(CRATE, pose, 0, near)
+    without = push(Body.of(CRATE, pose), 0, near)
     ((_, there),) = without.moved
     agent = (there.x + 0.3, there.y)  # what is run into would come to rest at its feet
     solved.clear()
-    beside = push(CRATE, pose, 0, near, agent, agent_gap_m=0.22)
+    beside = push(Body.of(CRATE, pose), 0, near, agent=agent, agent_gap_m=0.22)
     assert all(scene.agent is not None for scene in solved)
     assert solved
     assert beside != without
@@ -94,25 +97,31 @@ def test_the_agent_is_named_where_it_alone_hinders(heading):
     dx, dy = AHEAD[heading]
     crate = box("square", (0.4, 0.4, 0.2))
     pose, agent = Pose(3.0, 4.0, 0.001, UPRIGHT), (3.0 + 0.405 * dx, 4.0 + 0.405 * dy)
-    hindered = push(crate, pose, heading, among(), agent, agent_gap_m=0.205)
+    hindered = push(Body.of(crate, pose), heading, among(), agent=agent, agent_gap_m=0.205)
     assert (hindered.success, hindered.reason) == (False, "the agent is in the way")
     assert hindered.displacement_m < 0.02
-    assert push(crate, pose, heading, among()).success
+    assert push(Body.of(crate, pose), heading, among()).success
     # A wall that hinders by itself is named though the agent stands there too, behind the thing.
     x, y = 3.0 + 0.265 * dx, 4.0 + 0.265 * dy
     wall = wall_body(Wall(x - 0.06, y - 0.06, x + 0.06, y + 0.06, 0.0, 2.6))
     behind = (3.0 - 0.405 * dx, 4.0 - 0.405 * dy)
-    walled = push(crate, pose, heading, among(wall), behind, agent_gap_m=0.205)
+    walled = push(Body.of(crate, pose), heading, among(wall), agent=behind, agent_gap_m=0.205)
     assert walled.reason == "something is in the way"
     # And what cannot be moved at all is too heavy, whoever stands there.
     heavy = box("heavy", (0.4, 0.4, 0.2), 500.0)
-    assert push(heavy, pose, heading, among(wall), agent, agent_gap_m=0.2).reason == "too heavy"
+    assert (
+        push(Body.of(heavy, pose), heading, among(wall), agent=agent, agent_gap_m=0.2).reason
+        == "too heavy"
+    )
 
 
 def test_pulling_onto_the_agent_says_so_and_changes_nothing(hand_house):
     crate = box("pulled", (0.6, 0.6, 0.3))
     world = World(
-        HouseModel.of(hand_house), [(crate, Pose(3.51, 1.0, 0.0, UPRIGHT))], (12, 4, 0), (1, 1)
+        HouseModel.of(hand_house),
+        [Body.of(crate, Pose(3.51, 1.0, 0.0, UPRIGHT))],
+        (12, 4, 0),
+        (1, 1),
     )
     before = world.digest()
     result = world.step(Action.PUSH_BACK)
@@ -136,7 +145,9 @@ def test_the_agent_does_not_lever_what_has_low_feet(heading, side):
         if axis_distance(3.0 + d * dx, 4.0 + d * dy, plan) >= 0.205
     )  # fmt: skip
     agent = (3.0 + far * dx, 4.0 + far * dy)
-    pushed = push(telly, pose, heading, among(), agent, agent_gap_m=axis_distance(*agent, plan))
+    pushed = push(
+        Body.of(telly, pose), heading, among(), agent=agent, agent_gap_m=axis_distance(*agent, plan)
+    )
     assert pushed.at_rest
     assert pushed.seconds < 1.5
     assert axis_distance(*agent, footprint(telly, pushed.pose)) > 0.2 - 2e-3
@@ -144,14 +155,14 @@ def test_the_agent_does_not_lever_what_has_low_feet(heading, side):
 
 def test_a_crowd_is_what_may_be_moved():
     pose = Pose(3.0, 4.0, 0.001, UPRIGHT)
-    row = [Body(SMALL, Pose(3.5, 3.7 + 0.31 * k, 0.001, UPRIGHT), moves=True) for k in range(3)]
+    row = [Body.of(SMALL, Pose(3.5, 3.7 + 0.31 * k, 0.001, UPRIGHT)) for k in range(3)]
     wall = wall_body(Wall(3.0, 4.3, 4.0, 4.4, 0.0, 2.6))
     assert crowd_of(pose, row, wall) == (3, 0)
     assert crowd_of(pose, row[:1], wall) == (1, 0)
     assert crowd_of(pose, [], wall) == (0, 0)
     # What the first one met is driven on to: the neighbour's neighbour counts, the far one not.
-    behind = Body(SMALL, Pose(3.82, 4.0, 0.001, UPRIGHT), moves=True)
-    far = Body(SMALL, Pose(6.0, 4.0, 0.001, UPRIGHT), moves=True)
+    behind = Body.of(SMALL, Pose(3.82, 4.0, 0.001, UPRIGHT))
+    far = Body.of(SMALL, Pose(6.0, 4.0, 0.001, UPRIGHT))
     assert crowd_of(pose, [row[1], behind, far], wall) == (2, 0)
     # What is too heavy meets nothing.
     heavy = box("heavy crowd", (0.5, 0.4, 0.2), 500.0)
@@ -161,7 +172,8 @@ def test_a_crowd_is_what_may_be_moved():
 def crowd_of(pose, loose, wall, asset=CRATE):
     """Crowds of a push east and of one west."""
     near = among(*loose, wall)
-    return count_movers(asset, pose, 0, near), count_movers(asset, pose, 2, near)
+    body = Body.of(asset, pose)
+    return count_movers(body, 0, near), count_movers(body, 2, near)
 
 
 def test_a_crowd_is_never_fewer_than_what_moves():

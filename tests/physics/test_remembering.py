@@ -7,6 +7,7 @@ import sqlite3
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
@@ -18,7 +19,7 @@ from internav_data.physics import (
     PushSolution,
     SettleSolution,
     cache_disabled,
-    engine_of_this_process,
+    get_engine,
 )
 from internav_data.physics.cache import (
     CachedEngine,
@@ -29,9 +30,8 @@ from internav_data.physics.cache import (
     origin,
 )
 from internav_data.physics.engines.bullet import bullet
-from internav_data.physics.push import PUSH_SPECS
 from internav_data.physics.result_cache import FILE_NAME, ResultCache
-from internav_data.records import Asset, Part, Pose
+from internav_data.records import PUSH_SPECS, Asset, Part, Pose
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
@@ -50,10 +50,10 @@ BOX = Asset(
 )
 
 
-LONE = PhysicsScene((Body(BOX, Pose(0.0, 0.0, 0.001, UPRIGHT), moves=True),))
+LONE = PhysicsScene((Body.of(BOX, Pose(0.0, 0.0, 0.001, UPRIGHT)),))
 
 
-PAIR = PhysicsScene((*LONE.bodies, Body(BOX, Pose(0.7, 0.1, 0.001, UPRIGHT), moves=True)))
+PAIR = PhysicsScene((*LONE.bodies, Body.of(BOX, Pose(0.7, 0.1, 0.001, UPRIGHT))))
 
 
 FORCE = PUSH_SPECS["force"]
@@ -99,8 +99,8 @@ def test_every_difference_in_what_is_asked_is_another_question(tmp_path):
         (LONE, FORCE),
         (LONE, PUSH_SPECS["kick"]),
         (PAIR, FORCE),
-        (PhysicsScene((replace(body, asset=replace(BOX, friction=0.6)),)), FORCE),
-        (PhysicsScene((replace(body, asset=replace(BOX, mass_kg=3.5)),)), FORCE),
+        (PhysicsScene((replace(body, dynamics=replace(body.dynamics, friction=0.6)),)), FORCE),
+        (PhysicsScene((replace(body, dynamics=replace(body.dynamics, mass_kg=3.5)),)), FORCE),
         (PhysicsScene((replace(body, pose=Pose(0.0, 0.0, 0.001, (0.0, 0.0, 1.0, 0.0))),)), FORCE),
         (PhysicsScene((body, replace(PAIR.bodies[1], moves=False))), FORCE),
     ]
@@ -125,8 +125,9 @@ def test_other_rules_or_machines_are_not_believed(tmp_path):
     ["_CODE", "platform.python_version", "platform.libc_ver", "metadata.distribution"],
 )
 def test_whatever_answers_depend_on_is_in_the_origin(monkeypatch, part):
-    here = origin.__wrapped__(bullet().build)
-    assert origin.__wrapped__("pybullet 0, rules 0") != here == origin.__wrapped__(bullet().build)
+    here = origin.__wrapped__(bullet())
+    older = SimpleNamespace(name="bullet", build="pybullet 0, rules 0", libraries=("pybullet",))
+    assert origin.__wrapped__(older) != here == origin.__wrapped__(bullet())
     other = {
         "_CODE": "other code",
         "platform.python_version": lambda: "3.99",
@@ -134,7 +135,7 @@ def test_whatever_answers_depend_on_is_in_the_origin(monkeypatch, part):
         "metadata.distribution": lambda name: Record(f"another build of {name}"),
     }[part]
     monkeypatch.setattr(f"internav_data.physics.cache.{part}", other)
-    assert origin.__wrapped__(bullet().build) not in (None, here)
+    assert origin.__wrapped__(bullet()) not in (None, here)
 
 
 def test_every_module_that_physics_imports_is_in_the_digest(tmp_path):
@@ -166,10 +167,10 @@ class Record:
 
 def test_where_a_build_cannot_be_told_nothing_is_kept(monkeypatch):
     monkeypatch.setattr("internav_data.physics.cache.metadata.distribution", lambda _: Record(None))
-    assert origin.__wrapped__(bullet().build) is None
+    assert origin.__wrapped__(bullet()) is None
     monkeypatch.undo()
-    monkeypatch.setattr("internav_data.physics.cache._LIBRARIES", ("no such library",))
-    assert origin.__wrapped__(bullet().build) is None
+    other = SimpleNamespace(name="other", build="1", libraries=("no such library",))
+    assert origin.__wrapped__(other) is None
 
 
 finite = st.floats(allow_nan=False, allow_infinity=False, width=64)
@@ -342,11 +343,11 @@ def opened(folder):
 def test_solving_anew_believes_nothing_that_is_kept(tmp_path, monkeypatch):
     monkeypatch.setattr("internav_data.physics.registry.result_cache", lambda: held)
     held = ResultCache(tmp_path)
-    engine = engine_of_this_process()
+    engine = get_engine()
     lie = replace(engine.push(LONE, FORCE), seconds=123.0)
     held.put(engine._key(repr(FORCE), LONE), _write_push(lie))
     held.flush()
-    assert engine_of_this_process().push(LONE, FORCE) == lie
+    assert get_engine().push(LONE, FORCE) == lie
     with cache_disabled():
-        assert engine_of_this_process().push(LONE, FORCE) == bullet().push(LONE, FORCE) != lie
-    assert engine_of_this_process().push(LONE, FORCE) == lie
+        assert get_engine().push(LONE, FORCE) == bullet().push(LONE, FORCE) != lie
+    assert get_engine().push(LONE, FORCE) == lie

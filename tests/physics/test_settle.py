@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from internav_data.geometry import asset_corners, transform, yaw_quaternion
-from internav_data.physics import Body, PhysicsScene, engine_of_this_process, settle, wall_body
+from internav_data.physics import Body, PhysicsScene, get_engine, settle, wall_body
 from internav_data.physics.settle import MAX_PENETRATION_M
 from internav_data.records import Asset, Part, Pose, Wall
 
@@ -42,7 +42,7 @@ def never():
 
 
 def test_a_chair_stays_where_it_was_put():
-    there = settle(chair(), Pose(3.0, 4.0, 0.0, yaw_quaternion(30)), 0.01, never)
+    there = settle(Body.of(chair(), Pose(3.0, 4.0, 0.0, yaw_quaternion(30))), 0.01, never)
     assert there.refusal == ""
     assert math.dist((there.pose.x, there.pose.y), (3.0, 4.0)) <= 1e-3
     assert 0.0 <= there.pose.z <= 0.002
@@ -54,9 +54,7 @@ def test_a_chair_stays_where_it_was_put():
 def test_free_fall_takes_as_long_as_physics_says():
     # 1 cm falls in sqrt(2 h / g) = 45 ms = 11 steps; then ten calm steps follow.
     box = asset("box", [part("box", (0.0, 0.0, 0.2), (0.4, 0.4, 0.4))])
-    rest = engine_of_this_process().settle(
-        PhysicsScene((Body(box, Pose(0.0, 0.0, 0.01, UPRIGHT), moves=True),))
-    )
+    rest = get_engine().settle(PhysicsScene((Body.of(box, Pose(0.0, 0.0, 0.01, UPRIGHT)),)))
     assert rest.seconds >= math.sqrt(2 * 0.01 / 9.81) + 9 / 240
 
 
@@ -69,20 +67,20 @@ def test_what_leans_over_is_refused():
             part("box", (0.0, 0.0, 0.35), (0.05, 0.05, 0.5)),
         ],
     )
-    assert settle(leaning, Pose(1.0, 1.0, 0.0, UPRIGHT), 0.01, nothing).refusal
+    assert settle(Body.of(leaning, Pose(1.0, 1.0, 0.0, UPRIGHT)), 0.01, nothing).refusal
 
 
 def test_what_sinks_into_a_wall_is_pushed_out_and_refused():
     wall = wall_body(Wall(3.2, 0.0, 3.32, 8.0, 0.0, 2.6))
-    there = settle(chair(), Pose(3.0, 4.0, 0.0, UPRIGHT), 0.0, lambda: (wall,))
+    there = settle(Body.of(chair(), Pose(3.0, 4.0, 0.0, UPRIGHT)), 0.0, lambda: (wall,))
     assert there.refusal
 
 
 def test_a_neighbour_out_of_reach_changes_nothing():
     pose = Pose(3.0, 4.0, 0.0, yaw_quaternion(45))
     wall = wall_body(Wall(3.5, 0.0, 3.62, 8.0, 0.0, 2.6))
-    alone = settle(chair(), pose, 0.01, never)
-    beside = settle(chair(), pose, 0.0, lambda: (wall,))
+    alone = settle(Body.of(chair(), pose), 0.01, never)
+    beside = settle(Body.of(chair(), pose), 0.0, lambda: (wall,))
     assert alone == beside
 
 
@@ -90,10 +88,10 @@ def test_same_answer_in_a_fresh_process_and_after_any_history():
     script = (
         "import sys; sys.path.insert(0, 'tests/physics'); from test_settle import *\n"
         "n = int(sys.argv[1])\n"
-        "for k in range(n): settle(asset(f'b{k}', [part('box', (0, 0, .1 + k / 50), "
-        "(.2, .3, .2 + k / 25))]), Pose(0, 0, 0, UPRIGHT), 0.0, nothing)\n"
-        "e = engine_of_this_process()\n"
-        "print(repr(e.settle(PhysicsScene((Body(chair(), Pose(0, 0, .01, UPRIGHT), True),)))))"
+        "for k in range(n): settle(Body.of(asset(f'b{k}', [part('box', (0, 0, .1 + k / 50), "
+        "(.2, .3, .2 + k / 25))]), Pose(0, 0, 0, UPRIGHT)), 0.0, nothing)\n"
+        "e = get_engine()\n"
+        "print(repr(e.settle(PhysicsScene((Body.of(chair(), Pose(0, 0, .01, UPRIGHT)),)))))"
     )
     answers = {
         subprocess.run(
@@ -119,7 +117,7 @@ def test_assets_of_more_than_sixteen_parts_keep_them_all():
     # Bullet's shape arrays drop the seventeenth: here it alone carries the rest.
     parts = [part("box", (0.0, 0.0, 0.5 + 0.01 * k), (0.2, 0.2, 0.01)) for k in range(20)]
     parts.append(part("box", (0.0, 0.0, 0.1), (0.5, 0.5, 0.2)))
-    there = settle(asset("stack", parts), Pose(0.0, 0.0, 0.0, UPRIGHT), 0.01, nothing)
+    there = settle(Body.of(asset("stack", parts), Pose(0.0, 0.0, 0.0, UPRIGHT)), 0.01, nothing)
     assert there.refusal == ""
     corners, _ = asset_corners(asset("stack", parts))
     assert transform(corners, there.pose)[:, 2].min() == pytest.approx(0.001, abs=0.0011)

@@ -129,11 +129,11 @@ def test_a_chair_pulled_out_from_under_a_table_leaves_the_table_out(monkeypatch)
         return solve(self, scene, spec)
 
     monkeypatch.setattr(Bullet, "push", watched)
-    table = Body(TABLE, Pose(3.0, 4.0, 0.001, UPRIGHT), moves=True)
+    table = Body.of(TABLE, Pose(3.0, 4.0, 0.001, UPRIGHT))
     seat = Pose(3.5, 4.0, 0.001, UPRIGHT)
-    free = push(CHAIR, seat, 0, near_to())
-    assert push(CHAIR, seat, 0, near_to(table)) == free
+    free = push(Body.of(CHAIR, seat), 0, near_to())
+    assert push(Body.of(CHAIR, seat), 0, near_to(table)) == free
     assert [len(scene.bodies) for scene in asked] == [1]
     # Pushed on under it, its back runs into the top.
-    assert push(CHAIR, seat, 2, near_to(table)).moved
+    assert push(Body.of(CHAIR, seat), 2, near_to(table)).moved
     assert [len(scene.bodies) for scene in asked] == [1, 1, 2]

@@ -14,9 +14,10 @@ from internav_data.catalog import catalogue
 from internav_data.episodes import build_episodes
 from internav_data.houses import HouseConfig, build_house
 from internav_data.navigation import Lattice
+from internav_data.physics import Body
 from internav_data.planner.cost_to_go import FAR
 from internav_data.planner.problem import EVERYTHING, PlanningProblem
-from internav_data.planner.search import expert_of, expert_of_episode, replay, solve
+from internav_data.planner.search import expert_of_episode, replay, solve
 from internav_data.records import Asset, House, Part, Pose, Room, Wall
 from internav_data.world import ACTION_COUNT, Action, HouseModel, World
 
@@ -76,7 +77,11 @@ def room(width, depth, *inner):
 
 
 def at(asset, x, y):
-    return asset, Pose(x, y, 0.0, UPRIGHT)
+    return Body.of(asset, Pose(x, y, 0.0, UPRIGHT))
+
+
+def expert_of(model, obstacles, start, goal, **limit):
+    return solve(World(model, obstacles, start, goal), **limit)
 
 
 CORRIDOR = HouseModel.of(room(6.0, 1.5))

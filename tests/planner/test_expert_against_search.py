@@ -11,7 +11,8 @@ from collections import defaultdict, deque
 import pytest
 
 from internav_data.navigation import Lattice
-from internav_data.planner.search import expert_of
+from internav_data.physics import Body
+from internav_data.planner.search import solve
 from internav_data.records import Asset, House, Part, Pose, Room, Wall
 from internav_data.world import Action, HouseModel, World
 
@@ -130,8 +131,8 @@ def fewest(world, bound):
 def compared(name):
     """Steps of the expert, and of the best plan."""
     model, objects, start, goal = CASES[name]
-    obstacles = [(asset, Pose(x, y, 0.001, UPRIGHT)) for asset, x, y in objects]
-    expert = expert_of(model, obstacles, start, goal)
+    obstacles = [Body.of(asset, Pose(x, y, 0.001, UPRIGHT)) for asset, x, y in objects]
+    expert = solve(World(model, obstacles, start, goal))
     assert expert is not None, name
     best, worlds = fewest(World(model, obstacles, start, goal), expert.steps)
     return expert, best, worlds

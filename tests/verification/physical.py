@@ -8,7 +8,7 @@ import scenery
 from scenery import ASSETS, Grid, obstacle, small_scenes, thing
 
 from internav_data.episodes.outcomes import outcomes_of
-from internav_data.physics import engine_of_this_process, settle
+from internav_data.physics import Body, get_engine, settle
 from internav_data.planner.search import expert_of_episode
 from internav_data.records import Pose
 from internav_data.world import HouseModel, World
@@ -18,7 +18,7 @@ def settled(one):
     """An obstacle where it comes to rest."""
     asset = ASSETS[one.asset_id]
     spot = Pose(one.x, one.y, 0.0, one.quaternion)
-    rest = settle(asset, spot, 0.01, list)
+    rest = settle(Body.of(asset, spot), 0.01, list)
     assert not rest.refusal
     return replace(
         one,
@@ -33,7 +33,7 @@ def settled(one):
 
 def played(house, episode, model="force"):
     """An episode with settled obstacles, outcomes and expert."""
-    engine = engine_of_this_process()
+    engine = get_engine()
     resting = tuple(settled(one) for one in episode.obstacles)
     episode = replace(
         episode,

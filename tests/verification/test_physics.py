@@ -13,6 +13,7 @@ from scenery import ASSETS, Grid, brute_steps, thing, write_dataset
 
 import internav_data.world.world
 from internav_data.navigation import Lattice
+from internav_data.physics import Body
 from internav_data.physics.result_cache import ResultCache
 from internav_data.records import Pose
 from internav_data.records.errors import CorruptDataError
@@ -338,7 +339,7 @@ def test_what_carries_something_is_not_picked_up(scenes):
     assets = {**ASSETS, "Bar_1": scenery.asset("Bar_1", (0.3, 0.4, 0.6), (tall,))}
 
     def at(asset_id, x):
-        return MovableObject.at(assets[asset_id], Pose(x, 2.0, 0.0, (0.0, 0.0, 0.0, 1.0)))
+        return MovableObject.of(Body.of(assets[asset_id], Pose(x, 2.0, 0.0, (0.0, 0.0, 0.0, 1.0))))
 
     outcome = episodes[0].obstacles[0].outcomes[4]
     scene = CheckedScene(CheckedLayout(house, Shapes(assets)), FORCE)

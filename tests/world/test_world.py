@@ -15,6 +15,7 @@ from internav_data.episodes import build_episodes
 from internav_data.geometry import Polygons, footprint, wall_footprints, yaw_quaternion
 from internav_data.houses import HouseConfig, build_house
 from internav_data.navigation import CLEARANCE_M, Lattice
+from internav_data.physics import Body
 from internav_data.records import Pose
 from internav_data.records.errors import UsageError
 from internav_data.world import ACTIONS, Action, HouseModel, World
@@ -68,7 +69,7 @@ def small(hand_house):
     """The agent at (3, 1) looking along +x, a chair 0.75 m ahead, nothing else near."""
     chair = hand_house.assets["Chair_0"]
     model = HouseModel.of(hand_house)
-    return World(model, [(chair, Pose(3.75, 1.0, 0.0, UPRIGHT))], (12, 4, 0), (28, 4))
+    return World(model, [Body.of(chair, Pose(3.75, 1.0, 0.0, UPRIGHT))], (12, 4, 0), (28, 4))
 
 
 def test_actions_have_the_released_order():
@@ -195,9 +196,11 @@ def test_the_closest_is_taken_and_ties_go_by_index(hand_house):
     near = Pose(3.6, 1.0, 0.0, UPRIGHT)
     model = HouseModel.of(hand_house)
     first = len(model.items)
-    tie = World(model, [(chair, p) for p in poses], (12, 4, 0), (28, 4))
+    tie = World(model, [Body.of(chair, p) for p in poses], (12, 4, 0), (28, 4))
     assert tie.target(pick=False) == first
-    world = World(model, [*((chair, p) for p in poses), (chair, near)], (12, 4, 0), (28, 4))
+    world = World(
+        model, [*(Body.of(chair, p) for p in poses), Body.of(chair, near)], (12, 4, 0), (28, 4)
+    )
     assert world.target(pick=False) == first + 2
 
 
@@ -205,7 +208,7 @@ def test_pick_and_drop(hand_house):
     apple = hand_house.assets["Apple_0"]
     model = HouseModel.of(hand_house)
     poses = [Pose(3.5, 1.0, 0.0, UPRIGHT), Pose(3.5, 1.3, 0.0, UPRIGHT)]
-    world = World(model, [(apple, p) for p in poses], (12, 4, 0), (28, 4))
+    world = World(model, [Body.of(apple, p) for p in poses], (12, 4, 0), (28, 4))
     assert world.step(Action.DROP).reason == "hands are empty"
     # Pickable things are never pushed.
     assert world.step(Action.PUSH_AHEAD).reason == "nothing to push in sight and reach"
@@ -228,7 +231,7 @@ def test_what_carries_something_is_not_picked(hand_house):
     apple = hand_house.assets["Apple_0"]
     model = HouseModel.of(hand_house)
     stack = [Pose(3.5, 1.0, 0.0, UPRIGHT), Pose(3.5, 1.0, 0.1, UPRIGHT)]
-    world = World(model, [(apple, p) for p in stack], (12, 4, 0), (28, 4))
+    world = World(model, [Body.of(apple, p) for p in stack], (12, 4, 0), (28, 4))
     result = world.step(Action.PICKUP)
     assert (result.success, result.reason) == (False, "something rests on it")
 

@@ -14,14 +14,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from internav_data.geometry import centre_of_mass, multiply, rotation_matrix
-from internav_data.physics.engines.bullet_scene import RULES, STEP_S, Builder, pybullet
+from internav_data.physics.engines.bullet_scene import (
+    HULL_MARGIN_M,
+    RULES,
+    STEP_S,
+    Builder,
+    pybullet,
+)
 from internav_data.physics.scene import PushSolution, SettleSolution
 from internav_data.physics.sweep import bounding_radius_m, sweep_recorder
 from internav_data.records import Pose
 
 if TYPE_CHECKING:
-    from internav_data.physics.scene import PhysicsScene, PushSpec
-    from internav_data.records import Asset
+    from internav_data.physics.scene import PhysicsScene
+    from internav_data.records import Asset, PushSpec
 
 
 REST_SPEED = 0.001
@@ -52,6 +58,9 @@ class Bullet:
 
     _builder: Builder
     name: str = "bullet"
+    rules: int = RULES
+    libraries: tuple[str, ...] = ("pybullet",)
+    contact_margin_m: float = HULL_MARGIN_M
     build: str = field(default_factory=lambda: f"pybullet {version('pybullet')}, rules {RULES}")
 
     def settle(self, scene: PhysicsScene) -> SettleSolution:
@@ -93,7 +102,7 @@ class Bullet:
             pybullet.changeDynamics(mover, -1, activationState=_ASLEEP, physicsClientId=client)
         for mover, recorder in movers:
             recorder.follow(*pybullet.getBasePositionAndOrientation(mover, client))
-        gain = spec.force_n / scene.bodies[0].asset.mass_kg * STEP_S
+        gain = spec.force_n / scene.bodies[0].dynamics.mass_kg * STEP_S
         calm, steps, rests = 0, 0, False
         while steps < limit and not rests:
             if pushes_left:

@@ -56,6 +56,8 @@ GRAVITY = 9.81
 SOLVER_ITERATIONS = 20
 SOLVER_RESIDUAL = 1e-6
 """The solver stops early below this."""
+HULL_MARGIN_M = 0.001
+"""Thickness that Bullet adds to convex hulls."""
 CONTACT_BREAKS_M = 0.002
 """A contact point that has drifted this far is looked for anew. At Bullet's 2 cm stale points make
 sliding things jump and stay awake: a push among others takes twice as long."""
@@ -164,13 +166,13 @@ class Builder:
     def _add(self, body: Body) -> int:
         asset, pose = body.asset, body.pose
         identity = self._place(
-            asset.mass_kg if body.moves else 0.0,
+            body.dynamics.mass_kg if body.moves else 0.0,
             self._shape(body),
             basePosition=(pose.x, pose.y, pose.z),
             baseOrientation=pose.quaternion,
             baseInertialFramePosition=centre_of_mass(asset),
         )
-        self._surface(identity, asset.friction)
+        self._surface(identity, body.dynamics.friction)
         return identity
 
     def _shape(self, body: Body) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 from shapely import Point
 
+from internav_data.physics import DEFAULT_ENGINE, ENGINES
 from internav_data.verification.objects import wall_slabs
 from internav_data.verification.overlaps import overlapping_slabs
 from internav_data.world import HouseModel, World
@@ -50,7 +51,13 @@ class CheckedScene:
 
     def world(self, episode: Episode) -> World:
         """Return the world of an episode at its start."""
-        return World.of_episode(self.model, episode, self.assets, self.config.push_model)
+        push_model, engine = self.config.push_model, self.engine(episode)
+        return World.of_episode(self.model, episode, self.assets, push_model, engine)
+
+    def engine(self, episode: Episode) -> str:
+        """Return the name of the physics engine that checks an episode: its own, if known here."""
+        made_by = episode.physics.engine
+        return made_by if made_by in ENGINES else DEFAULT_ENGINE
 
     def rearranged(
         self, items: Sequence[MovableObject], changes: dict[int, Pose | None]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from internav_data.physics import cache_disabled, engine_of_this_process
+from internav_data.physics import cache_disabled, get_engine
 from internav_data.verification.replay.expert_replay import check_expert
 from internav_data.verification.replay.outcomes import check_outcomes
 from internav_data.verification.replay.settling import check_settling
@@ -30,7 +30,7 @@ def _replay(scene: CheckedScene, episode: Episode, report: FindingCollector) -> 
     def expect(holds: object, predicate: str, expected: object, got: object) -> bool:
         return report.expect(holds, predicate, expected, got, name)
 
-    engine = engine_of_this_process()
+    engine = get_engine(scene.engine(episode))
     made = f"{episode.physics.engine} of {episode.physics.build}"
     here = f"{engine.name} of {engine.build}"
     if made != here:

@@ -68,7 +68,7 @@ class OutcomeCheck:
     def push(self, world: World, index: int) -> None:
         """Push an obstacle again and compare."""
         item, outcome = world.items[index], self.outcome
-        if not item.asset.pushable:
+        if not item.dynamics.pushable:
             self._ends("not pushable", 0.0, 0.0)
             return
         pushed = world.simulate_push(index, PUSH_OUTCOMES.index(outcome.action), agent=False)
@@ -80,7 +80,7 @@ class OutcomeCheck:
 
     def pick(self, world: World, index: int) -> None:
         """Remove an obstacle and compare."""
-        if not world.items[index].asset.pickable:
+        if not world.items[index].dynamics.pickable:
             reason = "not pickable"
         else:
             reason = "something rests on it" if self._carries(world.items, index) else ""

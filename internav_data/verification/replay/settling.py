@@ -67,10 +67,10 @@ def _fall(scene: CheckedScene, episode: Episode, number: int) -> SettleResult:
     for _ in range(TRIES):
         spot = Pose(round(x, 4), round(y, 4), 0.0, turn)
         settled = settle(
-            asset,
-            spot,
+            Body(asset, spot, obstacle.dynamics),
             scene.config.gap_m,
             lambda: _near(scene, episode, number, spot),  # noqa: B023 - asked at once
+            scene.engine(episode),
         )
         if _apart(settled.pose, obstacle.pose)[0] <= ROUNDED_M:
             break
@@ -103,13 +103,12 @@ def _near(scene: CheckedScene, episode: Episode, number: int, spot: Pose) -> lis
     def near(plans: list[Geometry] | tuple[Geometry, ...]) -> bool:
         return bool(shapely.dwithin(here, np.array(plans, dtype=object), NEAR_M).any())
 
-    placed = [(thing.asset_id, thing.pose) for thing in scene.layout.house.objects]
-    placed += [(o.asset_id, o.pose) for o in episode.obstacles[:number]]
-    bodies = [
-        Body(scene.assets[other], pose, moves=False)
-        for other, pose in placed
-        if near(scene.footprint(other, pose))
+    assets = scene.assets
+    placed = [
+        *(Body.of(assets[o.asset_id], o.pose, moves=False) for o in scene.layout.house.objects),
+        *(Body.of_obstacle(o, assets, moves=False) for o in episode.obstacles[:number]),
     ]
+    bodies = [b for b in placed if near(scene.footprint(b.asset.asset_id, b.pose))]
     walls = [
         wall
         for wall in scene.layout.house.walls

@@ -1,0 +1,50 @@
+"""Physical properties of objects, and the pushes that an agent gives them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final, Literal
+
+PushModel = Literal["force", "kick"]
+"""Name of a push in configs and options: a key of `PUSH_SPECS`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Dynamics:
+    """Properties of one object that decide what happens when an agent acts on it.
+
+    Two objects of one asset share its geometry; their dynamics may differ.
+    """
+
+    mass_kg: float
+    friction: float
+    """Coulomb friction coefficient on floor, walls and other objects."""
+    pushable: bool
+    pickable: bool
+
+
+@dataclass(frozen=True, slots=True)
+class PushSpec:
+    """Parameters of a push at an object's centre of mass, parallel to the floor.
+
+    The force acts until the object has reached the speed (the last impulse is scaled to give
+    exactly this speed) or the time is over; then the object is let go. An infinite force gives the
+    speed at once, whatever the mass.
+    """
+
+    force_n: float
+    speed_m_s: float
+    seconds: float
+
+
+PUSH_SPECS: Final[Mapping[PushModel, PushSpec]] = MappingProxyType(
+    {
+        "force": PushSpec(force_n=200.0, speed_m_s=2.0, seconds=0.5),
+        "kick": PushSpec(force_n=math.inf, speed_m_s=2.0, seconds=0.5),
+    }
+)
+"""Parameters by push model: the paper's constant force, and the released code's 2 m/s for every
+mass."""

@@ -1,0 +1,131 @@
+"""Objects of one asset share its geometry and have dynamics of their own."""
+
+import ast
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import internav_data
+from internav_data.catalog import catalogue
+from internav_data.episodes import build_episodes
+from internav_data.episodes.outcomes import outcomes_of
+from internav_data.geometry import asset_corners
+from internav_data.houses import HouseConfig, build_house
+from internav_data.physics import Body, push, settle
+from internav_data.physics.sweep import bounding_radius_m, centred_corners
+from internav_data.planner.push_heuristic import slide_m
+from internav_data.records import Asset, Dynamics, Part, Pose
+from internav_data.world import Action, HouseModel, World
+
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+CRATE = Asset(
+    "dynamics crate", "Crate", (0.5, 0.4, 0.3), 6.0, 0.5, True, False, True, True,
+    (Part("box", (0.0, 0.0, 0.15), (0.5, 0.4, 0.3), UPRIGHT, (), (1, 2, 3), "wood"),),
+)  # fmt: skip
+SAFE = Dynamics(mass_kg=500.0, friction=0.5, pushable=True, pickable=False)
+"""Too heavy for 200 N."""
+
+
+def alone(dop8):
+    return ()
+
+
+def test_a_heavier_object_of_the_same_asset_does_not_move():
+    pose = Pose(2.0, 3.0, 0.001, UPRIGHT)
+    light = push(Body.of(CRATE, pose), 0, alone)
+    heavy = push(Body(CRATE, pose, SAFE), 0, alone)
+    assert light.success
+    assert (heavy.success, heavy.reason) == (False, "too heavy")
+    assert push(Body.of(CRATE, pose), 0, alone) == light, "not the cached push of the heavy one"
+
+
+def test_a_heavy_neighbour_stops_what_a_light_one_would_not():
+    pose = Pose(2.0, 3.0, 0.001, UPRIGHT)
+    ends = []
+    for dynamics in (CRATE.dynamics, SAFE):
+        other = Body(CRATE, Pose(2.7, 3.0, 0.001, UPRIGHT), dynamics)
+        pushed = push(Body.of(CRATE, pose), 0, lambda _, other=other: [(0, other)])
+        ends.append((pushed.pose.x, bool(pushed.moved)))
+    assert ends[0][1]
+    assert not ends[1][1]
+    assert ends[1][0] < ends[0][0] - 0.05
+
+
+def test_friction_is_the_objects_own():
+    smooth = replace(CRATE.dynamics, friction=0.25)
+    pose = Pose(2.0, 3.0, 0.001, UPRIGHT)
+    far = [
+        push(Body(CRATE, pose, own), 0, alone).displacement_m for own in (CRATE.dynamics, smooth)
+    ]
+    assert far[1] == pytest.approx(2.0 * far[0], rel=0.15)
+
+
+def test_geometry_is_shared_by_objects_of_one_asset():
+    pose = Pose(2.0, 3.0, 0.0, UPRIGHT)
+    push(Body.of(CRATE, pose), 1, alone)
+    settle(Body.of(CRATE, pose), 0.0, tuple)
+    caches = (asset_corners, centred_corners, bounding_radius_m)
+    before = [cache.cache_info().currsize for cache in caches]
+    push(Body(CRATE, pose, SAFE), 1, alone)
+    settle(Body(CRATE, pose, SAFE), 0.0, tuple)
+    assert [cache.cache_info().currsize for cache in caches] == before
+
+
+def test_an_episodes_stored_dynamics_decide_what_a_world_does(hand_house):
+    chair = hand_house.assets["Chair_0"]
+    model = HouseModel.of(hand_house)
+    spot = Pose(3.75, 1.0, 0.0, UPRIGHT)
+    worlds = [
+        World(model, [Body(chair, spot, own)], (12, 4, 0), (28, 4))
+        for own in (chair.dynamics, SAFE, replace(chair.dynamics, pushable=False, pickable=True))
+    ]
+    light, heavy, pickable = worlds
+    assert len({world.digest() for world in worlds}) == 3
+    assert slide_m(light, light.obstacles[0]) > 0.0 == slide_m(heavy, heavy.obstacles[0])
+    assert light.step(Action.PUSH_AHEAD).success
+    assert heavy.step(Action.PUSH_AHEAD).reason == "too heavy"
+    assert pickable.step(Action.PUSH_AHEAD).reason == "nothing to push in sight and reach"
+    picked = pickable.step(Action.PICKUP)
+    assert picked.success
+    assert pickable.step(Action.DROP).success
+    assert pickable.body(picked.target).dynamics.pickable, "kept while it is carried"
+
+
+def test_outcomes_of_an_episode_follow_its_stored_values():
+    house = build_house(0, 0, HouseConfig(), catalogue())
+    (episode,) = build_episodes(house, 1, catalogue().spawnable)
+    model, assets = HouseModel.of(house), catalogue().assets
+    number, _ = next(
+        (k, o) for k, o in enumerate(episode.obstacles) if o.outcomes[0].reason != "not pushable"
+    )
+
+    def outcomes(**changes):
+        obstacles = list(episode.obstacles)
+        obstacles[number] = replace(obstacles[number], **changes)
+        changed = replace(episode, obstacles=tuple(obstacles))
+        return outcomes_of(World.of_episode(model, changed, assets))
+
+    assert outcomes() == tuple(o.outcomes for o in episode.obstacles)
+    assert {o.reason for o in outcomes(mass_kg=5000.0)[number][:4]} == {"too heavy"}
+    assert {o.reason for o in outcomes(pushable=False)[number][:4]} == {"not pushable"}
+    assert outcomes(pushable=False, pickable=True)[number][4].reason != "not pickable"
+
+
+ROOMS = ("physics", "world", "planner", "envs", "evaluation")
+"""Rooms in which objects have dynamics of their own."""
+OWN = {"mass_kg", "friction", "pushable", "pickable"}
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_nobody_reads_the_dynamics_of_an_asset_beside_an_object(room):
+    root = Path(internav_data.__file__).parent
+    found = [
+        f"{file.relative_to(root)}:{node.lineno} {ast.unparse(node)}"
+        for file in (root / room).rglob("*.py")
+        for node in ast.walk(ast.parse(file.read_text()))
+        if isinstance(node, ast.Attribute)
+        and node.attr in OWN
+        and ast.unparse(node.value).split(".")[-1].split("[")[0] in {"asset", "assets"}
+    ]
+    assert found == []
