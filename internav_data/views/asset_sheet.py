@@ -1,33 +1,49 @@
-"""A contact sheet of the catalogue: one cell a type, several of its assets side by side."""
+"""Pictures of assets by the agent's camera, and a contact sheet of the catalogue.
+
+Assets stand on the floor of an endless room; the sheet has one cell for each type, with several of
+its assets side by side.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from internav_data.catalog import SHEETS
+from internav_data.geometry import part_corners, transform
+from internav_data.records import House, Material, Pose, Room
 from internav_data.records.errors import UsageError
-from internav_data.views.orthographic import OrthographicView, Surface, asset_surface, draw_surface
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
     from internav_data.catalog import Catalogue
-    from internav_data.core.typing import Image
-    from internav_data.records import Asset
+    from internav_data.core.typing import Floats, Image
+    from internav_data.records import RGB, Asset
+    from internav_data.render.camera import StaticScene
 
 _TURN_DEG = -24.0
-"""Things are turned a little, so that front, side and top are seen."""
+"""Assets are turned a little, so that front, side and top are seen."""
 _PITCH_DEG = 24.0
+_FROM_ABOVE_DEG = 50.0
+"""Pitch for flat assets."""
+_DISTANCE: Final = 1.6
+"""Distance of the camera as a multiple of the width of the picture where the assets stand."""
+_OVERSAMPLING: Final = 2
+_BACKGROUND: Final[RGB] = (247, 247, 245)
+_FLOOR_M: Final = 100.0
+"""Half a side of the floor, beyond all that is pictured."""
+_FLOOR: Final = -1
+"""Instance id of the floor."""
 _LABEL_PX = 26
 _INK, _FAINT, _GAP = (52, 56, 62), (120, 124, 130), (226, 226, 222)
-_FROM_ABOVE_DEG = 50.0
 _FLAT = ("Rug",)
 _LONG = 1.5
-"""Things so much wider than high are shown one fewer a cell."""
+"""Assets so many times wider than high are shown one fewer a cell."""
 
 
 def _chosen(assets: Sequence[Asset], count: int) -> list[Asset]:
@@ -37,31 +53,99 @@ def _chosen(assets: Sequence[Asset], count: int) -> list[Asset]:
     return [assets[round(k * (len(assets) - 1) / (count - 1))] for k in range(count)]
 
 
+@lru_cache(maxsize=1)
+def _studio() -> StaticScene:
+    """Return a house that is one floor without walls."""
+    from internav_data.render.camera import StaticScene  # noqa: PLC0415 - seconds
+
+    a = _FLOOR_M
+    square = ((-a, -a), (a, -a), (a, a), (-a, a))
+    room = Room(0, "studio", square, 4.0 * a * a, a, "plain", "plain")
+    plain = Material("plain", (255, 255, 255), "plain")
+    return StaticScene.of(
+        House(
+            scene_id="studio", scene=0, seed=0, split="train", preset="", outline=square,
+            rooms=(room,), doors=(), windows=(), walls=(), objects=(), materials=(plain,),
+            room_graph=(), area_m2=room.area_m2, assets={},
+        )
+    )  # fmt: skip
+
+
 def draw_assets(
     assets: Sequence[Asset], width: int, height: int, *, turn_deg: float = _TURN_DEG
 ) -> Image:
-    """Draw assets side by side on a floor, as large as fits, shape (height, width, 3) uint8."""
+    """Draw assets side by side on a floor, as large as fits, shape (height, width, 3) uint8.
+
+    Raises
+    ------
+    UsageError
+        There are no assets.
+    """
     if not assets:
         raise UsageError("no assets to draw: give at least one")
-    pitch = _FROM_ABOVE_DEG if all(a.type in _FLAT for a in assets) else _PITCH_DEG
+    from internav_data.render.camera import Camera, CameraView, camera_axes  # noqa: PLC0415
+
+    pitch_deg = _FROM_ABOVE_DEG if all(a.type in _FLAT for a in assets) else _PITCH_DEG
+    placed = _side_by_side(assets, turn_deg)
+    corners = np.vstack([transform(part_corners(p), pose) for a, pose in placed for p in a.parts])
+    axes = camera_axes(90.0, pitch_deg)
+    eye, window = _framing(corners, axes, width / height)
+    left, top, pixels_per_tan = window[0], window[1], width * _OVERSAMPLING / window[2]
+    scene = _studio()
+    props = scene.props(placed)
+    # The camera draws a square of 90 degrees, tangents -1 to 1; the window is cut out of it.
+    camera = Camera(math.ceil(2.0 * pixels_per_tan), portals=False)
+    view = CameraView(scene, props, eye[0], eye[1], 90.0, pitch_deg, eye[2])
+    shown, _, ids = camera.render([view])
+    for k in range(len(props)):
+        props.hide(k)
+    bare = camera.render([view]).rgb
+    column, row = (round((at + 1.0) * pixels_per_tan) for at in (left, top))
+    cut = (
+        0,
+        slice(row, row + height * _OVERSAMPLING),
+        slice(column, column + width * _OVERSAMPLING),
+    )
+    # On the floor only shadows are kept: the rest of its shading is the distance's.
+    light = shown[cut].astype(np.float64) / np.maximum(bare[cut], 1)
+    floor = np.array(_BACKGROUND) * np.minimum(light, 1.0)
+    picture = np.where((ids[cut] == _FLOOR)[..., None], floor, shown[cut])
+    blocks = picture.reshape(height, _OVERSAMPLING, width, _OVERSAMPLING, 3).mean(axis=(1, 3))
+    image: Image = np.rint(blocks).astype(np.uint8)
+    return image
+
+
+def _side_by_side(assets: Sequence[Asset], turn_deg: float) -> list[tuple[Asset, Pose]]:
+    """Place assets along +x, turned about their upright axes."""
     turn = math.radians(turn_deg)
     c, s = abs(math.cos(turn)), abs(math.sin(turn))
-    wide = [a.size[0] * c + a.size[1] * s for a in assets]
-    gap = 0.16 * max(wide)
-    surfaces, x = [], 0.0
-    for asset, across in zip(assets, wide, strict=True):
-        surfaces.append(asset_surface(asset).moved((x + across / 2.0, 0.0, 0.0), turn_deg))
+    widths = [a.size[0] * c + a.size[1] * s for a in assets]
+    gap = 0.16 * max(widths)
+    upright = (0.0, 0.0, math.sin(turn / 2.0), math.cos(turn / 2.0))
+    placed, x = [], 0.0
+    for asset, across in zip(assets, widths, strict=True):
+        placed.append((asset, Pose(x + across / 2.0, 0.0, 0.0, upright)))
         x += across + gap
-    whole = Surface.joined(surfaces)
-    tilt = math.radians(pitch)
-    right = whole.corners[..., 0]
-    down = -whole.corners[..., 1] * math.sin(tilt) - whole.corners[..., 2] * math.cos(tilt)
-    spans = (float(np.ptp(right)), float(np.ptp(down)))
-    scale = min(0.92 * width / spans[0], 0.86 * height / spans[1])
-    middle = float(down.max() + down.min()) / 2.0
-    centre = (float(right.max() + right.min()) / 2.0, -middle / math.sin(tilt), 0.0)
-    view = OrthographicView(width, height, scale, centre, yaw_deg=0.0, pitch_deg=pitch)
-    return draw_surface(whole, view)
+    return placed
+
+
+def _framing(corners: Floats, axes: Floats, aspect: float) -> tuple[Floats, Floats]:
+    """Return the camera's position (3,) and the picture's window (left, top, width) in tangents.
+
+    `corners` (n, 3) is what the window frames, `axes` (3, 3) the camera's, `aspect` the picture's
+    width divided by its height.
+    """
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    away = corners @ axes.T
+    spans = np.ptp(away, axis=0)
+    distance = _DISTANCE * max(spans[0], spans[1] * aspect) + spans[2] / 2.0
+    eye = (low + high) / 2.0 - distance * axes[2]
+    seen = (corners - eye) @ axes.T
+    tangents = seen[:, :2] / seen[:, 2:]
+    first, last = tangents.min(axis=0), tangents.max(axis=0)
+    wide = max((last[0] - first[0]) / 0.92, (last[1] - first[1]) / 0.86 * aspect)
+    middle = (first + last) / 2.0
+    return eye, np.array([middle[0] - wide / 2.0, middle[1] - wide / aspect / 2.0, wide])
 
 
 def _cell(type_: str, assets: Sequence[Asset], width: int, height: int, count: int) -> Image:
@@ -70,7 +154,7 @@ def _cell(type_: str, assets: Sequence[Asset], width: int, height: int, count: i
     long = assets[0].size[0] > _LONG * assets[0].size[2]
     picture = draw_assets(_chosen(assets, count - 1 if long else count), width, height - _LABEL_PX)
     cell = np.empty((height, width, 3), np.uint8)
-    cell[:] = (247, 247, 245)
+    cell[:] = _BACKGROUND
     cell[_LABEL_PX:] = picture
     font = cv2.FONT_HERSHEY_SIMPLEX
     cv2.putText(cell, type_, (9, 19), font, 0.5, _INK, 1, cv2.LINE_AA)
