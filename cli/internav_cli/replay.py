@@ -81,7 +81,7 @@ def command(
     if outs and formats:
         raise click.UsageError("--format is for files without --out: a name's suffix says it")
     from internav_data.records.errors import UsageError
-    from internav_data.views import Replay, film_format, read_actions, write_video
+    from internav_data.views import Replay, read_actions, video_format, write_video
     from internav_data.views.replay import DEFAULTS
 
     dataset, episode_id = _arguments(dataset, episode_id)
@@ -93,7 +93,7 @@ def command(
     if given is not None and given.episode_id not in {None, name}:
         raise UsageError(f"{actions_file}: its actions are for {given.episode_id}, not for {name}")
     paths = outs or [Path(f"{name.replace('/', '-')}.{kind}") for kind in formats or ("mp4",)]
-    kinds = [film_format(path) for path in paths]
+    kinds = [video_format(path) for path in paths]
     for path in paths:
         if path.exists() and not force:
             raise UsageError(f"{path}: is there already; choose another name, or pass --force")
@@ -105,7 +105,7 @@ def command(
             "without); choose another episode, or pass --actions FILE"
         )
     actions = None if given is None else given.actions
-    film = Replay.of(house, task, assets, actions, model=model)
+    film = Replay.of(house, task, assets, actions, push_model=model)
     for path, kind in zip(paths, kinds, strict=True):
         pixels, rate = size or DEFAULTS[kind][0], fps if fps is not None else DEFAULTS[kind][1]
         count = write_video(path, film.frames(size=pixels, fps=rate), rate)

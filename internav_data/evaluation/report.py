@@ -279,7 +279,7 @@ def _add_curves(page: Page, logs: Mapping[str, Series]) -> None:
 
 
 def _pictures(results: Sequence[EpisodeResult], dataset: Dataset[Episode]) -> list[Any]:
-    from internav_data.views.trajectories import draw_trajectory  # noqa: PLC0415
+    from internav_data.views.trajectory import draw_trajectory  # noqa: PLC0415
 
     chosen = picked(results)
     episodes = episodes_by_id(dataset, [result.episode_id for _, result in chosen])
@@ -288,7 +288,7 @@ def _pictures(results: Sequence[EpisodeResult], dataset: Dataset[Episode]) -> li
         episode = episodes[result.episode_id]
         image = draw_trajectory(
             dataset.scene(episode.scene_id), episode, dataset.assets, result.actions,
-            pixels=_PIXELS, model=push_model_of(dataset),
+            pixels=_PIXELS, push_model=push_model_of(dataset),
         )  # fmt: skip
         end = "success" if result.success else f"failed, {result.distance_m:.2f} m away"
         pictures.append(

@@ -77,7 +77,7 @@ def films(
         panel = bars_panel(steps, SIZE) if any(steps) else None
         replay = Replay.of(
             only.scene(episode.scene_id), episode, only.assets, again.actions,
-            title=player.name, model=push_model_of(only),
+            title=player.name, push_model=push_model_of(only),
         )  # fmt: skip
         path = folder / f"{word}-{result.episode_id.replace('/', '-')}.{kind}"
         write_video(path, replay.frames(size=SIZE, fps=FPS, panel=panel), FPS)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from internav_data.views.episodes import draw_episode, episode_lines
 from internav_data.views.plan import draw_house, house_line
 from internav_data.views.sheets import contact_sheet, write_png
-from internav_data.views.tasks import draw_episode, episode_lines
 
 if TYPE_CHECKING:
     from internav_data.views.replay import Replay, replay_frames
     from internav_data.views.replay_actions import ActionList, read_actions
     from internav_data.views.replay_story import Moment
-    from internav_data.views.video import film_format, write_video
+    from internav_data.views.video import video_format, write_video
 
 __all__ = [
     "ActionList",
@@ -22,10 +22,10 @@ __all__ = [
     "draw_episode",
     "draw_house",
     "episode_lines",
-    "film_format",
     "house_line",
     "read_actions",
     "replay_frames",
+    "video_format",
     "write_png",
     "write_video",
 ]
@@ -34,7 +34,7 @@ _HOMES = {
     "ActionList": "replay_actions",
     "Moment": "replay_story",
     "Replay": "replay",
-    "film_format": "video",
+    "video_format": "video",
     "read_actions": "replay_actions",
     "replay_frames": "replay",
     "write_video": "video",

@@ -179,18 +179,18 @@ def draw_asset_sheet(
     Parameters
     ----------
     catalogue
-        Where the assets come from.
+        Catalogue with the assets.
     types
-        Which types, in this order; all by default, the obstacle types first.
+        Asset types in the order of the cells; by default all, the obstacle types first.
     columns, each
-        Cells in a row, and assets in a cell.
+        Number of cells in a row, and of assets in a cell.
     cell_px
         Width and height of a cell, pixels.
 
     Raises
     ------
     UsageError
-        When a type has no assets.
+        A type has no assets.
     """
     known = [*(t for t in SHEETS if t in catalogue.types)]
     known += [t for t in catalogue.types if t not in SHEETS]
@@ -216,7 +216,7 @@ def write_asset_sheet(path: Path, catalogue: Catalogue, types: Sequence[str] | N
     Raises
     ------
     UsageError
-        When the file cannot be written.
+        The file cannot be written.
     """
     import cv2  # noqa: PLC0415 - seconds, all of these
 

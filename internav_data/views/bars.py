@@ -1,4 +1,4 @@
-"""Bars beside a replay: what an agent was about to do, step by step."""
+"""Bar charts beside a replay: an agent's distributions, step by step."""
 
 from __future__ import annotations
 
@@ -23,39 +23,40 @@ _CHOSEN: Final[RGB] = (196, 36, 112)
 _REFERENCE: Final = 400.0
 """Camera size at which lengths in the code are pixels."""
 _WIDTH: Final = 0.5
-"""Of the panel, as a share of its height."""
+"""Width of the panel as a share of its height."""
 
 
 @dataclass(frozen=True, slots=True)
 class Bars:
-    """One group of bars: shares in [0, 1] with their names."""
+    """A group of bars with a title."""
 
     title: str
     labels: tuple[str, ...]
     shares: tuple[float, ...]
+    """Lengths of the bars, in [0, 1]."""
     chosen: int = -1
-    """Which one was taken: drawn in another colour; -1 for none."""
+    """Index of the bar in the colour of the chosen one, -1 for none."""
 
 
 def bars_panel(steps: Sequence[Sequence[Bars]], size: int) -> Callable[[Moment], Image]:
-    """Return a replay's panel that shows what led to each action.
+    """Return a replay's panel that shows groups of bars for each action.
 
     Parameters
     ----------
     steps
-        The groups of bars of each action, in order: those of action k + 1 stand beside the
-        moment after k actions, when it is about to be taken.
+        Groups of bars of each action, in order: those of action k + 1 stand beside the moment
+        after k actions.
     size
         Pixels a side of the replay's camera.
 
     Returns
     -------
-    For `Replay.frames(panel=…)`: pictures (size, size / 2, 3) uint8 RGB.
+    Function for `Replay.frames(panel=…)`: it returns pictures (size, size / 2, 3) uint8 RGB.
 
     Raises
     ------
     UsageError
-        A group with more or fewer shares than labels.
+        A group has more or fewer shares than labels.
     """
     for group in (group for groups in steps for group in groups):
         if len(group.labels) != len(group.shares):

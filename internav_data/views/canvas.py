@@ -1,4 +1,4 @@
-"""A canvas measured in metres, y up, drawn larger than asked for and shrunk: smooth edges."""
+"""Canvas measured in metres, y up. It is drawn oversampled and shrunk, for smooth edges."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ if TYPE_CHECKING:
     Points = Sequence[Vec2] | Floats
 
 OVERSAMPLING = 2
-"""Drawn this many times larger; with cv2's own anti-aliasing twice is as good as four times."""
+"""Factor of oversampling; with cv2's own anti-aliasing twice is as good as four times."""
 _SHIFT = 4
-"""cv2 takes coordinates in sixteenths of a pixel."""
+"""Fractional bits of cv2's coordinates: sixteenths of a pixel."""
 _FONT = cv2.FONT_HERSHEY_DUPLEX
 _CAP_HEIGHT = 21.0
 """Height of a capital letter of the font at scale 1, pixels."""
 
 
 class Canvas:
-    """A picture of a rectangle of the floor.
+    """Picture of a rectangle of the floor.
 
     Lengths named `_px` are pixels of the finished picture; all others are metres.
 
@@ -57,7 +57,7 @@ class Canvas:
         self.image[:] = background
 
     def finished(self) -> Image:
-        """Return the picture at the size asked for, (h, w, 3) uint8 RGB."""
+        """Return the picture at its final size, (h, w, 3) uint8 RGB."""
         height, width = self.image.shape[:2]
         size = (width // OVERSAMPLING, height // OVERSAMPLING)
         return np.asarray(cv2.resize(self.image, size, interpolation=cv2.INTER_AREA), np.uint8)
@@ -74,7 +74,7 @@ class Canvas:
         return mask
 
     def blend(self, mask: Image, colour: RGB, strength: float) -> None:
-        """Mix a colour into the picture where a mask says so, `strength` in [0, 1]."""
+        """Blend a colour into the picture by a mask (H, W) uint8, `strength` in [0, 1]."""
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
         if len(rows) == 0:
             return
@@ -92,7 +92,7 @@ class Canvas:
         )
 
     def dashes(self, points: Points, colour: RGB, width_px: float, dash_m: float) -> None:
-        """Draw a polyline of dashes with gaps of the same length, running on round corners."""
+        """Draw a dashed polyline; gaps are as long as dashes, which continue round corners."""
         path = np.asarray(points, dtype=np.float64)
         along = 0.0
         for a, b in itertools.pairwise(path):
@@ -109,7 +109,7 @@ class Canvas:
             along += length
 
     def disc(self, centre: Vec2, radius: float, colour: RGB, width_px: float | None = None) -> None:
-        """Fill a disc, or draw a ring where a line width is given."""
+        """Fill a disc, or draw a ring if a line width is given."""
         fixed = self._fixed([centre])[0, 0]
         thickness = cv2.FILLED if width_px is None else max(1, round(width_px * OVERSAMPLING))
         size = round(radius * self.scale * OVERSAMPLING * 2**_SHIFT)
@@ -155,25 +155,25 @@ class Canvas:
         cv2.putText(self.image, text, origin, _FONT, font, colour, thickness, cv2.LINE_AA)
 
     def text_width(self, text: str, height_px: float) -> float:
-        """Return how long a text is, metres."""
+        """Return the width of a text, metres."""
         font = height_px * OVERSAMPLING / _CAP_HEIGHT
         (width, _), _ = cv2.getTextSize(text, _FONT, font, max(1, round(font * 1.2)))
         return float(width) / (self.scale * OVERSAMPLING)
 
     def window(self, low: Vec2, high: Vec2) -> tuple[slice, slice]:
-        """Rows and columns of the oversampled picture that a rectangle covers."""
+        """Return the rows and columns of the oversampled picture that a rectangle covers."""
         corners = self._fixed([low, high])[:, 0].astype(np.float64) / 2**_SHIFT
         height, width = self.image.shape[:2]
         top, bottom = math.floor(corners[1, 1]), math.ceil(corners[0, 1]) + 1
         left, right = math.floor(corners[0, 0]), math.ceil(corners[1, 0]) + 1
-        # Nothing, rather than the picture's other end, for what lies outside.
+        # Negative bounds would wrap to the picture's other end.
         return (
             slice(min(max(0, top), height), min(max(0, bottom), height)),
             slice(min(max(0, left), width), min(max(0, right), width)),
         )
 
     def metres(self, window: tuple[slice, slice]) -> tuple[Floats, Floats]:
-        """Coordinates of a window's pixel centres: x (columns,) and y (rows,), metres."""
+        """Return the coordinates of a window's pixel centres: x (columns,), y (rows,), metres."""
         step = self.scale * OVERSAMPLING
         x = self._low[0] + (np.arange(window[1].start, window[1].stop) + 0.5) / step
         y = self._high[1] - (np.arange(window[0].start, window[0].stop) + 0.5) / step

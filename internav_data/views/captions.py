@@ -1,4 +1,4 @@
-"""What is written below a picture: lines of text and a legend of swatches."""
+"""Captions below a picture: lines of text and a legend of swatches."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ def with_caption(picture: Image, lines: Sequence[str], legend: Sequence[Swatch])
     picture
         (h, w, 3) uint8 RGB.
     lines
-        ASCII text; what is too long for the picture's width is broken at runs of spaces.
+        ASCII text; lines too long for the picture's width are broken at runs of spaces.
     legend
-        Colours and what they mean, set side by side.
+        Colours with their meanings, set side by side.
     """
     width = picture.shape[1]
     measure = Canvas((0.0, 0.0), (float(width), 1.0), width, _PAPER)
     room = width - 2.0 * _EDGE_PX
-    rows = [row for line in lines for row in _broken(measure, line, room)]
-    legend_rows = _arranged(measure, legend, room)
+    rows = [row for line in lines for row in _wrapped(measure, line, room)]
+    legend_rows = _legend_rows(measure, legend, room)
     height = _ROW_PX * (len(rows) + len(legend_rows)) + 10
     strip = Canvas((0.0, 0.0), (float(width), float(height)), max(width, height), _PAPER)
     y = height - _ROW_PX / 2.0 - 2.0
@@ -56,7 +56,7 @@ def with_caption(picture: Image, lines: Sequence[str], legend: Sequence[Swatch])
     return np.asarray(np.vstack([picture, below]), np.uint8)
 
 
-def _broken(measure: Canvas, line: str, room: float) -> list[str]:
+def _wrapped(measure: Canvas, line: str, room: float) -> list[str]:
     rows: list[str] = []
     for piece in line.split("   "):
         joined = f"{rows[-1]}   {piece}" if rows else piece
@@ -67,7 +67,7 @@ def _broken(measure: Canvas, line: str, room: float) -> list[str]:
     return rows
 
 
-def _arranged(
+def _legend_rows(
     measure: Canvas, legend: Sequence[Swatch], room: float
 ) -> list[list[tuple[float, RGB, str]]]:
     rows: list[list[tuple[float, RGB, str]]] = []

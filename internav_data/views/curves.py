@@ -1,4 +1,4 @@
-"""Curves as SVG: lines over a common axis, drawn without any library."""
+"""Line charts as SVG over a common axis, without any library."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ COLOURS: Final = ("#1f6fb4", "#c4246f", "#2c9a5c", "#d98a00", "#6a4fb0", "#7a6a5
 _WIDTH, _HEIGHT = 460, 250
 _LEFT, _RIGHT, _TOP, _BOTTOM = 58, 12, 28, 38
 _TICKS: Final = 5
-_POINTS_AT_MOST: Final = 400
-"""More are thinned: a page is no database."""
+_MAX_POINTS: Final = 400
+"""Maximum number of points of a drawn curve; longer ones are thinned."""
 
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A named line: points (x, y); those that are no numbers are left out."""
+    """Named line of points (x, y); points that are not finite are left out."""
 
     name: str
     points: tuple[tuple[float, float], ...]
 
 
 def curves_svg(title: str, x_name: str, curves: Sequence[Curve]) -> str:
-    """Return an SVG picture of some curves, empty where no point is finite."""
+    """Return an SVG picture of some curves, empty if no point is finite."""
     kept = [Curve(curve.name, _thinned(curve.points)) for curve in curves]
     points = [point for curve in kept for point in curve.points]
     if not points:
@@ -69,7 +69,7 @@ def curves_svg(title: str, x_name: str, curves: Sequence[Curve]) -> str:
 
 def _thinned(points: Sequence[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
     finite = [(x, y) for x, y in points if math.isfinite(x) and math.isfinite(y)]
-    every = -(-len(finite) // _POINTS_AT_MOST)
+    every = -(-len(finite) // _MAX_POINTS)
     return tuple(finite[::every]) if every > 1 else tuple(finite)
 
 

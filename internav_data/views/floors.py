@@ -1,4 +1,4 @@
-"""Floors seen from above: planks, tiles, carpets, each a formula of where a pixel is."""
+"""Floors from above: planks, tiles, carpets, each a formula of a pixel's position."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def _speckle(a: NDArray[np.int64], b: NDArray[np.int64]) -> Floats:
 
 
 def _cells(values: Floats, size: float) -> tuple[NDArray[np.int64], Floats]:
-    """Which cell of a given size a coordinate lies in, and how deep inside it, metres."""
+    """Return the index of the cell with each coordinate, and the depth inside it, metres."""
     index = np.floor(values / size)
     return index.astype(np.int64), values - index * size
 

@@ -1,7 +1,8 @@
-"""Animated GIFs of a few colours a frame: only what changed since the frame before is stored.
+"""Animated GIFs with one palette a frame, in which only changed pixels are stored.
 
-After the GIF89a specification (CompuServe, 1990): blocks, LZW codes of 9 to 12 bits, one palette a
-frame. OpenCV writes whole frames, three to ten times as much.
+After the GIF89a specification (CompuServe 1990): blocks, LZW codes of 9 to 12 bits. Replays take a
+third of the bytes that Pillow needs, as small changes of colour are left out and palettes fit the
+changed pixels alone (docs/decisions.md). OpenCV writes entire frames, three to ten times as much.
 """
 
 from __future__ import annotations
@@ -22,11 +23,11 @@ if TYPE_CHECKING:
     from internav_data.core.typing import Floats, Image
 
 _UNCHANGED: Final = 255
-"""Palette entry of what stays as it is: transparent."""
+"""Palette entry of unchanged pixels: transparent."""
 _TOLERANCE: Final = 6
-"""A colour this near to what is shown (in each of red, green and blue) is left as it is."""
+"""Maximum difference, in each of red, green and blue, of a pixel that counts as unchanged."""
 _CLEAR, _END, _FIRST, _CODES = 256, 257, 258, 4096
-"""LZW: two codes with a meaning, the first free one, and how many there are."""
+"""LZW: the codes for clear and end, the first free code, and the number of codes."""
 
 
 def write_gif(file: BinaryIO, frames: Iterable[Image], fps: float) -> int:
@@ -35,7 +36,7 @@ def write_gif(file: BinaryIO, frames: Iterable[Image], fps: float) -> int:
     Parameters
     ----------
     file
-        Where to, open for writing.
+        Binary file, open for writing.
     frames
         (h, w, 3) uint8 RGB each, all of one size.
     fps
@@ -44,12 +45,12 @@ def write_gif(file: BinaryIO, frames: Iterable[Image], fps: float) -> int:
 
     Returns
     -------
-    How many frames were given.
+    Number of frames that were given.
 
     Raises
     ------
     UsageError
-        Without frames, or with frames of several sizes.
+        No frames, or frames of several sizes.
     """
     shown: Image | None = None
     waiting = b""
@@ -63,13 +64,13 @@ def write_gif(file: BinaryIO, frames: Iterable[Image], fps: float) -> int:
             raise UsageError(f"a GIF's frames are of one size: {shown.shape}, then {frame.shape}")
         if last is None or not np.array_equal(frame, last):
             now = round(100.0 * count / fps)
-            _stay(file, waiting, now - shown_until)
+            _write_frame(file, waiting, now - shown_until)
             waiting, shown_until = _picture(frame, shown, last), now
             last = frame
         count += 1
     if not count:
         raise UsageError("a GIF needs at least one frame")
-    _stay(file, waiting, round(100.0 * count / fps) - shown_until)
+    _write_frame(file, waiting, round(100.0 * count / fps) - shown_until)
     file.write(b";")
     return count
 
@@ -80,8 +81,8 @@ def _begin(file: BinaryIO, shape: tuple[int, ...]) -> None:
     file.write(b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")
 
 
-def _stay(file: BinaryIO, picture: bytes, hundredths: int) -> None:
-    """Write a picture, once it is known how long it stays."""
+def _write_frame(file: BinaryIO, picture: bytes, hundredths: int) -> None:
+    """Write a picture once its duration is known."""
     if picture:
         stay = min(max(hundredths, 2), 65535)
         # Flags: leave the picture where it is, one entry is transparent.
@@ -89,7 +90,7 @@ def _stay(file: BinaryIO, picture: bytes, hundredths: int) -> None:
 
 
 def _picture(frame: Image, shown: Image, last: Image | None) -> bytes:
-    """Encode what changed, and bring `shown` in line with what a viewer will see."""
+    """Encode the changed pixels, and update `shown` (h, w, 3) to the viewer's picture."""
     if last is None:
         changed = np.ones(frame.shape[:2], np.uint8)
     else:
@@ -102,7 +103,7 @@ def _picture(frame: Image, shown: Image, last: Image | None) -> bytes:
     part, mask = np.ascontiguousarray(frame[box]), np.ascontiguousarray(changed[box])
     palette, places = _palette(part, mask)
     indices = np.empty(mask.shape, np.uint8)
-    _assign(part, mask, places, palette, indices, shown[box])
+    _assign_entries(part, mask, places, palette, indices, shown[box])
     head = struct.pack("<BHHHHB", 0x2C, left, top, mask.shape[1], mask.shape[0], 0x87)
     data = _lzw(indices.ravel()).tobytes()
     blocks = (data[k : k + 255] for k in range(0, len(data), 255))
@@ -111,7 +112,7 @@ def _picture(frame: Image, shown: Image, last: Image | None) -> bytes:
 
 
 def _palette(part: Image, mask: Image) -> tuple[Image, NDArray[np.int64]]:
-    """At most 255 colours (256, 3) for the masked pixels, and each coarse colour's entry."""
+    """Return at most 255 colours (256, 3) for masked pixels, and each coarse colour's entry."""
     sums = _coarse(part, mask)
     taken = np.flatnonzero(sums[:, 3])
     colours = sums[taken, :3] / sums[taken, 3:]
@@ -128,7 +129,7 @@ def _palette(part: Image, mask: Image) -> tuple[Image, NDArray[np.int64]]:
 
 @njit(cache=True)
 def _changed(frame: Image, shown: Image, last: Image, tolerance: int) -> Image:
-    """Mark pixels that are others than in the frame before and far from what is shown, (h, w)."""
+    """Return a mask (h, w) of pixels that changed and differ from the viewer's picture."""
     height, width = frame.shape[:2]
     out = np.zeros((height, width), np.uint8)
     for y in range(height):
@@ -160,13 +161,16 @@ def _coarse(part: Image, mask: Image) -> Floats:
 
 
 @njit(cache=True)
-def _split(colours: Floats, weights: Floats, most: int) -> NDArray[np.int64]:
-    """Divide colours into at most so many boxes: always the one of largest spread, at its mean."""
+def _split(colours: Floats, weights: Floats, max_boxes: int) -> NDArray[np.int64]:
+    """Divide colours (n, 3) into boxes: always the one of largest spread, at its mean.
+
+    Heckbert's median cut (1982), but along the axis of largest variance and at the mean.
+    """
     count = len(colours)
     boxes = np.zeros(count, np.int64)
-    means, spreads = np.zeros((most, 3)), np.zeros((most, 3))
-    _measure(colours, weights, boxes, 0, means, spreads)
-    for new in range(1, most):
+    means, spreads = np.zeros((max_boxes, 3)), np.zeros((max_boxes, 3))
+    _measure_box(colours, weights, boxes, 0, means, spreads)
+    for new in range(1, max_boxes):
         widest = np.argmax(spreads[:new])
         box, axis = widest // 3, widest % 3
         if spreads[box, axis] <= 0.0:
@@ -174,17 +178,17 @@ def _split(colours: Floats, weights: Floats, most: int) -> NDArray[np.int64]:
         for k in range(count):
             if boxes[k] == box and colours[k, axis] > means[box, axis]:
                 boxes[k] = new
-        _measure(colours, weights, boxes, box, means, spreads)
-        _measure(colours, weights, boxes, new, means, spreads)
+        _measure_box(colours, weights, boxes, box, means, spreads)
+        _measure_box(colours, weights, boxes, new, means, spreads)
     return boxes
 
 
 @njit(cache=True)
-def _measure(
+def _measure_box(
     colours: Floats, weights: Floats, boxes: NDArray[np.int64], box: int,
     means: Floats, spreads: Floats,
 ) -> None:  # fmt: skip
-    """Mean colour of a box, and summed squares about it; no spread where it cannot be split."""
+    """Write a box's mean colour and the squares about it, 0 along axes without a split."""
     total, first, second = 0.0, np.zeros(3), np.zeros(3)
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for k in range(len(colours)):
@@ -204,11 +208,11 @@ def _measure(
 
 
 @njit(cache=True)
-def _assign(
+def _assign_entries(
     part: Image, mask: Image, places: NDArray[np.int64], palette: Image,
     indices: Image, shown: Image,
 ) -> None:  # fmt: skip
-    """Write each pixel's palette entry, and what a viewer then shows."""
+    """Write each pixel's palette entry (h, w) and the viewer's picture (h, w, 3)."""
     for y in range(mask.shape[0]):
         for x in range(mask.shape[1]):
             if not mask[y, x]:
@@ -222,7 +226,7 @@ def _assign(
 
 
 @njit(cache=True)
-def _put(out: Image, state: NDArray[np.int64], code: int) -> None:
+def _append_code(out: Image, state: NDArray[np.int64], code: int) -> None:
     """Append a code; `state` is bits written, the next free code, bits a code."""
     bit, size = state[0], state[2]
     for k in range(size):
@@ -242,7 +246,7 @@ def _lzw(pixels: Image) -> Image:
     out = np.zeros(count * 12 // 8 + count // 512 + 64, np.uint8)
     table = np.zeros((_CODES, 256), np.int16)
     state = np.array([0, _FIRST, 9])
-    _put(out, state, _CLEAR)
+    _append_code(out, state, _CLEAR)
     prefix = int(pixels[0])
     for n in range(1, count):
         pixel = int(pixels[n])
@@ -250,15 +254,15 @@ def _lzw(pixels: Image) -> Image:
         if longer:
             prefix = longer
             continue
-        _put(out, state, prefix)
+        _append_code(out, state, prefix)
         if state[1] < _CODES - 1:
             table[prefix, pixel] = state[1]
             state[1] += 1
         else:
-            _put(out, state, _CLEAR)
+            _append_code(out, state, _CLEAR)
             table[:] = 0
             state[1], state[2] = _FIRST, 9
         prefix = pixel
-    _put(out, state, prefix)
-    _put(out, state, _END)
+    _append_code(out, state, prefix)
+    _append_code(out, state, _END)
     return out[: (state[0] + 7) >> 3]

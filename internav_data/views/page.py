@@ -1,4 +1,4 @@
-"""An HTML page in one file: nothing is fetched when it is opened, no script runs in it."""
+"""HTML page in one file: it fetches nothing and runs no script."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ svg .left,svg .name{text-anchor:end}svg .below{text-anchor:middle}
 
 
 class Page:
-    """Headings, words, tables and pictures, one after the other."""
+    """Page of headings, paragraphs, tables and pictures in order."""
 
     def __init__(self, title: str) -> None:
         self._title = html.escape(title)
@@ -66,20 +66,21 @@ class Page:
         Parameters
         ----------
         groups
-            Headings that span so many columns each; the first column has none. May be empty.
+            Headings, each with the number of columns it spans; the first column has none. May be
+            empty.
         headings
-            Of all columns.
+            Headings of all columns.
         rows
-            A word for how each row is shown (ours, oracle, paper), and its cells.
+            CSS class of each row (ours, oracle, paper), and its cells.
         """
-        said = ['<div class="wide"><table><thead>']
+        text = ['<div class="wide"><table><thead>']
         if groups:
             spans = "".join(f'<th colspan="{n}">{html.escape(text)}</th>' for text, n in groups)
-            said.append(f'<tr class="first"><th></th>{spans}</tr>')
-        said.append(_cells("th", headings, ""))
-        said.append("</thead><tbody>")
-        said += [_cells("td", cells, kind) for kind, cells in rows]
-        self._parts.append("".join([*said, "</tbody></table></div>"]))
+            text.append(f'<tr class="first"><th></th>{spans}</tr>')
+        text.append(_cells("th", headings, ""))
+        text.append("</thead><tbody>")
+        text += [_cells("td", cells, kind) for kind, cells in rows]
+        self._parts.append("".join([*text, "</tbody></table></div>"]))
 
     def curves(self, pictures: Sequence[str]) -> None:
         """Lay out SVG pictures (of `curves_svg`) side by side; empty ones are left out."""
@@ -87,7 +88,7 @@ class Page:
         self._parts.append(f'<div class="row">{shown}</div>')
 
     def pictures(self, captioned: Sequence[tuple[Image, str]]) -> None:
-        """Lay out pictures (h, w, 3) uint8 RGB side by side, words below each."""
+        """Lay out pictures (h, w, 3) uint8 RGB side by side, a caption below each."""
         shown = "".join(
             f'<figure><img alt="{html.escape(text)}" src="data:image/png;base64,{_png(image)}">'
             f"<figcaption>{html.escape(text)}</figcaption></figure>"
@@ -96,7 +97,7 @@ class Page:
         self._parts.append(f'<div class="row">{shown}</div>')
 
     def text(self) -> str:
-        """Return the whole page."""
+        """Return the HTML of the page."""
         return (
             '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
             '<meta name="viewport" content="width=device-width,initial-scale=1">'
@@ -106,7 +107,7 @@ class Page:
         )
 
     def write(self, path: Path) -> None:
-        """Write the page; the file appears whole or not at all."""
+        """Write the page atomically."""
         write_atomically(path, self.text().encode())
 
 

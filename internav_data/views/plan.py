@@ -1,4 +1,4 @@
-"""Houses and episodes from above: what `internav-gen show` draws, after the paper's figure 4."""
+"""Houses from above, as `internav-gen show` draws them after the paper's figure 4."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from internav_data.geometry import HIGHEST_M
 from internav_data.views.canvas import OVERSAMPLING, Canvas
 from internav_data.views.captions import with_caption
 from internav_data.views.floors import paint_floor
-from internav_data.views.silhouettes import outlines, paint
+from internav_data.views.silhouettes import paint, silhouettes
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -35,7 +35,7 @@ _MARGIN_M = 0.75
 _WALL_M = 0.12
 _RUG_M = 0.05
 _OVERHEAD_M = 1.95
-"""What hangs wholly above this is left out: it would hide what stands below."""
+"""Height above which a hanging object is left out: it would hide those below."""
 
 
 def draw_house(house: House, *, pixels: int = 900, caption: bool = True) -> Image:
@@ -44,11 +44,11 @@ def draw_house(house: House, *, pixels: int = 900, caption: bool = True) -> Imag
     Parameters
     ----------
     house
-        What to draw; `house.assets` says what its things are made of.
+        The house; `house.assets` holds the assets of its objects.
     pixels
         Longer side of the plan; the caption is added below it.
     caption
-        Whether to say below which house this is.
+        Whether to add a line that names the house.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def draw_house(house: House, *, pixels: int = 900, caption: bool = True) -> Imag
 
 
 def house_line(house: House) -> str:
-    """Return one line about a house, as written below its picture."""
+    """Return the caption of a house's picture, one line."""
     count = len(house.rooms)
     rooms = "1 room" if count == 1 else f"{count} rooms"
     parts = [house.scene_id, rooms, f"{house.area_m2:.0f} m2", f"{len(house.objects)} things"]
@@ -81,25 +81,25 @@ def house_canvas(house: House, pixels: int) -> Canvas:
 def paint_house(
     canvas: Canvas,
     house: House,
-    on_way: Collection[int] | None = None,
+    on_path: Collection[int] | None = None,
     *,
     scale_at: Vec2 | None = None,
 ) -> None:
-    """Paint floors, shadows, things, walls, windows and doors, in this order; then a scale.
+    """Paint floors, shadows, objects, walls, windows and doors, in this order; then a scale.
 
-    Where rooms `on_way` are given these are tinted, and the other rooms' floors pale. The scale's
-    lower left corner is below the house's, or at `scale_at`.
+    With `on_path`, these rooms are tinted and the other rooms' floors pale. The scale's lower left
+    corner is below the house's, or at `scale_at`.
     """
     for room in house.rooms:
         paint_floor(canvas, house, room)
     for room in house.rooms:
-        if on_way is not None:
-            colour, strength = (TINT, 0.13) if room.room_id in on_way else (PAPER, 0.55)
+        if on_path is not None:
+            colour, strength = (TINT, 0.13) if room.room_id in on_path else (PAPER, 0.55)
             canvas.blend(canvas.mask([room.polygon]), colour, strength)
     seen = [
         outline
-        for thing in house.objects
-        for outline in outlines(house.assets[thing.asset_id], thing.pose)
+        for object_ in house.objects
+        for outline in silhouettes(house.assets[object_.asset_id], object_.pose)
         if outline.low_m < _OVERHEAD_M
     ]
     solid = [_rectangle(w) for w in house.walls if w.z_min < HIGHEST_M and w.z_max > HIGHEST_M]
@@ -200,7 +200,7 @@ def _paint_scale(canvas: Canvas, at: Vec2) -> None:
 
 
 def paint_labels(canvas: Canvas, house: House, taken: Sequence[Floats]) -> None:
-    """Write each room's name and area where it hides least.
+    """Write each room's name and area where they hide least.
 
     Parameters
     ----------
@@ -211,8 +211,8 @@ def paint_labels(canvas: Canvas, house: House, taken: Sequence[Floats]) -> None:
     """
     seen = [
         o
-        for thing in house.objects
-        for o in outlines(house.assets[thing.asset_id], thing.pose)
+        for object_ in house.objects
+        for o in silhouettes(house.assets[object_.asset_id], object_.pose)
         if o.low_m < _OVERHEAD_M
     ]
     blocked = canvas.mask([*(o.plan for o in seen if o.top_m > _RUG_M), *taken])
@@ -236,13 +236,13 @@ def _label_room(canvas: Canvas, room: Room, blocked: Image) -> None:
         max(canvas.text_width(name, height), canvas.text_width(area, height * 0.8)),
         3.2 * height / canvas.scale,
     )
-    at = _quietest(free.astype(np.float32), x, y, size)
+    at = _clearest(free.astype(np.float32), x, y, size)
     gap = 0.85 * height / canvas.scale
     canvas.text((at[0], at[1] + gap), name, height, _LABEL, halo=PAPER)
     canvas.text((at[0], at[1] - gap), area, height * 0.8, _LABEL, halo=PAPER)
 
 
-def _quietest(free: NDArray[np.float32], x: Floats, y: Floats, size: Vec2) -> Vec2:
+def _clearest(free: NDArray[np.float32], x: Floats, y: Floats, size: Vec2) -> Vec2:
     """Return the centre of the box of a given size that covers most free floor."""
     step = abs(float(x[1] - x[0]))
     box = (max(1, round(size[0] / step)) | 1, max(1, round(size[1] / step)) | 1)

@@ -1,6 +1,7 @@
-"""Replays: the agent's camera beside the map, what it does in words, as frames of a film.
+"""Replays: frames of a video with the agent's camera, the map, and each action in words.
 
-A story cut into shots: what each picture of a replay shows, and for how many frames.
+`replay_story` plays an episode and cuts it into shots, `replay_painters` draws the parts of a
+frame, and `Replay` puts them together.
 """
 
 from __future__ import annotations
@@ -11,8 +12,14 @@ from typing import TYPE_CHECKING, Final, Self
 import numpy as np
 
 from internav_data.records.errors import UsageError
-from internav_data.views.replay_panels import EyePainter, Footer, Header, MapPainter, title_card
-from internav_data.views.replay_story import Moment, Shot, Story, played, shots
+from internav_data.views.replay_painters import (
+    CameraPainter,
+    Footer,
+    Header,
+    MapPainter,
+    title_card,
+)
+from internav_data.views.replay_story import Moment, Shot, Story, play, shots
 from internav_data.world import HouseModel
 
 if TYPE_CHECKING:
@@ -28,20 +35,21 @@ SIZE: Final = 480
 """Pixels a side of the camera's picture."""
 FPS: Final = 12.0
 DEFAULTS: Final = {"mp4": (SIZE, FPS), "gif": (360, 8.0)}
-"""Camera size and frames a second by kind of film; GIFs are smaller, as they hold more bytes."""
+"""Camera size and frames a second by kind of video; GIFs are smaller, as they hold more bytes."""
 SIZES: Final = (160, 1080)
-"""Smallest and largest camera picture a replay is made of."""
+"""Smallest and largest size of the camera's picture."""
 _PAPER: Final[RGB] = (250, 249, 246)
 _EDGE: Final = 0.02
-"""Gaps, as a share of the camera's picture."""
+"""Gaps between pictures, as a share of the camera's picture."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Replay:
-    """An episode played, ready to be drawn."""
+    """A played episode, ready to be drawn."""
 
     story: Story
     title: str
+    """Name of the policy, for the title card."""
 
     @classmethod
     def of(
@@ -52,27 +60,33 @@ class Replay:
         actions: Sequence[int] | None = None,
         *,
         title: str | None = None,
-        model: PushModel = "force",
+        push_model: PushModel = "force",
     ) -> Self:
-        """Play an episode; draw it later, as often as wanted. Parameters as in `replay_frames`."""
-        stage = house if isinstance(house, HouseModel) else HouseModel.of(house)
+        """Play an episode, to draw it any number of times; parameters as in `replay_frames`."""
+        model = house if isinstance(house, HouseModel) else HouseModel.of(house)
         who = title or ("expert" if actions is None else "given actions")
-        return cls(played(stage, episode, assets, actions, model), who)
+        return cls(play(model, episode, assets, actions, push_model), who)
 
     @property
     def success(self) -> bool:
-        """Whether it ends with Done at the goal."""
+        """Whether the episode ends with Done at the goal."""
         return self.story.success
 
     @property
     def steps(self) -> int:
-        """How many actions were played."""
+        """Number of actions that were played."""
         return self.story.moments[-1].step
 
     def frames(
         self, *, size: int = SIZE, fps: float = FPS, panel: Panel | None = None
     ) -> Iterator[Image]:
-        """Draw it; see `replay_frames`."""
+        """Draw the replay; parameters and frames as in `replay_frames`.
+
+        Raises
+        ------
+        UsageError
+            The size or the rate is out of bounds, or the panel is not a picture of that size.
+        """
         if not SIZES[0] <= size <= SIZES[1]:
             raise UsageError(
                 f"a replay's camera has {SIZES[0]} to {SIZES[1]} pixels a side, got {size}"
@@ -101,29 +115,29 @@ def replay_frames(
     fps: float = FPS,
     panel: Panel | None = None,
     title: str | None = None,
-    model: PushModel = "force",
+    push_model: PushModel = "force",
 ) -> Iterator[Image]:
     """Play an episode and draw it: camera, map, words.
 
     Parameters
     ----------
     house
-        The episode's house, or the stage made of it.
+        The episode's house or its model.
     episode, assets
-        What to play, and what its obstacles are made of, by asset_id.
+        The episode, and the assets of its obstacles by asset_id.
     actions
         Numbers of the twelve actions; -1 waits. The stored expert's by default.
     size
         Pixels a side of the camera's picture.
     fps
-        Frames a second that the film will have: moves and slides are drawn in between.
+        Frames a second of the video: moves and slides are drawn in between.
     panel
-        Called once for each moment (the start, then after each action); returns a picture
-        (size, w, 3) uint8 RGB of always the same width, drawn beside the map.
+        Function that is called once for each moment (the start, then after each action) and
+        returns a picture (size, w, 3) uint8 RGB of constant width, drawn beside the map.
     title
-        Who acts, for the title.
-    model
-        How pushes are answered: "force" or "kick".
+        Name of the policy, for the title card.
+    push_model
+        Physics of pushes: "force" or "kick".
 
     Yields
     ------
@@ -134,16 +148,16 @@ def replay_frames(
     UsageError
         No expert, an unknown action, another house's episode, a size or rate out of bounds.
     """
-    made = Replay.of(house, episode, assets, actions, title=title, model=model)
+    made = Replay.of(house, episode, assets, actions, title=title, push_model=push_model)
     return made.frames(size=size, fps=fps, panel=panel)
 
 
 class _Painter:
-    """Puts the pictures of a shot together."""
+    """Composer of a frame from the pictures of a shot."""
 
     def __init__(self, story: Story, size: int, panel: Panel | None) -> None:
         self._size, self._gap = size, max(4, 2 * round(size * _EDGE / 2.0))
-        self._eye, self._map = EyePainter(story, size), MapPainter(story, size)
+        self._camera_painter, self._map = CameraPainter(story, size), MapPainter(story, size)
         self._panel, self._beside = panel, self._side(story.moments[0], panel)
         self._moment = story.moments[0]
         width = size + self._map.size[0] + 3 * self._gap
@@ -170,7 +184,7 @@ class _Painter:
         frame, gap = self._blank.copy(), self._gap
         if self._panel is not None and shot.moment is not self._moment:
             self._beside, self._moment = self._side(shot.moment, self._panel), shot.moment
-        pictures = [self._eye.draw(shot) if card is None else card, self._map.draw(shot)]
+        pictures = [self._camera_painter.draw(shot) if card is None else card, self._map.draw(shot)]
         if self._beside is not None:
             pictures.append(self._beside)
         top, left = self._header.height, gap

@@ -1,4 +1,4 @@
-"""Action lists in small files: what `internav-gen replay --actions` reads."""
+"""Action lists in JSON files, as `internav-gen replay --actions` reads them."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Final
 
 from internav_data.records.errors import UsageError
-from internav_data.views.replay_story import ACTIONS_AT_MOST
+from internav_data.views.replay_story import MAX_ACTIONS
 from internav_data.world import ACTION_COUNT, ACTIONS, Action
 
-_BYTES_AT_MOST: Final = 1_000_000
+_MAX_BYTES: Final = 1_000_000
 _KEYS: Final = {"episode_id", "actions"}
 _NAMES: Final = {action.name.replace("_", "").lower(): action for action in Action}
 _EXAMPLE: Final = '["MoveAhead", "PushAhead", 0, 11] or {"episode_id": ..., "actions": [...]}'
@@ -19,18 +19,20 @@ _EXAMPLE: Final = '["MoveAhead", "PushAhead", 0, 11] or {"episode_id": ..., "act
 
 @dataclass(frozen=True, slots=True)
 class ActionList:
-    """Actions, and of which episode they are, where the file says so."""
+    """Actions of an episode."""
 
     episode_id: str | None
+    """Id of the episode, None if the file names none."""
     actions: tuple[int, ...]
+    """Numbers of `Action`; -1 waits."""
 
 
 def read_actions(path: Path) -> ActionList:
     """Read actions from a JSON file.
 
-    A list of actions, or an object of `actions` and (if wanted) the `episode_id` they are for. An
-    action is its number (0 MoveAhead to 11 Done; -1 waits) or its name: MoveAhead, move_ahead and
-    MOVE_AHEAD are one.
+    The file holds a list of actions, or an object with `actions` and, optionally, their
+    `episode_id`. An action is its number (0 MoveAhead to 11 Done; -1 waits) or its name:
+    MoveAhead, move_ahead and MOVE_AHEAD are one.
 
     Raises
     ------
@@ -40,11 +42,11 @@ def read_actions(path: Path) -> ActionList:
     path = Path(path)
     try:
         with path.open("rb") as file:
-            raw = file.read(_BYTES_AT_MOST + 1)
+            raw = file.read(_MAX_BYTES + 1)
     except OSError as error:
         raise UsageError(f"{path}: cannot be read: {error.strerror}") from error
-    if len(raw) > _BYTES_AT_MOST:
-        raise UsageError(f"{path}: too large for a list of actions: over {_BYTES_AT_MOST} bytes")
+    if len(raw) > _MAX_BYTES:
+        raise UsageError(f"{path}: too large for a list of actions: over {_MAX_BYTES} bytes")
     try:
         data = json.loads(raw.decode("utf-8"))
     except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
@@ -59,8 +61,8 @@ def read_actions(path: Path) -> ActionList:
             raise UsageError(f"{path}: episode_id: expected a string, got {episode_id!r}")
     if not isinstance(data, list):
         raise UsageError(f"{path}: expected a list of actions, as in {_EXAMPLE}")
-    if not 0 < len(data) <= ACTIONS_AT_MOST:
-        raise UsageError(f"{path}: {len(data)} actions; expected 1 to {ACTIONS_AT_MOST}")
+    if not 0 < len(data) <= MAX_ACTIONS:
+        raise UsageError(f"{path}: {len(data)} actions; expected 1 to {MAX_ACTIONS}")
     return ActionList(episode_id, tuple(_action(path, k, entry) for k, entry in enumerate(data)))
 
 

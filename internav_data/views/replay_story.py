@@ -1,4 +1,4 @@
-"""The story of a replay: an episode after each action, cut into shots with a sentence each."""
+"""Story of a replay: the states of an episode after each action, cut into captioned shots."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ if TYPE_CHECKING:
     from internav_data.world import StepResult
 
 
-ACTIONS_AT_MOST: Final = 10_000
-"""No longer list is played."""
+MAX_ACTIONS: Final = 10_000
+"""Maximum length of an action list."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moment:
-    """An episode after so many actions.
+    """State of an episode after some actions.
 
     Attributes
     ----------
     step
-        How many actions were done; 0 is the start.
+        Number of actions so far; 0 is the start.
     total
-        How many there are.
+        Number of all actions.
     world
         The state. Not to be changed.
     result
-        What the last action did; None at the start.
+        Result of the last action; None at the start.
     steps
-        Lattice distance from the agent to the goal, things as they lie; None when cut off.
+        Lattice distance from the agent to the goal, objects as they lie; None when cut off.
     """
 
     step: int
@@ -48,57 +48,57 @@ class Moment:
     steps: int | None
 
     def pose(self, item: int) -> Pose | None:
-        """Return where a thing lies; None while it is held."""
+        """Return the pose of an item; None while it is held."""
         return self.world.items[item].pose
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Story:
-    """An episode played: `moments[k]` is after k actions."""
+    """A played episode: `moments[k]` is its state after k actions."""
 
     episode: Episode
-    stage: HouseModel
+    model: HouseModel
     moments: tuple[Moment, ...]
     moved: tuple[int, ...]
-    """Furniture (indices of the stage's items) that lies elsewhere at some time."""
+    """Furniture (indices of the model's items) that is moved in this story."""
 
     @property
     def results(self) -> list[StepResult]:
-        """What each action did."""
+        """Results of the actions, in order."""
         return [m.result for m in self.moments if m.result is not None]
 
     @property
     def success(self) -> bool:
-        """Whether it ends with Done at the goal."""
+        """Whether the episode ends with Done at the goal."""
         last = self.moments[-1].result
         return last is not None and last.action == Action.DONE and last.success
 
     def name(self, item: int) -> str:
-        """Return a thing's type, an obstacle's with its number in the episode."""
-        first = len(self.stage.items)
+        """Return an item's type; an obstacle's has its number in the episode."""
+        first = len(self.model.items)
         kind = self.moments[0].world.items[item].asset.type
         return f"{kind} {item - first + 1}" if item >= first else kind
 
 
-def played(
-    stage: HouseModel,
+def play(
+    model: HouseModel,
     episode: Episode,
     assets: Mapping[str, Asset],
     actions: Sequence[int] | None = None,
-    model: PushModel = "force",
+    push_model: PushModel = "force",
 ) -> Story:
     """Play actions from an episode's start; those of its expert by default.
 
     Parameters
     ----------
-    stage
-        The episode's house.
-    episode, assets
-        What to play, and what its obstacles are made of, by asset_id.
-    actions
-        Numbers of `Action`; -1 waits, as in an environment. What follows a Done is not played.
     model
-        How pushes are answered.
+        Model of the episode's house.
+    episode, assets
+        The episode, and the assets of its obstacles by asset_id.
+    actions
+        Numbers of `Action`; -1 waits, as in an environment. Actions after a Done are ignored.
+    push_model
+        Physics of pushes: "force" or "kick".
 
     Raises
     ------
@@ -112,28 +112,28 @@ def played(
                 "internav_data.planner.search.expert_of_episode"
             )
         actions = episode.expert.actions
-    if len(actions) > ACTIONS_AT_MOST:
-        raise UsageError(f"{len(actions)} actions: at most {ACTIONS_AT_MOST} are played")
+    if len(actions) > MAX_ACTIONS:
+        raise UsageError(f"{len(actions)} actions: at most {MAX_ACTIONS} are played")
     missing = [o.asset_id for o in episode.obstacles if o.asset_id not in assets]
     if missing:
         raise UsageError(
             f"{episode.episode_id}: obstacle {missing[0]}: its asset is not known; pass the "
             "dataset's assets or the catalogue that the episode was made with"
         )
-    world = World.of_episode(stage, episode, assets, model)
-    chosen = [Action(action) for action in _known(actions)]
+    world = World.of_episode(model, episode, assets, push_model)
+    chosen = [Action(action) for action in _checked(actions)]
     if Action.DONE in chosen:
         chosen = chosen[: chosen.index(Action.DONE) + 1]
     moments = [Moment(0, len(chosen), world.copy(), None, world.steps())]
     for k, action in enumerate(chosen, 1):
         result = world.step(action)
         moments.append(Moment(k, len(chosen), world.copy(), result, world.steps()))
-    home = range(len(stage.items))
-    moved = [k for k in home if any(m.world.items[k] is not stage.items[k] for m in moments)]
-    return Story(episode, stage, tuple(moments), tuple(moved))
+    home = range(len(model.items))
+    moved = [k for k in home if any(m.world.items[k] is not model.items[k] for m in moments)]
+    return Story(episode, model, tuple(moments), tuple(moved))
 
 
-def _known(actions: Sequence[int]) -> Sequence[int]:
+def _checked(actions: Sequence[int]) -> Sequence[int]:
     for k, action in enumerate(actions):
         if not Action.WAIT <= action < ACTION_COUNT:
             raise UsageError(
@@ -143,8 +143,8 @@ def _known(actions: Sequence[int]) -> Sequence[int]:
     return actions
 
 
-def sentence(story: Story, moment: Moment) -> str:
-    """Say in words what the last action did, or why it failed."""
+def describe(story: Story, moment: Moment) -> str:
+    """Describe the effect of the last action in words, or the reason of its failure."""
     result = moment.result
     if result is None:
         return "start"
@@ -153,13 +153,13 @@ def sentence(story: Story, moment: Moment) -> str:
     if not result.success:
         return f"{words}{target} failed: {result.reason}"
     if action.kind == "push":
-        said = f"{words}: {target.strip()} slid {result.displacement_m:.2f} m"
+        text = f"{words}: {target.strip()} slid {result.displacement_m:.2f} m"
         if result.toppled:
-            said += ", fell over"
+            text += ", fell over"
         others = len(result.moved) - 1
         if others:
-            said += f", moved {others} other thing{'s' if others > 1 else ''}"
-        return said + _opened(story, moment)
+            text += f", moved {others} other thing{'s' if others > 1 else ''}"
+        return text + _opened(story, moment)
     if action.kind in INTERACTION_KINDS:
         return f"{words}{target}{_opened(story, moment)}"
     if action == Action.DONE:
@@ -168,7 +168,7 @@ def sentence(story: Story, moment: Moment) -> str:
 
 
 def _opened(story: Story, moment: Moment) -> str:
-    """Say whether the last action opened or closed the way."""
+    """Describe whether the last action opened or closed the path to the goal."""
     before = story.moments[moment.step - 1].steps
     if before is None and moment.steps is not None:
         return " - the way is open"
@@ -185,7 +185,7 @@ TITLE_S: Final = 1.5
 END_S: Final = 1.5
 
 _AIM_S: Final = 0.4
-"""What is about to be pushed or picked up is pointed out for so long."""
+"""Duration for which the target of an interaction is highlighted beforehand."""
 
 _SLIDE_S: Final = 0.5
 
@@ -198,24 +198,24 @@ Mood = Literal["plain", "good", "bad"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shot:
-    """One picture: the state between two moments, and what is said about it.
+    """One picture: a state between two moments, with its caption.
 
     Attributes
     ----------
     frames
-        How many frames it stays.
+        Number of frames for which it is shown.
     moment
-        The moment it belongs to: the one after the action that is being done.
+        The moment after the action that is being executed.
     x, y, yaw_deg, horizon_deg
-        The eye: metres, degrees.
+        Camera pose: metres, degrees.
     poses
-        Where things lie that move in this story, by item; None while held.
+        Poses of the objects that move in this story, by item; None while held.
     trail
-        Nodes the agent stood on, and where it is; metres.
+        Nodes on which the agent stood, and its position; metres.
     text, mood
-        What is said, and how it is coloured.
+        Caption, and the mood that decides its colour.
     target
-        Item to point out, or -1.
+        Item to highlight, or -1.
     steps
         Lattice distance to the goal; None when cut off.
     """
@@ -235,18 +235,18 @@ class Shot:
 
 
 def shots(story: Story, fps: float) -> Iterator[Shot]:
-    """Cut a story into shots at so many frames a second.
+    """Cut a story into shots for a video of `fps` frames a second.
 
-    The first is for the title, the last for the end.
+    The first shows the title card, the last the end.
     """
     first = story.moments[0]
     title = f"{first.total} action{'' if first.total == 1 else 's'} to come"
     yield _still(story, first, _frames(TITLE_S, fps), title)
     for before, after in zip(story.moments, story.moments[1:], strict=False):
-        yield from _acted(story, before, after, fps)
+        yield from _action_shots(story, before, after, fps)
     last = story.moments[-1]
     if story.success:
-        yield _still(story, last, _frames(END_S, fps), sentence(story, last), "good")
+        yield _still(story, last, _frames(END_S, fps), describe(story, last), "good")
     else:
         text = f"ended after {last.total} actions, not done at the goal"
         yield _still(story, last, _frames(END_S, fps), text, "bad")
@@ -256,11 +256,11 @@ def _frames(seconds: float, fps: float) -> int:
     return max(1, round(seconds * fps))
 
 
-def _acted(story: Story, before: Moment, after: Moment, fps: float) -> Iterator[Shot]:
+def _action_shots(story: Story, before: Moment, after: Moment, fps: float) -> Iterator[Shot]:
     result = after.result
     if result is None:
         return
-    text = sentence(story, after)
+    text = describe(story, after)
     if not result.success:
         frames = _frames(_RESULT_S, fps)
         yield _still(story, after, frames, text, "bad", result.target)
@@ -277,7 +277,7 @@ def _acted(story: Story, before: Moment, after: Moment, fps: float) -> Iterator[
     else:
         count = _frames(1.0 / PACE, fps)
         for k in range(1, count + 1):
-            yield _between(story, before, after, k / count, text)
+            yield _in_motion(story, before, after, k / count, text)
 
 
 def _still(
@@ -289,7 +289,7 @@ def _still(
     target: int = -1,
     shown: Moment | None = None,
 ) -> Shot:
-    """Show a moment; or, while its action is being announced, the one before."""
+    """Return a shot of a moment, or of the one before while its action is announced."""
     state = shown or moment
     world = state.world
     return Shot(
@@ -320,8 +320,8 @@ def _trail(story: Story, step: int) -> tuple[Vec2, ...]:
     return tuple(points)
 
 
-def _between(story: Story, before: Moment, after: Moment, share: float, text: str) -> Shot:
-    """Show a move, a turn or a look under way."""
+def _in_motion(story: Story, before: Moment, after: Moment, share: float, text: str) -> Shot:
+    """Return a shot within a move, a turn or a look; `share` of it is done."""
     old, new = before.world, after.world
     x = SPACING_M * (old.i + share * (new.i - old.i))
     y = SPACING_M * (old.j + share * (new.j - old.j))
@@ -345,7 +345,7 @@ def _between(story: Story, before: Moment, after: Moment, share: float, text: st
 def _slide(
     story: Story, before: Moment, after: Moment, result: StepResult, fps: float
 ) -> Iterator[Shot]:
-    """Show things on their way; in a straight line, slower towards the end."""
+    """Yield shots of sliding objects: straight lines, slower towards the end."""
     count = _frames(_SLIDE_S, fps)
     still = _still(story, after, 1, "", "plain", result.target, shown=before)
     text = f"{result.action.words}: {story.name(result.target)}"
@@ -354,7 +354,7 @@ def _slide(
         poses = dict(still.poses)
         for item, pose in result.moved:
             begin = poses[item]
-            poses[item] = pose if begin is None else _mixed(begin, pose, share)
+            poses[item] = pose if begin is None else _interpolated(begin, pose, share)
         yield Shot(
             frames=1,
             moment=after,
@@ -371,8 +371,8 @@ def _slide(
         )
 
 
-def _mixed(begin: Pose, end: Pose, share: float) -> Pose:
-    """Return a pose between two, the shorter way round."""
+def _interpolated(begin: Pose, end: Pose, share: float) -> Pose:
+    """Return a pose between two, by the shorter rotation."""
     a, b = begin.quaternion, end.quaternion
     sign = 1.0 if sum(p * q for p, q in zip(a, b, strict=True)) >= 0.0 else -1.0
     x, y, z, w = (p + share * (sign * q - p) for p, q in zip(a, b, strict=True))

@@ -1,4 +1,4 @@
-"""Pictures side by side, and pictures on disk."""
+"""Contact sheets of pictures, and pictures on disk."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def contact_sheet(
     Raises
     ------
     UsageError
-        Without pictures or columns, or with another number of labels than pictures.
+        No pictures, no columns, or another number of labels than pictures.
     """
     if not images or columns < 1:
         raise UsageError(
@@ -79,12 +79,12 @@ def _label(text: str, width: int) -> Image:
 
 
 def write_png(path: Path, image: Image) -> None:
-    """Write an RGB picture; the file appears whole or not at all.
+    """Write an RGB picture (h, w, 3) uint8 atomically as PNG.
 
     Raises
     ------
     InternavError
-        If the file cannot be written.
+        The file cannot be written.
     """
     path = Path(path)
     good, data = cv2.imencode(".png", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))

@@ -1,4 +1,4 @@
-"""Things seen from above: every part's own polyhedron, shaded by how its faces lie in the light."""
+"""Objects from above: the polyhedron of every part, its faces shaded by Lambert's law."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 
 _LIGHT = np.array([-0.42, 0.38, 0.82]) / math.sqrt(0.42**2 + 0.38**2 + 0.82**2)
 _AMBIENT = 0.5
-"""Share of light that comes from everywhere."""
+"""Share of ambient light."""
 _UPWARD = 0.02
-"""Faces that look up less than this are not seen from above."""
+"""Minimum z of the normal of a face that is visible from above."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Outline:
-    """One part as it is seen from above.
+class Silhouette:
+    """Silhouette of one part, seen from above.
 
     Shapes: plan (n, 2), faces (m, 3, 2), shades (m,); metres, brightness 1 for a level face.
     """
@@ -46,7 +46,7 @@ class Outline:
 
 @lru_cache(maxsize=16384)
 def _facets(part: Part) -> tuple[Floats, NDArray[np.int64], Floats]:
-    """Corners (n, 3), triangles (m, 3) and outward normals (m, 3) in the asset's frame."""
+    """Return corners (n, 3), triangles (m, 3) and outward normals (m, 3), the asset's frame."""
     corners = part_corners(part)
     try:
         hull = ConvexHull(corners)
@@ -60,8 +60,8 @@ def _plan(points: Floats) -> Floats:
     return np.asarray(hull, dtype=np.float64)
 
 
-def outlines(asset: Asset, pose: Pose) -> list[Outline]:
-    """Return an asset's parts at a pose as they are seen from above."""
+def silhouettes(asset: Asset, pose: Pose) -> list[Silhouette]:
+    """Return the silhouettes of an asset's parts at a pose."""
     matrix = rotation_matrix(pose.quaternion)
     found = []
     for part in asset.parts:
@@ -71,7 +71,7 @@ def outlines(asset: Asset, pose: Pose) -> list[Outline]:
         seen = turned[:, 2] > _UPWARD
         lambert = np.maximum(turned[seen] @ _LIGHT, 0.0) / _LIGHT[2]
         found.append(
-            Outline(
+            Silhouette(
                 plan=_plan(moved[:, :2]),
                 faces=moved[triangles[seen]][:, :, :2],
                 shades=_AMBIENT + (1.0 - _AMBIENT) * lambert,
@@ -84,24 +84,24 @@ def outlines(asset: Asset, pose: Pose) -> list[Outline]:
 
 
 def shaded(colour: RGB, light: float) -> RGB:
-    """Return a colour made darker or lighter, 1.0 for as it is."""
+    """Return a colour multiplied by a light factor."""
     r, g, b = (min(255, max(0, round(c * light))) for c in colour)
     return (r, g, b)
 
 
-def paint(canvas: Canvas, parts: Iterable[Outline], line_px: float, colour: RGB | None) -> None:
+def paint(canvas: Canvas, parts: Iterable[Silhouette], line_px: float, colour: RGB | None) -> None:
     """Paint parts from the lowest top to the highest, each with a soft outline.
 
     Parameters
     ----------
     canvas
-        What to paint on.
+        Canvas to paint on.
     parts
-        In any order; equal tops keep theirs.
+        Silhouettes in any order; those with equal tops keep theirs.
     line_px
         Width of the outline, pixels.
     colour
-        Instead of the parts' own colours.
+        Colour for all parts instead of their own.
     """
     for part in sorted(parts, key=lambda p: p.top_m):
         base = part.colour if colour is None else colour

@@ -1,4 +1,4 @@
-"""Frames as a film: MP4 or GIF, whole or not at all."""
+"""Videos: MP4 or GIF files, written atomically."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from internav_data.core.typing import Image
 
 FORMATS: Final = ("mp4", "gif")
-"""Kinds of film, chosen by the suffix of the file's name."""
+"""Kinds of video, chosen by the suffix of the file's name."""
 
 
-def film_format(path: Path) -> str:
-    """Return which kind of film a path asks for.
+def video_format(path: Path) -> str:
+    """Return the kind of video that a path's suffix names.
 
     Raises
     ------
@@ -33,14 +33,14 @@ def film_format(path: Path) -> str:
     suffix = Path(path).suffix.lower().removeprefix(".")
     if suffix not in FORMATS:
         raise UsageError(
-            f"{path}: the suffix says which kind of film to write; expected .mp4 or .gif, "
+            f"{path}: the suffix says which kind of video to write; expected .mp4 or .gif, "
             f"got {f'.{suffix}' if suffix else 'none'}"
         )
     return suffix
 
 
 def write_video(path: Path, frames: Iterable[Image], fps: float) -> int:
-    """Write a film; the file appears whole or not at all, in place of an older one.
+    """Write a video atomically; it replaces an older file.
 
     MP4 holds MPEG-4 Part 2 video (`mp4v`), as the wheels of OpenCV have no encoder for H.264: VLC,
     mpv, ffplay and most desktop players play it, browsers do not. GIF plays anywhere.
@@ -48,16 +48,16 @@ def write_video(path: Path, frames: Iterable[Image], fps: float) -> int:
     Parameters
     ----------
     path
-        Where to; its suffix (.mp4 or .gif) says what.
+        File to write; its suffix (.mp4 or .gif) decides the format.
     frames
-        (h, w, 3) uint8 RGB each, all of one size. Taken one at a time, never all in memory. An MP4
-        of odd sides gets one more row or column.
+        (h, w, 3) uint8 RGB each, all of one size, taken one at a time. An MP4 of odd sides gets
+        one more row or column.
     fps
         Frames a second.
 
     Returns
     -------
-    How many frames were written.
+    Number of frames that were written.
 
     Raises
     ------
@@ -67,9 +67,9 @@ def write_video(path: Path, frames: Iterable[Image], fps: float) -> int:
         The file cannot be written.
     """
     path = Path(path)
-    kind = film_format(path)
+    kind = video_format(path)
     if not fps > 0.0:
-        raise UsageError(f"a film's frames a second: expected more than 0, got {fps}")
+        raise UsageError(f"a video's frames a second: expected more than 0, got {fps}")
     write = _gif if kind == "gif" else _mp4
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -99,7 +99,7 @@ def _mp4(path: Path, frames: Iterable[Image], fps: float) -> int:
     rest = iter(frames)
     first = next(rest, None)
     if first is None:
-        raise UsageError("a film needs at least one frame")
+        raise UsageError("a video needs at least one frame")
     height, width = first.shape[:2]
     size = (width + width % 2, height + height % 2)
     fourcc: Callable[..., int] = cv2.VideoWriter.fourcc
@@ -113,7 +113,7 @@ def _mp4(path: Path, frames: Iterable[Image], fps: float) -> int:
             )
         for frame in itertools.chain([first], rest):
             if frame.shape != first.shape:
-                raise UsageError(f"a film's frames are of one size: {first.shape}, {frame.shape}")
+                raise UsageError(f"a video's frames are of one size: {first.shape}, {frame.shape}")
             even = cv2.copyMakeBorder(
                 frame, 0, size[1] - height, 0, size[0] - width, cv2.BORDER_REPLICATE
             )

@@ -10,7 +10,7 @@ from internav_data.geometry import transform, yaw_quaternion
 from internav_data.records import Asset, Part, Pose
 from internav_data.views.canvas import OVERSAMPLING, Canvas
 from internav_data.views.captions import with_caption
-from internav_data.views.silhouettes import outlines, shaded
+from internav_data.views.silhouettes import shaded, silhouettes
 
 WHITE = (255, 255, 255)
 corner = st.tuples(st.floats(0.5, 9.5), st.floats(0.5, 5.5))
@@ -89,7 +89,7 @@ def test_an_outline_is_the_hull_of_the_projected_corners(yaw, x, size):
     part = Part("box", (0.1, -0.2, 0.5), size, (0.0, 0.0, 0.0, 1.0), (), (100, 90, 80), "wood")
     asset = Asset("Box_0", "Box", size, 1.0, 0.6, False, True, True, True, (part,))
     pose = Pose(x, 1.0, 0.0, yaw_quaternion(yaw))
-    (outline,) = outlines(asset, pose)
+    (outline,) = silhouettes(asset, pose)
     half = np.array(size) / 2.0
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
     corners = transform(signs * half + np.array(part.centre), pose)
@@ -104,7 +104,7 @@ def test_a_leaning_face_is_darker_on_the_far_side_from_the_light():
     ridge = ((0.0, -1.0, 1.0), (0.0, 1.0, 1.0))
     part = Part("hull", (0, 0, 0), (2, 2, 1), (0, 0, 0, 1), (*roof, *ridge), (90, 90, 90), "wood")
     asset = Asset("Box_1", "Box", (2, 2, 1), 1.0, 0.6, False, True, True, True, (part,))
-    (outline,) = outlines(asset, Pose(0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 1.0)))
+    (outline,) = silhouettes(asset, Pose(0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 1.0)))
     west = [s for f, s in zip(outline.faces, outline.shades, strict=True) if f[:, 0].mean() < 0]
     east = [s for f, s in zip(outline.faces, outline.shades, strict=True) if f[:, 0].mean() > 0]
     assert min(west) > max(east)

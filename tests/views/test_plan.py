@@ -90,7 +90,7 @@ def test_rooms_on_the_way_are_tinted_and_others_pale(hand_house, hand_episode):
 
 def test_a_way_is_drawn_where_it_runs(hand_house, hand_episode):
     way = np.array([[3.5, 3.0], [4.5, 3.0]])
-    drawn = draw_episode(hand_house, hand_episode, pixels=PIXELS, way=way)
+    drawn = draw_episode(hand_house, hand_episode, pixels=PIXELS, path=way)
     assert near(at(drawn, 4.0, 3.0), (36, 104, 214), 60)
 
 

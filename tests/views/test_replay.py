@@ -12,7 +12,7 @@ from internav_data.planner.search import expert_of_episode
 from internav_data.records.errors import InternavError, UsageError
 from internav_data.render.camera import Camera, CameraView, StaticScene
 from internav_data.views import Replay, read_actions, replay_frames, write_video
-from internav_data.views.replay_story import sentence, shots
+from internav_data.views.replay_story import describe, shots
 from internav_data.world import Action, HouseModel
 
 AHEAD, LEFT, RIGHT, DOWN, PUSH, PICK, DROP, DONE = 0, 1, 2, 3, 5, 9, 10, 11
@@ -23,19 +23,19 @@ SIZE = 200
 
 
 @pytest.fixture(scope="module")
-def stage(hand_house):
+def model(hand_house):
     return HouseModel.of(hand_house)
 
 
 @pytest.fixture(scope="module")
-def tried(stage, hand_episode):
-    return Replay.of(stage, hand_episode, stage.house.assets, TRIED)
+def tried(model, hand_episode):
+    return Replay.of(model, hand_episode, model.house.assets, TRIED)
 
 
 @pytest.fixture(scope="module")
-def solved(stage, hand_episode):
-    expert = expert_of_episode(stage, hand_episode, stage.house.assets)
-    return Replay.of(stage, replace(hand_episode, expert=expert), stage.house.assets)
+def solved(model, hand_episode):
+    expert = expert_of_episode(model, hand_episode, model.house.assets)
+    return Replay.of(model, replace(hand_episode, expert=expert), model.house.assets)
 
 
 @pytest.fixture(scope="module")
@@ -71,10 +71,10 @@ def test_the_same_episode_gives_the_same_frames(tried, frames, hand_house, hand_
     assert digest(again) == digest(frames)
 
 
-def test_the_camera_shows_what_the_world_is_like(tried, frames, stage, hand_episode):
+def test_the_camera_shows_what_the_world_is_like(tried, frames, model, hand_episode):
     """Against pictures of a camera set up by hand, after every action."""
-    scenery, camera, count = StaticScene.of(stage.house), Camera(SIZE), 18
-    assets = stage.house.assets
+    scenery, camera, count = StaticScene.of(model.house), Camera(SIZE), 18
+    assets = model.house.assets
     props = scenery.props((assets[o.asset_id], o.pose) for o in hand_episode.obstacles)
     for moment in tried.story.moments[1:10]:
         count += 3
@@ -84,7 +84,7 @@ def test_the_camera_shows_what_the_world_is_like(tried, frames, stage, hand_epis
         )
         assert np.array_equal(eye(frames[count - 1]), camera.render([view]).rgb[0])
     pushed = tried.story.moments[11].pose(1 + 1)
-    props.move(len(stage.house.objects), pushed)
+    props.move(len(model.house.objects), pushed)
     after = tried.story.moments[13]
     x, y = after.world.position
     view = CameraView(scenery, props, x, y, 90.0, after.world.horizon_deg)
@@ -94,7 +94,7 @@ def test_the_camera_shows_what_the_world_is_like(tried, frames, stage, hand_epis
 
 
 def test_words_say_what_happened_and_why_not(tried, solved):
-    told = [sentence(tried.story, m) for m in tried.story.moments]
+    told = [describe(tried.story, m) for m in tried.story.moments]
     assert told[0] == "start"
     assert told[1:10] == [*["move ahead"] * 4, "turn right", *["move ahead"] * 4]
     assert told[10].startswith("pick up failed: nothing to pick up")
@@ -123,33 +123,33 @@ def test_a_slide_runs_from_where_it_stood_to_where_it_lies(tried):
     assert cut[-1].steps is not None
 
 
-def test_what_is_held_is_told_and_leaves_an_outline(stage, hand_episode):
+def test_what_is_held_is_told_and_leaves_an_outline(model, hand_episode):
     beside = replace(hand_episode.obstacles[1], x=3.0, y=1.8)
     episode = replace(hand_episode, obstacles=(hand_episode.obstacles[0], beside))
-    played = Replay.of(stage, episode, stage.house.assets, [PICK, AHEAD, DROP])
-    told = [sentence(played.story, m) for m in played.story.moments]
+    played = Replay.of(model, episode, model.house.assets, [PICK, AHEAD, DROP])
+    told = [describe(played.story, m) for m in played.story.moments]
     assert told[1].startswith("pick up Apple 2")
     assert told[3].startswith("drop Apple 2")
     cut = list(shots(played.story, 4.0))
     assert [s.poses[3] is None for s in cut] == [False, False, True, True, False, False]
     assert played.story.moments[1].world.held == 3
     # The camera no longer has it; what is shown in a corner instead is not the camera's.
-    assets, film = stage.house.assets, list(played.frames(size=SIZE, fps=4.0))
+    assets, film = model.house.assets, list(played.frames(size=SIZE, fps=4.0))
     chair = episode.obstacles[0]
-    view = CameraView(*_alone(stage, [(assets[chair.asset_id], chair.pose)]), 3.0, 1.25, 90.0, 30.0)
+    view = CameraView(*_alone(model, [(assets[chair.asset_id], chair.pose)]), 3.0, 1.25, 90.0, 30.0)
     seen, wanted = eye(film[-9]), Camera(SIZE).render([view]).rgb[0]
     assert np.array_equal(seen[: SIZE // 2], wanted[: SIZE // 2])
     assert np.array_equal(seen[:, : SIZE // 2], wanted[:, : SIZE // 2])
     assert not np.array_equal(seen[SIZE // 2 :, SIZE // 2 :], wanted[SIZE // 2 :, SIZE // 2 :])
 
 
-def _alone(stage, obstacles):
-    scenery = StaticScene.of(stage.house)
+def _alone(model, obstacles):
+    scenery = StaticScene.of(model.house)
     return scenery, scenery.props(obstacles)
 
 
 def test_the_map_shows_the_agent_where_it_stands(tried, frames):
-    from internav_data.views.replay_panels import AGENT, MapPainter
+    from internav_data.views.replay_painters import AGENT, MapPainter
 
     painter = MapPainter(tried.story, SIZE)
     canvas = painter._canvas
@@ -174,7 +174,7 @@ def share_of(picture, canvas, low, high, colour):
 
 
 def test_the_map_shows_the_trail_and_where_things_stood(tried):
-    from internav_data.views.replay_panels import _GHOST, AGENT, MapPainter
+    from internav_data.views.replay_painters import _GHOST, AGENT, MapPainter
 
     painter = MapPainter(tried.story, 400)
     all_shots = list(shots(tried.story, 12.0))
@@ -189,7 +189,7 @@ def test_the_map_shows_the_trail_and_where_things_stood(tried):
         assert np.array_equal(fresh.draw(shot), painter.draw(shot)), "of the shot alone"
 
 
-def test_words_are_written_below_and_fit(tried, frames, stage, hand_episode):
+def test_words_are_written_below_and_fit(tried, frames, model, hand_episode):
     footer = 2 * round(38 * SIZE / 400)
     red = np.array((200, 36, 24))
 
@@ -203,7 +203,7 @@ def test_words_are_written_below_and_fit(tried, frames, stage, hand_episode):
         assert (words(frame)[:, -3:] > 200).all(), "nothing runs over the edge"
 
 
-def test_a_panel_is_asked_once_a_moment_and_drawn_beside(stage, hand_episode, frames):
+def test_a_panel_is_asked_once_a_moment_and_drawn_beside(model, hand_episode, frames):
     asked = []
 
     def panel(moment):
@@ -212,7 +212,7 @@ def test_a_panel_is_asked_once_a_moment_and_drawn_beside(stage, hand_episode, fr
 
     film = list(
         replay_frames(
-            stage, hand_episode, stage.house.assets, TRIED, size=SIZE, fps=12.0, panel=panel
+            model, hand_episode, model.house.assets, TRIED, size=SIZE, fps=12.0, panel=panel
         )
     )
     assert asked == list(range(len(TRIED) + 1))
@@ -222,16 +222,16 @@ def test_a_panel_is_asked_once_a_moment_and_drawn_beside(stage, hand_episode, fr
     with pytest.raises(UsageError, match=r"\(200, w, 3\)"):
         list(
             replay_frames(
-                stage, hand_episode, stage.house.assets, TRIED, size=SIZE,
+                model, hand_episode, model.house.assets, TRIED, size=SIZE,
                 panel=lambda _: np.zeros((SIZE - 1, 40, 3), np.uint8),
             )
         )  # fmt: skip
 
 
-def test_nothing_after_done_is_played_and_waiting_is_allowed(stage, hand_episode):
-    played = Replay.of(stage, hand_episode, stage.house.assets, [-1, DONE, AHEAD])
+def test_nothing_after_done_is_played_and_waiting_is_allowed(model, hand_episode):
+    played = Replay.of(model, hand_episode, model.house.assets, [-1, DONE, AHEAD])
     assert [r.action for r in played.story.results] == [Action.WAIT, Action.DONE]
-    assert sentence(played.story, played.story.moments[-1]) == "done failed: not at the goal"
+    assert describe(played.story, played.story.moments[-1]) == "done failed: not at the goal"
 
 
 @pytest.mark.parametrize("kind", ["mp4", "gif"])
@@ -285,19 +285,19 @@ def test_a_film_that_fails_leaves_nothing_and_keeps_the_older_one(tmp_path):
         write_video(tmp_path / "film.gif" / "film.gif", broken(), 5.0)
 
 
-def test_what_cannot_be_played_is_refused(stage, hand_episode):
-    assets = stage.house.assets
+def test_what_cannot_be_played_is_refused(model, hand_episode):
+    assets = model.house.assets
     with pytest.raises(UsageError, match="no expert"):
-        Replay.of(stage, hand_episode, assets)
+        Replay.of(model, hand_episode, assets)
     with pytest.raises(UsageError, match="action 1: expected"):
-        Replay.of(stage, hand_episode, assets, [0, 13])
+        Replay.of(model, hand_episode, assets, [0, 13])
     with pytest.raises(UsageError, match="10000"):
-        Replay.of(stage, hand_episode, assets, [0] * 10_001)
+        Replay.of(model, hand_episode, assets, [0] * 10_001)
     with pytest.raises(UsageError, match="Chair_0"):
-        Replay.of(stage, hand_episode, {}, [0])
+        Replay.of(model, hand_episode, {}, [0])
     with pytest.raises(UsageError, match="scene-000009"):
-        Replay.of(stage, replace(hand_episode, scene_id="scene-000009"), assets, [0])
-    film = Replay.of(stage, hand_episode, assets, [0])
+        Replay.of(model, replace(hand_episode, scene_id="scene-000009"), assets, [0])
+    film = Replay.of(model, hand_episode, assets, [0])
     with pytest.raises(UsageError, match="160 to 1080"):
         film.frames(size=20)
     with pytest.raises(UsageError, match="1 to 60"):

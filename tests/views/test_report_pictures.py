@@ -13,7 +13,7 @@ from internav_data.views.bars import Bars, bars_panel, draw_bars
 from internav_data.views.curves import Curve, curves_svg
 from internav_data.views.page import Page
 from internav_data.views.replay import Replay
-from internav_data.views.trajectories import FAILED, LATE, WORKED, draw_trajectory
+from internav_data.views.trajectory import FAILED, LATE, WORKED, draw_trajectory
 from internav_data.world import HouseModel
 
 AHEAD, RIGHT, PUSH, PICK, DONE = 0, 2, 5, 9, 11
@@ -21,7 +21,7 @@ TO_THE_DOOR = [*[AHEAD] * 4, RIGHT, *[AHEAD] * 4]
 
 
 @pytest.fixture(scope="module")
-def stage(hand_house):
+def model(hand_house):
     return HouseModel.of(hand_house)
 
 
@@ -30,9 +30,9 @@ def count(picture, colour, tolerance=30):
     return int((far <= tolerance).sum())
 
 
-def test_what_worked_and_what_failed_is_marked(stage, hand_episode):
+def test_what_worked_and_what_failed_is_marked(model, hand_episode):
     def draw(actions):
-        return draw_trajectory(stage, hand_episode, stage.house.assets, actions, pixels=400)
+        return draw_trajectory(model, hand_episode, model.house.assets, actions, pixels=400)
 
     plain = draw(TO_THE_DOOR)
     failed, worked = draw([*TO_THE_DOOR, PICK]), draw([*TO_THE_DOOR, PUSH])
@@ -43,9 +43,9 @@ def test_what_worked_and_what_failed_is_marked(stage, hand_episode):
     assert (draw(TO_THE_DOOR) == plain).all()
 
 
-def test_the_way_lies_where_the_agent_walked(stage, hand_episode):
+def test_the_way_lies_where_the_agent_walked(model, hand_episode):
     start, walked = (
-        draw_trajectory(stage, hand_episode, stage.house.assets, actions, pixels=900)
+        draw_trajectory(model, hand_episode, model.house.assets, actions, pixels=900)
         for actions in ([RIGHT], [AHEAD] * 4)
     )
     rows, columns = np.nonzero((start != walked).any(axis=2))
@@ -59,12 +59,12 @@ def test_the_way_lies_where_the_agent_walked(stage, hand_episode):
     assert 2.0 < y.max() < 2.4
 
 
-def test_a_trajectory_needs_its_own_house(stage, hand_episode):
+def test_a_trajectory_needs_its_own_house(model, hand_episode):
     from dataclasses import replace
 
     other = replace(hand_episode, scene_id="scene-000009")
     with pytest.raises(UsageError, match="belongs to"):
-        draw_trajectory(stage, other, stage.house.assets, [DONE])
+        draw_trajectory(model, other, model.house.assets, [DONE])
 
 
 def test_bars_are_as_long_as_their_shares():
@@ -84,8 +84,8 @@ def test_what_was_taken_has_another_colour():
     assert count(draw_bars([shares], 400), (196, 36, 112), 6) > 100
 
 
-def test_bars_stand_beside_a_replay(stage, hand_episode):
-    replay = Replay.of(stage, hand_episode, stage.house.assets, [AHEAD, AHEAD])
+def test_bars_stand_beside_a_replay(model, hand_episode):
+    replay = Replay.of(model, hand_episode, model.house.assets, [AHEAD, AHEAD])
     steps = [[Bars("option", ("a", "b"), (p, 1 - p))] for p in (0.1, 0.9)]
     frames = list(replay.frames(size=160, fps=4.0, panel=bars_panel(steps, 160)))
     bare = next(iter(replay.frames(size=160, fps=4.0)))

@@ -1,4 +1,4 @@
-"""One episode from above: obstacles in yellow, start, goal and the ways between them."""
+"""One episode from above: obstacles in yellow, start, goal and the paths between them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from internav_data.records.agent import AgentSpec
 from internav_data.records.errors import UsageError
 from internav_data.views.captions import with_caption
 from internav_data.views.plan import INK, PAPER, TINT, house_canvas, paint_house, paint_labels
-from internav_data.views.silhouettes import Outline, outlines, paint, shaded
+from internav_data.views.silhouettes import Silhouette, paint, shaded, silhouettes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -30,7 +30,7 @@ _RIM: RGB = (48, 36, 8)
 START: RGB = (40, 148, 84)
 GOAL: RGB = (36, 104, 214)
 _PATH: RGB = (150, 70, 150)
-_WAY: RGB = (36, 104, 214)
+_SHORTEST_PATH: RGB = (36, 104, 214)
 _RADIUS_M = AgentSpec().radius_m
 _SMALL_M = 0.3
 """Obstacles smaller than this are ringed: an apple is three pixels wide."""
@@ -42,7 +42,7 @@ def draw_episode(
     assets: Mapping[str, Asset] | None = None,
     *,
     pixels: int = 900,
-    way: Floats | None = None,
+    path: Floats | None = None,
 ) -> Image:
     """Draw an episode from above, north (y) up, with a legend and a caption.
 
@@ -51,13 +51,13 @@ def draw_episode(
     house
         The house that the episode plays in.
     episode
-        What to draw.
+        The episode.
     assets
-        What the obstacles are made of, by asset_id; those of the house are known already.
+        Assets of the obstacles by asset_id, beyond those of the house.
     pixels
         Longer side of the plan; legend and caption are added below it.
-    way
-        Any-angle way to draw, shape (n, 2), metres.
+    path
+        Euclidean path to draw, shape (n, 2), metres.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def draw_episode(
     Raises
     ------
     UsageError
-        If the episode belongs to another house, or an obstacle's asset is not known.
+        The episode belongs to another house, or an obstacle's asset is not known.
     """
     if episode.scene_id != house.scene_id:
         raise UsageError(
@@ -74,15 +74,15 @@ def draw_episode(
             "pass the house that `dataset.scene(episode.scene_id)` returns"
         )
     known = {**house.assets, **(assets or {})}
-    shapes = [_outlines(obstacle, known) for obstacle in episode.obstacles]
+    shapes = [_silhouettes(obstacle, known) for obstacle in episode.obstacles]
     canvas = house_canvas(house, pixels)
-    on_way = episode.room_paths[0] if episode.room_paths else ()
-    paint_house(canvas, house, on_way)
-    for k, path in enumerate(episode.node_paths):
+    on_path = episode.room_paths[0] if episode.room_paths else ()
+    paint_house(canvas, house, on_path)
+    for k, node_path in enumerate(episode.node_paths):
         if k == 0:
-            canvas.dashes(path.points, _PATH, 2.0, 0.14)
-    if way is not None and len(way) > 1:
-        canvas.line(way, _WAY, 1.6)
+            canvas.dashes(node_path.points, _PATH, 2.0, 0.14)
+    if path is not None and len(path) > 1:
+        canvas.line(path, _SHORTEST_PATH, 1.6)
     for obstacle, parts in zip(episode.obstacles, shapes, strict=True):
         paint_obstacle(canvas, obstacle_kind(obstacle), parts)
     paint_start(canvas, episode)
@@ -96,7 +96,7 @@ def draw_episode(
 
 
 def episode_lines(episode: Episode) -> list[str]:
-    """Return what is written below an episode's picture: its figures, then its obstacles."""
+    """Return the caption of an episode's picture: its figures, then its obstacles."""
     mode = f"{episode.mode}, {'sealed' if episode.sealed else 'passable off the grid'}"
     if episode.mode == "lengthened":
         mode = episode.mode
@@ -106,11 +106,11 @@ def episode_lines(episode: Episode) -> list[str]:
         f"clear {episode.shortest_path_steps} steps, {episode.shortest_path_m:.2f} m",
         f"with obstacles {_with_obstacles(episode)}",
     ]
-    things = [
+    objects = [
         f"{k} {o.type} {o.mass_kg:.1f} kg ({obstacle_kind(o)})"
         for k, o in enumerate(episode.obstacles, 1)
     ]
-    return ["   ".join(first), "   ".join(things)] if things else ["   ".join(first)]
+    return ["   ".join(first), "   ".join(objects)] if objects else ["   ".join(first)]
 
 
 def _with_obstacles(episode: Episode) -> str:
@@ -140,17 +140,17 @@ def _legend(episode: Episode) -> list[tuple[RGB, str]]:
     return entries + [(COLOURS[k], f"{NAMES[k]} obstacle") for k in NAMES if k in kinds]
 
 
-def _outlines(obstacle: Obstacle, assets: Mapping[str, Asset]) -> list[Outline]:
+def _silhouettes(obstacle: Obstacle, assets: Mapping[str, Asset]) -> list[Silhouette]:
     asset = assets.get(obstacle.asset_id)
     if asset is None:
         raise UsageError(
             f"obstacle {obstacle.asset_id}: its asset is not known; pass the dataset's assets or "
             "the catalogue that the episode was made with"
         )
-    return outlines(asset, obstacle.pose)
+    return silhouettes(asset, obstacle.pose)
 
 
-def paint_obstacle(canvas: Canvas, kind: Kind, parts: list[Outline]) -> None:
+def paint_obstacle(canvas: Canvas, kind: Kind, parts: list[Silhouette]) -> None:
     """Paint an obstacle in the colour of its kind, with a dark rim; a small one with a ring."""
     colour = COLOURS[kind]
     low, high = _extent(parts)
@@ -168,8 +168,8 @@ def paint_obstacle(canvas: Canvas, kind: Kind, parts: list[Outline]) -> None:
         _hatch(canvas, parts)
 
 
-def _hatch(canvas: Canvas, parts: list[Outline]) -> None:
-    """Diagonal lines over what cannot be moved."""
+def _hatch(canvas: Canvas, parts: list[Silhouette]) -> None:
+    """Draw diagonal lines over a fixed obstacle."""
     mask = canvas.mask([p.plan for p in parts])
     low, high = _extent(parts)
     window = canvas.window((float(low[0]), float(low[1])), (float(high[0]), float(high[1])))
@@ -179,13 +179,13 @@ def _hatch(canvas: Canvas, parts: list[Outline]) -> None:
     canvas.blend(np.minimum(mask, lines), (70, 44, 0), 0.7)
 
 
-def _extent(parts: list[Outline]) -> tuple[Floats, Floats]:
+def _extent(parts: list[Silhouette]) -> tuple[Floats, Floats]:
     corners = np.vstack([p.plan for p in parts])
     return corners.min(axis=0), corners.max(axis=0)
 
 
-def paint_number(canvas: Canvas, number: int, colour: RGB, parts: list[Outline]) -> None:
-    """Put a badge on the obstacle, or beside it where it would hide it."""
+def paint_number(canvas: Canvas, number: int, colour: RGB, parts: list[Silhouette]) -> None:
+    """Paint a numbered badge on the obstacle, or beside a small one."""
     low, high = _extent(parts)
     at = (low + high) / 2.0
     radius = 6.5 / canvas.scale
@@ -198,7 +198,7 @@ def paint_number(canvas: Canvas, number: int, colour: RGB, parts: list[Outline])
 
 
 def paint_start(canvas: Canvas, episode: Episode) -> None:
-    """Paint the agent's disc where an episode begins, an arrow where it looks."""
+    """Paint the agent's disc at the start, with an arrow along its yaw."""
     at = (episode.start.x, episode.start.y)
     turn = math.radians(episode.start.yaw_deg)
     ahead = np.array([math.cos(turn), math.sin(turn)])

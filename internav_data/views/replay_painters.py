@@ -1,8 +1,7 @@
-"""The map of a replay: what stays drawn once, what moves drawn on a copy of it.
+"""Parts of a replay's frame: the map, the agent's camera, a header, a footer and a title card.
 
-What the agent sees in a replay: its camera, with what it is about to touch pointed out.
-
-The words of a replay: a header, a title card, and below what was done and how it went.
+The map draws all that stays once, and moving objects on a copy of it. The camera's picture
+highlights the object that is about to be pushed or picked up.
 """
 
 from __future__ import annotations
@@ -18,9 +17,7 @@ from internav_data.records.agent import AgentSpec
 from internav_data.render.camera import Camera, CameraView, StaticScene
 from internav_data.views.asset_sheet import draw_assets
 from internav_data.views.canvas import Canvas
-from internav_data.views.plan import INK, PAPER, paint_house, paint_labels
-from internav_data.views.silhouettes import Outline, outlines, paint, shaded
-from internav_data.views.tasks import (
+from internav_data.views.episodes import (
     COLOURS,
     GOAL,
     NAMES,
@@ -31,6 +28,8 @@ from internav_data.views.tasks import (
     paint_obstacle,
     paint_start,
 )
+from internav_data.views.plan import INK, PAPER, paint_house, paint_labels
+from internav_data.views.silhouettes import Silhouette, paint, shaded, silhouettes
 from internav_data.world import Action
 from internav_data.world.actions import INTERACTION_KINDS
 from internav_data.world.visibility import CAMERA_M, REACH_M
@@ -46,26 +45,27 @@ if TYPE_CHECKING:
     from internav_data.world import StepResult
 
 AGENT: Final[RGB] = (196, 36, 112)
-"""Of the agent and its trail."""
+"""Colour of the agent and its trail."""
 _EDGE: Final[RGB] = (206, 204, 198)
 _GHOST: Final[RGB] = (120, 84, 10)
 _TARGET: Final[RGB] = (235, 60, 30)
 _MARGIN_M: Final = 0.7
-"""Shown around a house, and (`_ROOM_M`) around what happens where not all of it is shown."""
+"""Margin around a house on its map."""
 _ROOM_M: Final = 1.8
-_MOST: Final = 0.55
-"""A house is shown whole where this share of it would be."""
+"""Margin around all action, on a map of a part of the house."""
+_WHOLE_SHARE: Final = 0.55
+"""A map shows the entire house if it would show more than this share of it."""
 _RADIUS_M: Final = AgentSpec().radius_m
 _HALF_VIEW_DEG: Final = AgentSpec().field_of_view_deg / 2.0
-_NARROWEST, _WIDEST = 0.75, 1.6
-"""Of a map, as a share of its height."""
-_SMALLEST_PX: Final = 7.0
-"""Radius of the agent on the map of a large house."""
+_MIN_ASPECT, _MAX_ASPECT = 0.75, 1.6
+"""Bounds of a map's width as a share of its height."""
+_MIN_RADIUS_PX: Final = 7.0
+"""Minimum radius of the agent, for maps of large houses."""
 
 
 def _box(story: Story) -> tuple[Vec2, Vec2]:
-    """Corners of the part of the house that matters: all that happens in it, with some room."""
-    outline, episode = story.stage.house.outline, story.episode
+    """Return two corners of the mapped part of the house: all action, with a margin."""
+    outline, episode = story.model.house.outline, story.episode
     points = [m.world.position for m in story.moments] + [(episode.goal.x, episode.goal.y)]
     for moment in story.moments:
         poses = (moment.pose(k) for k in (*story.moved, *moment.world.obstacles))
@@ -74,26 +74,26 @@ def _box(story: Story) -> tuple[Vec2, Vec2]:
     first, last = house.min(axis=0) - _MARGIN_M, house.max(axis=0) + _MARGIN_M
     low = np.maximum(inside.min(axis=0) - _ROOM_M, first)
     high = np.minimum(inside.max(axis=0) + _ROOM_M, last)
-    if float(np.prod(high - low)) > _MOST * float(np.prod(last - first)):
+    if float(np.prod(high - low)) > _WHOLE_SHARE * float(np.prod(last - first)):
         low, high = first, last
     return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
 
 
 class MapPainter:
-    """Draws a story's map, `height` pixels high and as wide as the house asks for.
+    """Painter of a story's map; its width follows from the house's shape.
 
     Parameters
     ----------
     story
-        What happens.
+        The played episode.
     height
-        Pixels.
+        Height of the map, pixels.
     """
 
     def __init__(self, story: Story, height: int) -> None:
         self._story = story
         (x0, y0), (x1, y1) = _box(story)
-        share = min(max((x1 - x0) / (y1 - y0), _NARROWEST), _WIDEST)
+        share = min(max((x1 - x0) / (y1 - y0), _MIN_ASPECT), _MAX_ASPECT)
         self.size = (2 * round(height * share / 2.0), height)
         """Width and height, pixels."""
         wide = max(x1 - x0, (y1 - y0) * self.size[0] / height)
@@ -101,37 +101,37 @@ class MapPainter:
         x, y = (x0 + x1 - wide) / 2.0, (y0 + y1 - high) / 2.0
         self._low = (x, y)
         self._canvas = Canvas((x, y), (x + wide, y + high), max(self.size), PAPER)
-        self._outlines: dict[tuple[int, Pose], list[Outline]] = {}
+        self._silhouettes: dict[tuple[int, Pose], list[Silhouette]] = {}
         self._first = {k: story.moments[0].pose(k) for k in self._moving()}
         self._walls = np.array([
             (w.x_min, w.y_min, w.x_max, w.y_max)
-            for w in story.stage.house.walls
+            for w in story.model.house.walls
             if w.z_min < CAMERA_M < w.z_max
         ]).reshape(-1, 4)  # fmt: skip
-        self._still = self._drawn_once()
+        self._still = self._static_map()
         self._furnished: tuple[object, Image] = (None, self._still)
-        """The latest picture with things on it: most actions move none."""
+        """Latest map with objects, with its key: most actions move none."""
 
     def _moving(self) -> Iterable[int]:
         return (*self._story.moved, *self._story.moments[0].world.obstacles)
 
-    def _drawn_once(self) -> Image:
+    def _static_map(self) -> Image:
         story, canvas = self._story, self._canvas
-        house, episode = story.stage.house, story.episode
-        gone = {story.stage.object_ids[k] for k in story.moved}
+        house, episode = story.model.house, story.episode
+        gone = {story.model.object_ids[k] for k in story.moved}
         still = replace(house, objects=tuple(t for t in house.objects if t.object_id not in gone))
         margin = 10.0 / canvas.scale
         corner = (self._low[0] + margin, self._low[1] + margin)
-        on_way = episode.room_paths[0] if episode.room_paths else None
-        paint_house(canvas, still, on_way, scale_at=corner)
+        on_path = episode.room_paths[0] if episode.room_paths else None
+        paint_house(canvas, still, on_path, scale_at=corner)
         shapes = [part.plan for k, pose in self._first.items() for part in self._parts(k, pose)]
         ends = ((episode.start.x, episode.start.y), (episode.goal.x, episode.goal.y))
         shapes += [canvas.arc(end, 0.45, 0.0, 360.0) for end in ends]
-        # The trail and what is laid aside come later, over the names.
+        # Names keep clear of the trail and of end poses, which are drawn later.
         shapes += [canvas.arc(m.world.position, 0.3, 0.0, 360.0) for m in story.moments]
         last = story.moments[-1]
         shapes += [part.plan for k in self._moving() for part in self._parts(k, last.pose(k))]
-        paint_labels(canvas, _seen(still, canvas), shapes)
+        paint_labels(canvas, _rooms_on_canvas(still, canvas), shapes)
         paint_start(canvas, episode)
         paint_goal(canvas, episode)
         return canvas.image.copy()
@@ -145,7 +145,7 @@ class MapPainter:
         else:
             canvas.image[:] = self._still
             self._paint_ghosts(shot.poses)
-            self._paint_things(shot)
+            self._paint_objects(shot)
             self._paint_arrows(shot.poses)
             self._furnished = (key, canvas.image.copy())
         self._paint_cone(shot)
@@ -155,17 +155,17 @@ class MapPainter:
         picture[:1] = picture[-1:] = picture[:, :1] = picture[:, -1:] = _EDGE
         return picture
 
-    def _parts(self, item: int, pose: Pose | None) -> list[Outline]:
+    def _parts(self, item: int, pose: Pose | None) -> list[Silhouette]:
         if pose is None:
             return []
-        found = self._outlines.get((item, pose))
+        found = self._silhouettes.get((item, pose))
         if found is None:
             asset = self._story.moments[0].world.items[item].asset
-            found = self._outlines[item, pose] = outlines(asset, pose)
+            found = self._silhouettes[item, pose] = silhouettes(asset, pose)
         return found
 
-    def _paint_things(self, shot: Shot) -> None:
-        canvas, first = self._canvas, len(self._story.stage.items)
+    def _paint_objects(self, shot: Shot) -> None:
+        canvas, first = self._canvas, len(self._story.model.items)
         for item, pose in shot.poses.items():
             parts = self._parts(item, pose)
             if not parts:
@@ -186,14 +186,14 @@ class MapPainter:
                 paint_number(canvas, item - first + 1, colour, self._parts(item, pose))
 
     def _paint_ghosts(self, poses: Mapping[int, Pose | None]) -> None:
-        """Outline where things stood that lie elsewhere, or are held, now."""
+        """Outline the first poses of objects that have moved or are held."""
         for item, pose in poses.items():
             if pose != self._first[item]:
                 ring = _hull(self._parts(item, self._first[item]))
                 self._canvas.dashes(np.vstack([ring, ring[:1]]), _GHOST, 1.6, 0.07)
 
     def _paint_arrows(self, poses: Mapping[int, Pose | None]) -> None:
-        """Point from where things stood to where they are."""
+        """Draw arrows from the first poses of objects to their present ones."""
         for item, pose in poses.items():
             begin = self._first[item]
             if (
@@ -215,11 +215,11 @@ class MapPainter:
             self._canvas.line(shot.trail, AGENT, 2.6)
 
     def _paint_cone(self, shot: Shot) -> None:
-        """Tint what the camera's field of view takes in, as far as the agent reaches."""
+        """Tint the camera's field of view up to the agent's reach."""
         at = np.array((shot.x, shot.y))
         left, right = shot.yaw_deg - _HALF_VIEW_DEG, shot.yaw_deg + _HALF_VIEW_DEG
         arc = self._canvas.arc((shot.x, shot.y), REACH_M, left, right)
-        cone = np.vstack([at, at + (arc - at) * _open_shares(at, arc, self._walls)[:, None]])
+        cone = np.vstack([at, at + (arc - at) * _visible_shares(at, arc, self._walls)[:, None]])
         window = self._canvas.window(
             (float(cone[:, 0].min()), float(cone[:, 1].min())),
             (float(cone[:, 0].max()), float(cone[:, 1].max())),
@@ -231,7 +231,7 @@ class MapPainter:
 
     def _paint_agent(self, shot: Shot) -> None:
         canvas, at = self._canvas, np.array((shot.x, shot.y))
-        radius = max(_RADIUS_M, _SMALLEST_PX / canvas.scale)
+        radius = max(_RADIUS_M, _MIN_RADIUS_PX / canvas.scale)
         turn = math.radians(shot.yaw_deg)
         ahead = np.array([math.cos(turn), math.sin(turn)]) * radius
         left = np.array([-ahead[1], ahead[0]])
@@ -243,18 +243,21 @@ class MapPainter:
         canvas.disc(centre, radius * 1.12, INK, 0.8)
 
 
-def _hull(parts: list[Outline]) -> Floats:
-    """Convex outline (n, 2) around all parts."""
+def _hull(parts: list[Silhouette]) -> Floats:
+    """Return the convex outline (n, 2) around all parts."""
     corners = np.vstack([part.plan for part in parts]).astype(np.float32)
     return np.asarray(cv2.convexHull(corners), np.float64).reshape(-1, 2)
 
 
-def _open_shares(at: Floats, ends: Floats, walls: Floats) -> Floats:
-    """Return which share of the way to each end (n, 2) is before the first wall (m, 4), (n,)."""
+def _visible_shares(at: Floats, ends: Floats, walls: Floats) -> Floats:
+    """Return the shares (n,) of segments from a point (2,) to ends (n, 2) before a wall (m, 4).
+
+    Walls are axis-parallel boxes, intersected by the slab method (Kay and Kajiya 1986).
+    """
     ahead = (ends - at)[:, None, :]
     with np.errstate(divide="ignore", invalid="ignore"):
         first, second = (walls[:, :2] - at) / ahead, (walls[:, 2:] - at) / ahead
-    # Along a wall's side 0 / 0 says nothing; the other direction decides.
+    # Along a wall's side 0 / 0 is undefined; the other axis decides.
     enter = np.nan_to_num(np.minimum(first, second), nan=-np.inf).max(axis=2)
     leave = np.nan_to_num(np.maximum(first, second), nan=np.inf).min(axis=2)
     hits = np.where((enter <= leave) & (leave > 0.0), np.maximum(enter, 0.0), 1.0)
@@ -262,8 +265,8 @@ def _open_shares(at: Floats, ends: Floats, walls: Floats) -> Floats:
     return shares
 
 
-def _seen(house: House, canvas: Canvas) -> House:
-    """Return a house of only those rooms of which half is on the canvas: the others get no name."""
+def _rooms_on_canvas(house: House, canvas: Canvas) -> House:
+    """Return a house of only those rooms of which half is on the canvas: others get no name."""
     kept = []
     for room in house.rooms:
         xs, ys = [p[0] for p in room.polygon], [p[1] for p in room.polygon]
@@ -275,26 +278,26 @@ def _seen(house: House, canvas: Canvas) -> House:
     return replace(house, rooms=tuple(kept))
 
 
-_EYE_TARGET: Final[RGB] = (255, 214, 40)
+_HIGHLIGHT: Final[RGB] = (255, 214, 40)
 _RIM: Final[RGB] = (60, 44, 8)
-_EYE_BAD: Final[RGB] = (214, 44, 32)
+_FAILED: Final[RGB] = (214, 44, 32)
 _PAPER: Final[RGB] = (250, 249, 246)
 _STRIP_INK: Final[RGB] = (52, 54, 62)
 
 
-class EyePainter:
-    """Draws what the agent sees in a story, `size` pixels a side."""
+class CameraPainter:
+    """Painter of the agent's camera pictures, `size` pixels a side."""
 
     def __init__(self, story: Story, size: int) -> None:
         self._story, self._size = story, size
-        house, first = story.stage.house, story.moments[0]
+        house, first = story.model.house, story.moments[0]
         world = first.world
-        self._scenery = StaticScene.of(house)
-        things = [(world.items[k].asset, world.items[k].pose) for k in world.obstacles]
-        self._props = self._scenery.props([(a, p) for a, p in things if p is not None])
-        rows = {thing.object_id: row for row, thing in enumerate(house.objects)}
-        self._instances = [rows[t] for t in story.stage.object_ids]
-        self._instances += [len(house.objects) + k for k in range(len(things))]
+        self._scene = StaticScene.of(house)
+        objects = [(world.items[k].asset, world.items[k].pose) for k in world.obstacles]
+        self._props = self._scene.props([(a, p) for a, p in objects if p is not None])
+        rows = {object_.object_id: row for row, object_ in enumerate(house.objects)}
+        self._instances = [rows[t] for t in story.model.object_ids]
+        self._instances += [len(house.objects) + k for k in range(len(objects))]
         self._camera = Camera(size)
         self._icons: dict[int, Image] = {}
 
@@ -308,30 +311,28 @@ class EyePainter:
             else:
                 self._props.move(self._instances[item], pose)
                 self._props.show(self._instances[item])
-        view = CameraView(
-            self._scenery, self._props, shot.x, shot.y, shot.yaw_deg, shot.horizon_deg
-        )
+        view = CameraView(self._scene, self._props, shot.x, shot.y, shot.yaw_deg, shot.horizon_deg)
         frames = self._camera.render([view])
         picture: Image = frames.rgb[0]
         if shot.target >= 0:
-            self._point_out(picture, frames.ids[0] == 1 + self._instances[shot.target])
+            self._highlight(picture, frames.ids[0] == 1 + self._instances[shot.target])
         if held >= 0:
             self._in_hand(picture, held)
         if shot.mood == "bad":
             wide = max(2, self._size // 80)
-            cv2.rectangle(picture, (0, 0), (self._size - 1, self._size - 1), _EYE_BAD, 2 * wide)
+            cv2.rectangle(picture, (0, 0), (self._size - 1, self._size - 1), _FAILED, 2 * wide)
         return picture
 
-    def _point_out(self, picture: Image, mask: NDArray[np.bool_]) -> None:
-        """Draw a line around what is seen of a thing."""
+    def _highlight(self, picture: Image, mask: NDArray[np.bool_]) -> None:
+        """Draw a line around a mask (h, w) in the picture."""
         thick = max(1, self._size // 200)
         inside = mask.astype(np.uint8)
-        for reach, colour in ((2 * thick + 1, _RIM), (thick + 1, _EYE_TARGET)):
+        for reach, colour in ((2 * thick + 1, _RIM), (thick + 1, _HIGHLIGHT)):
             kernel = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
             picture[(cv2.dilate(inside, kernel) > 0) & ~mask] = colour
 
     def _in_hand(self, picture: Image, item: int) -> None:
-        """Show what is held in a corner."""
+        """Show the held object in a corner."""
         side, gap = self._size // 4, self._size // 50
         icon = self._icons.get(item)
         if icon is None:
@@ -341,19 +342,19 @@ class EyePainter:
 
 
 def _icon(asset: Asset, side: int) -> Image:
-    """Return a thing's picture with a label above it, (side, side, 3)."""
+    """Return a picture of an asset with a label above it, (side, side, 3)."""
     label = side // 6
     canvas = Canvas((0.0, 0.0), (float(side), float(side)), side, _PAPER)
-    canvas.text((side / 2.0, side - 0.58 * label), "in hand", 0.42 * label, _EYE_INK)
+    canvas.text((side / 2.0, side - 0.58 * label), "in hand", 0.42 * label, _LETTERS)
     icon = canvas.finished()
     icon[label:] = draw_assets([asset], side, side - label)
     edge = max(1, side // 40)
-    icon[:edge] = icon[-edge:] = _EYE_TARGET
-    icon[:, :edge] = icon[:, -edge:] = _EYE_TARGET
+    icon[:edge] = icon[-edge:] = _HIGHLIGHT
+    icon[:, :edge] = icon[:, -edge:] = _HIGHLIGHT
     return icon
 
 
-_EYE_INK: Final[RGB] = (40, 42, 50)
+_LETTERS: Final[RGB] = (40, 42, 50)
 _FAINT: Final[RGB] = (104, 106, 114)
 _STRIP_BAD: Final[RGB] = (200, 36, 24)
 _GOOD: Final[RGB] = (24, 128, 66)
@@ -372,7 +373,7 @@ def _strip(width: int, height: int, background: RGB = _PAPER) -> Canvas:
 
 
 def _fitting(canvas: Canvas, text: str, height_px: float, room: float) -> float:
-    """Return a letter height at most `height_px` at which a text fits."""
+    """Return the largest letter height up to `height_px` at which a text fits."""
     return min(height_px, height_px * room / max(canvas.text_width(text, height_px), 1.0))
 
 
@@ -387,7 +388,7 @@ def _colour(result: StepResult) -> RGB:
 
 
 class Header:
-    """Which episode this is, and how far it has come."""
+    """Strip with the episode's id and the number of the step."""
 
     def __init__(self, story: Story, width: int, size: int) -> None:
         self._unit = size / _REFERENCE
@@ -397,7 +398,7 @@ class Header:
         self._text = f"{episode.episode_id}   {episode.mode}   {rooms}"
 
     def draw(self, shot: Shot) -> Image:
-        """Return the strip, (height, width, 3)."""
+        """Return the strip at a shot, (height, width, 3) uint8 RGB."""
         canvas, unit = _strip(self._width, self.height), self._unit
         y = self.height / 2.0
         count = f"step {shot.moment.step} of {shot.moment.total}"
@@ -411,14 +412,14 @@ class Header:
 
 
 class Footer:
-    """What was done, how far the goal is, what is held; and all actions as a row of colours."""
+    """Strip with the action in words, the goal's distance, the held object and all actions."""
 
     def __init__(self, story: Story, width: int, size: int) -> None:
         self._story, self._unit = story, size / _REFERENCE
         self._width, self.height = width, 2 * round(38 * self._unit)
 
     def draw(self, shot: Shot) -> Image:
-        """Return the strip, (height, width, 3)."""
+        """Return the strip at a shot, (height, width, 3) uint8 RGB."""
         canvas, unit = _strip(self._width, self.height), self._unit
         left, room = 8.0 * unit, self._width - 16.0 * unit
         height = _fitting(canvas, shot.text, 13.0 * unit, room)
@@ -436,7 +437,7 @@ class Footer:
         return canvas.finished()
 
     def _paint_actions(self, canvas: Canvas, step: int) -> None:
-        """Paint a cell for each action, pale while it is to come; failures are notched in red."""
+        """Paint a cell for each action: pale if it is to come, notched in red if it failed."""
         results, unit = self._story.results, self._unit
         left, low, high = 8.0 * unit, 8.0 * unit, 19.0 * unit
         each = (self._width - 16.0 * unit) / max(len(results), 1)
@@ -458,7 +459,7 @@ class Footer:
 
 
 def title_card(story: Story, title: str, size: int) -> Image:
-    """Return what stands in the camera's place at the beginning, (size, size, 3)."""
+    """Return the title card, shown in place of the camera's picture, (size, size, 3) uint8."""
     unit = size / _REFERENCE
     canvas = _strip(size, size, (240, 238, 232))
     rows = _title_rows(story, title)
@@ -479,19 +480,19 @@ def title_card(story: Story, title: str, size: int) -> Image:
 
 
 def _title_rows(story: Story, title: str) -> list[tuple[RGB | None, int, str]]:
-    """Colour of a mark, number in it, text."""
+    """Rows of the title card: colour of a mark, number in it, text."""
     episode = story.episode
     rooms = "1 room" if episode.room_count == 1 else f"{episode.room_count} rooms"
-    way = (
+    path = (
         "cut off"
         if episode.obstructed_path_steps is None
         else f"{episode.obstructed_path_steps} steps"
     )
-    said = "blocked: something must be moved" if episode.interactive else "lengthened: a detour"
+    text = "blocked: something must be moved" if episode.interactive else "lengthened: a detour"
     rows: list[tuple[RGB | None, int, str]] = [
         (None, 0, f"{episode.episode_id}, {rooms}"),
-        (None, 0, said),
-        (None, 0, f"goal: {way}, without obstacles {episode.shortest_path_steps} steps"),
+        (None, 0, text),
+        (None, 0, f"goal: {path}, without obstacles {episode.shortest_path_steps} steps"),
         (None, 0, _summary(story, title)),
         (START, 0, "start"),
         (GOAL, 0, "goal"),

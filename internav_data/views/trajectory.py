@@ -1,4 +1,4 @@
-"""Where an agent went, from above, and what it pushed and picked, as in the paper's figure 5."""
+"""Trajectory of an agent from above with its interactions, as in the paper's figure 5."""
 
 from __future__ import annotations
 
@@ -11,10 +11,7 @@ import numpy as np
 
 from internav_data.records.agent import AgentSpec
 from internav_data.views.captions import with_caption
-from internav_data.views.plan import PAPER, house_canvas, paint_house, paint_labels
-from internav_data.views.replay_story import played
-from internav_data.views.silhouettes import outlines, shaded
-from internav_data.views.tasks import (
+from internav_data.views.episodes import (
     COLOURS,
     GOAL,
     NAMES,
@@ -25,6 +22,9 @@ from internav_data.views.tasks import (
     paint_obstacle,
     paint_start,
 )
+from internav_data.views.plan import PAPER, house_canvas, paint_house, paint_labels
+from internav_data.views.replay_story import play
+from internav_data.views.silhouettes import shaded, silhouettes
 from internav_data.world import Action, HouseModel
 from internav_data.world.actions import INTERACTION_KINDS
 
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 EARLY: Final[RGB] = (240, 150, 190)
 LATE: Final[RGB] = (160, 16, 92)
-"""The way is drawn from one to the other as time goes by."""
+"""The path fades from `EARLY` to `LATE` over time."""
 WORKED: Final[RGB] = (24, 150, 80)
 FAILED: Final[RGB] = (214, 40, 28)
 _GHOST: Final[RGB] = (120, 84, 10)
@@ -54,25 +54,27 @@ def draw_trajectory(
     *,
     pixels: int = 700,
     lines: Sequence[str] = (),
-    model: PushModel = "force",
+    push_model: PushModel = "force",
 ) -> Image:
     """Draw an episode from above as it was played, north (y) up.
 
-    Things lie as at the start; dashed outlines are where they lie at the end. Green dots and red
-    crosses are interactions that worked and failed, where the agent stood.
+    Objects lie as at the start; dashed outlines are their poses at the end. Green dots and red
+    crosses mark the agent's position at successful and failed interactions.
 
     Parameters
     ----------
-    house, episode, assets
-        What was played; the episode's house, or the stage made of it.
+    house
+        The episode's house or its model.
+    episode, assets
+        The episode, and the assets of its obstacles by asset_id.
     actions
-        What was done, -1 for a wait; the stored expert's by default.
+        Numbers of `Action`, -1 for a wait; the stored expert's by default.
     pixels
         Longer side of the plan; legend and caption are added below it.
     lines
-        What to write below it.
-    model
-        How pushes are answered.
+        Lines of the caption.
+    push_model
+        Physics of pushes: "force" or "kick".
 
     Returns
     -------
@@ -83,22 +85,22 @@ def draw_trajectory(
     UsageError
         The house or an asset is another's, there is no expert, or no such action.
     """
-    stage = house if isinstance(house, HouseModel) else HouseModel.of(house)
-    story = played(stage, episode, assets, actions, model)
-    canvas = house_canvas(stage.house, pixels)
-    on_way = episode.room_paths[0] if episode.room_paths else None
-    paint_house(canvas, stage.house, on_way)
-    shapes = [outlines(assets[o.asset_id], o.pose) for o in episode.obstacles]
+    model = house if isinstance(house, HouseModel) else HouseModel.of(house)
+    story = play(model, episode, assets, actions, push_model)
+    canvas = house_canvas(model.house, pixels)
+    on_path = episode.room_paths[0] if episode.room_paths else None
+    paint_house(canvas, model.house, on_path)
+    shapes = [silhouettes(assets[o.asset_id], o.pose) for o in episode.obstacles]
     for obstacle, parts in zip(episode.obstacles, shapes, strict=True):
         paint_obstacle(canvas, obstacle_kind(obstacle), parts)
     _paint_moved(canvas, story)
     taken = [part.plan for parts in shapes for part in parts]
     ends = [(episode.start.x, episode.start.y), (episode.goal.x, episode.goal.y)]
     taken += [canvas.arc(at, 0.45, 0.0, 360.0) for at in ends]
-    paint_labels(canvas, stage.house, taken)
+    paint_labels(canvas, model.house, taken)
     paint_start(canvas, episode)
     paint_goal(canvas, episode)
-    _paint_way(canvas, story)
+    _paint_path(canvas, story)
     _paint_end(canvas, story)
     _paint_interactions(canvas, story)
     for number, (obstacle, parts) in enumerate(zip(episode.obstacles, shapes, strict=True), 1):
@@ -113,7 +115,7 @@ def _legend(episode: Episode) -> list[tuple[RGB, str]]:
     return entries + [(COLOURS[k], f"{NAMES[k]} obstacle") for k in NAMES if k in kinds]
 
 
-def _paint_way(canvas: Canvas, story: Story) -> None:
+def _paint_path(canvas: Canvas, story: Story) -> None:
     points = [moment.world.position for moment in story.moments]
     legs = [(k, a, b) for k, (a, b) in enumerate(itertools.pairwise(points)) if a != b]
     for _, a, b in legs:
@@ -125,7 +127,7 @@ def _paint_way(canvas: Canvas, story: Story) -> None:
 
 
 def _paint_interactions(canvas: Canvas, story: Story) -> None:
-    """Mark where the agent stood; marks at one place fan out, the first ones in the middle."""
+    """Mark the agent's positions; marks at one place fan out, the first ones in the middle."""
     seen: dict[Vec2, int] = {}
     for moment in story.moments:
         result = moment.result
@@ -168,7 +170,7 @@ def _paint_end(canvas: Canvas, story: Story) -> None:
 
 
 def _paint_moved(canvas: Canvas, story: Story) -> None:
-    """Outline where things lie at the end that lay elsewhere at the start."""
+    """Outline the end poses of objects that have moved."""
     first, last = story.moments[0].world, story.moments[-1].world
     for before, after in zip(first.items, last.items, strict=True):
         begin, end = before.pose, after.pose
@@ -180,7 +182,7 @@ def _paint_moved(canvas: Canvas, story: Story) -> None:
 
 
 def _ring(asset: Asset, pose: Pose) -> Floats:
-    corners = np.vstack([part.plan for part in outlines(asset, pose)]).astype(np.float32)
+    corners = np.vstack([part.plan for part in silhouettes(asset, pose)]).astype(np.float32)
     return np.asarray(cv2.convexHull(corners), np.float64).reshape(-1, 2)
 
 
