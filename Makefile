@@ -80,8 +80,8 @@ demo: $(STAMP) ## make a small dataset, prove it right, draw it: about three min
 	@echo "Load it   $(BIN)/python examples/stream_episodes.py $(DEMO)/dataset"
 	@echo "Make more $(BIN)/internav-gen generate --help"
 
-DEMO_TRAIN := --device cpu --preset small --init-from expert --steps 32768 \
-  --set cloning.frames=80000 --set cloning.epochs=1 --set ppo.critic_rollouts=4 \
+DEMO_TRAIN := --device cpu --preset small --pretrain bc --steps 32768 \
+  --set cloning.frames=80000 --set cloning.epochs=1 --set ppo.critic_warmup_rollouts=4 \
   --set stages.auxiliary_share=0 --set stages.joint_learning_rate=3e-4 \
   --set run.max_steps=150 --set run.validate_every=8
 DEMO_MEASURE := --split all --max-steps 150 --force
@@ -94,14 +94,14 @@ demo-train: $(STAMP) ## see CaMP learn on a small dataset: about five minutes
 	  --rooms 1 --set 'episodes.max_obstacles=[2,2,2]' --seed 1
 	rm -rf $(DEMO)/camp
 	$(BIN)/camp-train $(DEMO)/houses --out $(DEMO)/camp $(DEMO_TRAIN) --stages cloning
-	$(BIN)/camp-eval $(DEMO)/camp $(DEMO)/unseen $(DEMO_MEASURE) --out $(DEMO)/cloned --no-oracles >/dev/null
+	$(BIN)/camp-eval $(DEMO)/camp $(DEMO)/unseen $(DEMO_MEASURE) --out $(DEMO)/cloned --no-reference-policies >/dev/null
 	$(BIN)/camp-train $(DEMO)/houses --out $(DEMO)/camp --resume --stages single,all
 	$(BIN)/camp-eval $(DEMO)/camp $(DEMO)/unseen $(DEMO_MEASURE) --out $(DEMO)/trained --video >/dev/null
 	$(BIN)/camp-eval compare $(DEMO)/cloned $(DEMO)/trained --dataset $(DEMO)/unseen --force \
 	  --out $(DEMO)/learnt
 	@echo
 	@echo "Look at   $(DEMO)/trained/report.html: tables, curves, where it went"
-	@echo "Watch     $(DEMO)/trained/films: what it saw and meant, step by step"
+	@echo "Watch     $(DEMO)/trained/videos: what it saw and meant, step by step"
 
 .PHONY: test
 test: $(STAMP) ## run the tests (but not the slow campaigns)

@@ -25,7 +25,7 @@ DATA = {
 }
 """Both of 1-3 rooms and at most three obstacles."""
 DATA_BOTH = ("--rooms", "1-3", "--set", "episodes.max_obstacles=[3,3,3]")
-NEAR = ("--where", "shortest_path_m<=6")
+NEAR = ("--filter", "shortest_path_m<=6")
 """Episodes to train and to measure on; shortest_path_m is 2 m at least."""
 METHODS = {
     "ppo": ("--method", "ppo"),
@@ -35,14 +35,14 @@ METHODS = {
     "camp": ("--method", "camp"),
 }
 TRAINING = (
-    "--device", "cpu", "--preset", "small", "--init-from", "expert", *NEAR,
+    "--device", "cpu", "--preset", "small", "--pretrain", "bc", *NEAR,
     "--steps", 60_000, "--set", "run.max_steps=200", "--set", "cloning.frames=100000",
     "--set", "cloning.epochs=1", "--set", "run.validate_every=1000",
     "--set", "run.validation_episodes=32", "--set", "run.tensorboard=false",
-    "--set", "ppo.critic_rollouts=4", "--set", "stages.joint_learning_rate=3e-4",
+    "--set", "ppo.critic_warmup_rollouts=4", "--set", "stages.joint_learning_rate=3e-4",
 )  # fmt: skip
 LEAST_EPISODES = 50
-MEASURE = ("--split", "all", *NEAR, "--max-steps", 200, "--limit", 400, "--no-oracles")
+MEASURE = ("--split", "all", *NEAR, "--max-steps", 200, "--limit", 400, "--no-reference-policies")
 
 
 def tool(name: str, *words: object) -> None:
@@ -114,12 +114,12 @@ def main() -> None:
     with ThreadPoolExecutor(args.jobs) as pool:
         list(pool.map(lambda run: one_run(folder, *run), runs))
     unseen, results = folder / "unseen", folder / "results"
-    oracles = results / "oracles"
-    if not (oracles / "tables.md").exists():
-        tool("camp-eval", "expert,planner,random", unseen, *MEASURE[:-1], "--out", oracles)
+    references = results / "reference-policies"
+    if not (references / "tables.md").exists():
+        tool("camp-eval", "expert,shortest_path,random", unseen, *MEASURE[:-1], "--out", references)
     for kind in ("cloned", "final"):
         found = sorted((results / kind).iterdir())
-        tool("camp-eval", "compare", *found, oracles, "--dataset", unseen,
+        tool("camp-eval", "compare", *found, references, "--dataset", unseen,
              "--out", results / f"all-{kind}", "--force")  # fmt: skip
     draw_curves(folder)
 

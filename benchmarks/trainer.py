@@ -76,7 +76,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
     torch.set_num_threads(1)
-    config = from_mapping(preset("small"), {"ppo": {"kl_limit": None}}, "")  # stops for nobody
+    config = from_mapping(preset("small"), {"ppo": {"target_kl": None}}, "")  # stops for nobody
     methods = options.methods.split(",")
     method_row(options.dataset, methods[0], config, options.rollouts)  # prepares models, compiles
     result = {
@@ -85,8 +85,8 @@ def main() -> int:
         "torch": torch.__version__,
         "threads": 1,
         "targets": TARGETS,
-        "environments": config.ppo.environments,
-        "steps": config.ppo.steps,
+        "environments": config.ppo.num_envs,
+        "steps": config.ppo.num_steps,
         "image_size": config.network.image_size,
         "update": update_row(options.dataset, config),
         "methods": {
@@ -105,7 +105,7 @@ def lived(dataset: Path, method: str, config: CampConfig) -> tuple[Agent, MainTa
     """Return an agent among its environments."""
     agent = make_agent(method, config)
     episodes = load_dataset(dataset, "train")
-    size, count = config.network.image_size, config.ppo.environments
+    size, count = config.network.image_size, config.ppo.num_envs
     env = MainTask(episodes, count, image_size=size, max_steps=MAX_STEPS, ids=agent.wants_ids)
     return agent, env, Collector(env, agent)
 
@@ -115,11 +115,11 @@ def method_row(dataset: Path, method: str, config: CampConfig, rollouts: int) ->
     agent, env, collector = lived(dataset, method, config)
     collector.begin(env.begin(0))
     optimiser = torch.optim.Adam(agent.optimised(), config.stages.joint_learning_rate)
-    count, steps = config.ppo.environments, config.ppo.steps
+    count, steps = config.ppo.num_envs, config.ppo.num_steps
 
     def train(number: int) -> None:
         rollout = collector.collect(uniforms_of(0, number, range(count), steps))
-        orders = orders_of(0, number, config.ppo.epochs, count)
+        orders = orders_of(0, number, config.ppo.update_epochs, count)
         update(agent, optimiser, rollout, config.ppo, orders)
 
     train(0)
@@ -151,16 +151,18 @@ def method_row(dataset: Path, method: str, config: CampConfig, rollouts: int) ->
 
 def update_row(dataset: Path, config: CampConfig) -> dict[str, Any]:
     """Time one update both ways, after both gave the same answers on a small one."""
-    small = from_mapping(config, {"ppo": {"environments": 4, "minibatches": 2, "steps": 12}}, "")
+    small = from_mapping(
+        config, {"ppo": {"num_envs": 4, "num_minibatches": 2, "num_steps": 12}}, ""
+    )
     both = (update, naive_update)
     ours, theirs = (one_update(dataset, small, how)[1] for how in both)
-    names = ("policy_loss", "value_loss", "entropy", "gradient_norm")
+    names = ("policy_loss", "value_loss", "entropy", "grad_norm")
     apart = max(abs(ours[name] - theirs[name]) for name in names)
     one_update(dataset, config, update)  # warms up
     taken = [[one_update(dataset, config, how)[0] for how in both] for _ in range(REPEATS)]
     fast, slow = (min(column) for column in zip(*taken, strict=True))
     return {
-        "samples": config.ppo.environments * config.ppo.steps * config.ppo.epochs,
+        "samples": config.ppo.num_envs * config.ppo.num_steps * config.ppo.update_epochs,
         "internav_s": round(fast, 3),
         "per_sample_s": round(slow, 3),
         "ratio": round(slow / fast, 2),
@@ -176,12 +178,14 @@ def one_update(
     """Return the seconds that an update took, and what was said of it."""
     agent, env, collector = lived(dataset, "camp", config)
     collector.begin(env.begin(0))
-    count = config.ppo.environments
-    rollout = collector.collect(uniforms_of(0, 0, range(count), config.ppo.steps))
+    count = config.ppo.num_envs
+    rollout = collector.collect(uniforms_of(0, 0, range(count), config.ppo.num_steps))
     env.close()
     optimiser = torch.optim.Adam(agent.optimised(), config.stages.joint_learning_rate)
     begin = time.process_time()
-    said = how(agent, optimiser, rollout, config.ppo, orders_of(0, 0, config.ppo.epochs, count))
+    said = how(
+        agent, optimiser, rollout, config.ppo, orders_of(0, 0, config.ppo.update_epochs, count)
+    )
     return time.process_time() - begin, said
 
 
@@ -197,28 +201,28 @@ def naive_update(
     returns = advantages + rollout.values
     advantages = (advantages - advantages.mean()) / (advantages.std(correction=0) + 1e-8)
     told: list[dict[str, float]] = []
-    size = config.environments // config.minibatches
+    size = config.num_envs // config.num_minibatches
     for order in orders:
         for first in range(0, len(order), size):
             parts = []
             for k in order[first : first + size]:
                 hidden = rollout.batch.state["hidden"][k]
-                for t in range(config.steps):
+                for t in range(config.num_steps):
                     log_prob, value, entropy, hidden = naive_step(
                         agent, rollout.batch, t, k, hidden
                     )
                     ratio = (log_prob - rollout.log_probs[t, k]).exp()
-                    clipped = ratio.clamp(1.0 - config.clip, 1.0 + config.clip)
+                    clipped = ratio.clamp(1.0 - config.clip_coef, 1.0 + config.clip_coef)
                     gain = torch.minimum(ratio * advantages[t, k], clipped * advantages[t, k])
                     parts.append((-gain, 0.5 * (value - returns[t, k]) ** 2, entropy))
             policy, wrong, entropy = (torch.stack(part).mean() for part in zip(*parts, strict=True))
-            loss = policy + config.value_coefficient * wrong - config.entropy_coefficient * entropy
+            loss = policy + config.vf_coef * wrong - config.ent_coef * entropy
             optimiser.zero_grad()
             loss.backward()
-            norm = torch.nn.utils.clip_grad_norm_(agent.optimised(), config.gradient_norm)
+            norm = torch.nn.utils.clip_grad_norm_(agent.optimised(), config.max_grad_norm)
             optimiser.step()
             said = {"policy_loss": policy, "value_loss": wrong, "entropy": entropy}
-            told.append({name: v.item() for name, v in {**said, "gradient_norm": norm}.items()})
+            told.append({name: v.item() for name, v in {**said, "grad_norm": norm}.items()})
     return {name: sum(row[name] for row in told) / len(told) for name in told[0]}
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from internav_cli.main import launch
-from internav_cli.options import DATASET, JSON, dataset_to_read, positive
+from internav_cli.options import DATASET, JSON, dataset_to_read, positive, renamed_option
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -41,7 +41,7 @@ class Commands(click.Group):
 Examples:
   camp-eval runs/camp-0                                a trained run on the test split
   camp-eval runs/camp-0 data/mine                      on another dataset
-  camp-eval expert,planner,random                      what bounds every column
+  camp-eval expert,shortest_path,random                what bounds every column
   camp-eval compare runs/camp-* runs/ppo-*             methods against each other, over seeds
   camp-eval evaluate --help                            all options of the first two
 
@@ -60,12 +60,12 @@ def cli(*, debug: bool) -> None:
 Examples:
   camp-eval runs/camp-0
   camp-eval runs/camp-0 data/mine --greedy --video --out results/greedy
-  camp-eval runs/camp-0 data/mine --where "room_count<=3" --where "mode=blocked"
-  camp-eval expert,planner,random data/mine --split val --limit 200
+  camp-eval runs/camp-0 data/mine --filter "room_count<=3" --filter "mode=blocked"
+  camp-eval expert,shortest_path,random data/mine --split val --limit 200
 
 \b
-RUN is a folder that camp-train wrote, or some of expert, planner, random with
-commas between them. DATASET defaults to the folder that INTERNAV_DATASET names,
+RUN is a folder that camp-train wrote, or some of expert, shortest_path,
+random with commas between them. DATASET defaults to the folder that INTERNAV_DATASET names,
 else internav-dataset. Written: episodes.parquet and evaluation.json for each,
 tables.md, tables.json, report.html.""",
 )
@@ -79,7 +79,7 @@ tables.md, tables.json, report.html.""",
     help="Which episodes.",
 )
 @click.option(
-    "--where",
+    "--filter",
     "conditions",
     multiple=True,
     metavar="COLUMN=VALUE",
@@ -97,18 +97,25 @@ tables.md, tables.json, report.html.""",
     "--batch", type=int, default=16, show_default=True, help="Episodes played side by side."
 )
 @click.option("--workers", type=int, default=0, help="Processes that step them.  [default: none]")
-@click.option("--oracles/--no-oracles", default=True, help="Rows of expert and planner beside.")
+@click.option(
+    "--reference-policies/--no-reference-policies",
+    default=True,
+    help="Rows of expert and shortest_path beside.",
+)
 @click.option("--video", is_flag=True, help="Film the best, the median and the worst episode.")
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
-    help="Folder to write.  [default: RUN/evaluation-SPLIT; ./evaluation-SPLIT for oracles]",
+    help="Folder to write.  [default: RUN/evaluation-SPLIT; ./evaluation-SPLIT without a run]",
 )
 @click.option("--force", is_flag=True, help="Write over an evaluation that is there.")
+@renamed_option("--where", "--filter")
+@renamed_option("--oracles", "--reference-policies", is_flag=True)
+@renamed_option("--no-oracles", "--no-reference-policies", is_flag=True)
 @JSON
 def evaluate_command(**given: Any) -> int:  # noqa: ANN401 - the options above
     """Let RUN play DATASET, and print the paper's tables."""
-    from internav_data.camp.policy import candidate, oracles_beside
+    from internav_data.camp.policy import candidate, reference_policies_beside
     from internav_data.evaluation.archive import (
         Evaluation,
         folder_name,
@@ -117,30 +124,30 @@ def evaluate_command(**given: Any) -> int:  # noqa: ANN401 - the options above
     )
     from internav_data.evaluation.evaluate import evaluate
     from internav_data.evaluation.report import methods_of
-    from internav_data.evaluation.videos import films
+    from internav_data.evaluation.videos import videos
 
     names, run = _who(given["run"])
     out = given["out"] or (run or Path()) / f"evaluation-{given['split']}"
     _check_out(out, force=given["force"])
     dataset, settings = _dataset(given), _settings(given)
     settings.check()
-    if run is not None and given["oracles"]:
-        names = [*names, *oracles_beside(dataset)]
+    if run is not None and given["reference_policies"]:
+        names = [*names, *reference_policies_beside(dataset)]
     greedy, cut = given["greedy"], given["without_intent"]
     candidates = [
         candidate(name, dataset, settings, greedy=greedy, without_intent=cut) for name in names
     ]
     found = []
     for each in candidates:
-        results = evaluate(each.player, dataset, settings, _teller(each.about.name))
+        results = evaluate(each.policy, dataset, settings, _teller(each.about.name))
         found.append(Evaluation(each.about, tuple(results)))
     forget_evaluations(out)
     for evaluation in found:
         folder = out / folder_name(evaluation.about.name)
         write_evaluation(folder, evaluation.about, evaluation.results)
     if given["video"]:
-        first = candidates[0].player
-        for path in films(out / "films", first, found[0].results, dataset, settings):
+        first = candidates[0].policy
+        for path in videos(out / "videos", first, found[0].results, dataset, settings):
             click.echo(f"wrote {path}", err=True)
     logs = {} if run is None else {run.name: run}
     _write(out, methods_of(found), dataset, logs, as_json=given["as_json"])
@@ -186,10 +193,10 @@ def compare_command(
 
 def _who(run: str) -> tuple[list[str], Path | None]:
     """Return names to evaluate, and the run's folder where it is one."""
-    from internav_data.evaluation.reference_policies import ORACLES
+    from internav_data.evaluation.reference_policies import REFERENCE_POLICIES
 
     names = [name.strip() for name in run.split(",")]
-    if all(name in ORACLES for name in names):
+    if all(name in REFERENCE_POLICIES for name in names):
         return list(dict.fromkeys(names)), None
     return [run], Path(run)
 

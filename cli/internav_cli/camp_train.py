@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from internav_cli.main import launch
-from internav_cli.options import DATASET, JSON, dataset_to_read
+from internav_cli.options import DATASET, JSON, dataset_to_read, renamed_option
 
 if TYPE_CHECKING:
     from internav_data.camp.config import CampConfig
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 _SETTINGS = {
     "seed": "seed",
-    "conditions": "data.where",
+    "conditions": "data.filter",
     "intent": "agent.intent",
     "sync_every": "agent.sync_every",
-    "steps": "stages.steps",
+    "steps": "stages.total_timesteps",
     "workers": "run.workers",
 }
 """Options that are settings, and their keys."""
@@ -33,9 +33,9 @@ _SETTINGS = {
     epilog="""\b
 Examples:
   camp-train                                              CaMP from scratch, into runs/camp-0
-  camp-train --init-from expert --steps 100000            clone the dataset's expert first
+  camp-train --pretrain bc --steps 100000                 clone the dataset's expert first
   camp-train data/mine --method ppo --seed 1 --out runs/ppo-1
-  camp-train data/mine --where "shortest_path_m<=6" --set run.max_steps=200
+  camp-train data/mine --filter "shortest_path_m<=6" --set run.max_steps=200
   camp-train --dry-run                                    how long it would take
   camp-train --out runs/camp-0 --resume                   go on after Ctrl-C
   camp-train --print-config > mine.toml                   all settings, to be changed
@@ -72,12 +72,12 @@ interrupted.""",
     "overrides",
     multiple=True,
     metavar="KEY=VALUE",
-    help="One setting, as in --set ppo.steps=32; wins over the file.  [repeatable]",
+    help="One setting, as in --set ppo.num_steps=32; wins over the file.  [repeatable]",
 )
 @click.option("--seed", type=int, help="Every random number derives from it.  [default: 0]")
 @click.option("--steps", type=int, help="Environment steps of all stages together.")
 @click.option(
-    "--where",
+    "--filter",
     "conditions",
     multiple=True,
     metavar="COLUMN=VALUE",
@@ -89,12 +89,14 @@ interrupted.""",
     help="Some of auxiliary,single,all, in order, or cloning alone.  [default: all three]",
 )
 @click.option(
-    "--init-from", type=click.Choice(["expert"]), help="Clone the dataset's expert first."
+    "--pretrain",
+    type=click.Choice(["bc"]),
+    help="Begin with behaviour cloning of the dataset's expert.",
 )
 @click.option(
     "--intent",
     type=click.Choice(["integrated", "policy", "recursive", "none"]),
-    help="What global is told (Table 4).  [default: integrated]",
+    help="Intent input of the global policy (Table 4).  [default: integrated]",
 )
 @click.option("--sync-every", type=int, help="Rollouts between copies of global.  [default: 3]")
 @click.option("--workers", type=int, help="Processes that step environments.  [default: none]")
@@ -104,6 +106,8 @@ interrupted.""",
 @click.option("--resume", is_flag=True, help="Go on from the last checkpoint of --out.")
 @click.option("--dry-run", is_flag=True, help="Tell how long it would take; write nothing.")
 @click.option("--print-config", is_flag=True, help="Print all settings as TOML and stop.")
+@renamed_option("--init-from", "--pretrain bc")
+@renamed_option("--where", "--filter")
 @JSON
 def command(**given: Any) -> int:  # noqa: ANN401 - the options above
     """Train an agent on DATASET: CaMP, one of its baselines, or your own."""
@@ -148,7 +152,7 @@ def _request(given: dict[str, Any]) -> Request:
         method=method,
         config=config,
         parts=parts,
-        clones=given["init_from"] is not None,
+        clones=given["pretrain"] is not None,
         device=given["device"],
     )
 

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from internav_data.camp.agents import Agent, State
     from internav_data.camp.config import CampConfig
 
-FORMAT: Final = 1
+FORMAT: Final = 2
 FOLDER: Final = "checkpoints"
 POINTER: Final = "checkpoints.json"
 ABOUT, WEIGHTS, TRAINING = "checkpoint.json", "weights.safetensors", "training.safetensors"

@@ -1,4 +1,4 @@
-"""The first stage of a run with `--init-from expert`: what the dataset's expert does is cloned.
+"""The first stage of a run with `--pretrain bc`: what the dataset's expert does is cloned.
 
 Cloning the dataset's expert: its episodes are played again and its actions made likely.
 """
@@ -58,7 +58,7 @@ def experts_of(dataset: Dataset[Episode]) -> Experts:
         if expert is None:
             raise UsageError(
                 f"episode {episode_id} has no expert to clone: generate the dataset with "
-                "experts, or train without --init-from expert"
+                "experts, or train without --pretrain bc"
             )
         return expert.actions
 
@@ -170,10 +170,10 @@ def clone(
     Yields
     ------
     dict
-        `loss`, `gradient_norm`, `learning_rate`, `update`, `updates` (how many there will be).
+        `loss`, `grad_norm`, `learning_rate`, `update`, `updates` (how many there will be).
     """
     count = demonstrations.env.num_envs
-    an_epoch = max(1, round(config.frames / (config.environments * config.steps)))
+    an_epoch = max(1, round(config.frames / (config.num_envs * config.num_steps)))
     updates = an_epoch * config.epochs
     state = agent.initial_state(count) if state is None else state
     for update in range(first, updates):
@@ -182,7 +182,7 @@ def clone(
         rate = config.learning_rate * (1.0 - update / updates)
         for group in optimiser.param_groups:
             group["lr"] = rate
-        batch = demonstrations.collect(config.steps, state)
+        batch = demonstrations.collect(config.num_steps, state)
         now = agent.evaluate(batch)
         frames = reduce(now.log_prob.new_tensor(float(now.log_prob.numel())))
         wrong = -now.log_prob if now.loss is None else now.loss - now.log_prob
@@ -196,7 +196,7 @@ def clone(
         if keep is not None:
             keep(state)
         yield {
-            "loss": said, "gradient_norm": norm, "learning_rate": rate,
+            "loss": said, "grad_norm": norm, "learning_rate": rate,
             "update": float(update + 1), "updates": float(updates),
         }  # fmt: skip
 
@@ -210,7 +210,7 @@ def clone_expert(trainer: Trainer) -> None:
     """Clone from where a run is to the end of cloning."""
     place, config, agent = trainer.place, trainer.config, trainer.agent
     given, reduce = config.cloning, trainer.ranks.reduce
-    count = given.environments
+    count = given.num_envs
     own, task, seen = _demonstrations(trainer)
     optimiser = torch.optim.Adam(agent.optimised(), given.learning_rate)
     state: State = agent.initial_state(len(own))
@@ -231,8 +231,8 @@ def clone_expert(trainer: Trainer) -> None:
         ):  # fmt: skip
             del held[1:]
             place.cloned_updates += 1
-            place.cloned_frames += count * given.steps
-            rate = rates(count * given.steps, [trainer.lap()] * 3)["steps_per_s"]
+            place.cloned_frames += count * given.num_steps
+            rate = rates(count * given.num_steps, [trainer.lap()] * 3)["steps_per_s"]
             trainer.write({"step": place.cloned_frames, "cloning": {**said, "frames_per_s": rate}})
             stop = trainer.asked()
             last = said["update"] == said["updates"]
@@ -269,6 +269,6 @@ def forecast_cloning(trainer: Trainer, measured: int) -> tuple[int, float]:
 def _demonstrations(trainer: Trainer) -> tuple[range, Task, Demonstrations]:
     """Return this rank's environments, by number and opened, and experts in them."""
     config, agent = trainer.config, trainer.agent
-    own = trainer.ranks.share(config.cloning.environments, "cloning.environments")
+    own = trainer.ranks.share(config.cloning.num_envs, "cloning.num_envs")
     task = trainer.data.main(config, len(own), ids=agent.wants_ids)
     return own, task, Demonstrations(task, agent, experts_of(trainer.data.episodes()))

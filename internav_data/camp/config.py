@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal
 
 from internav_data.core import config as values
 from internav_data.records.errors import UsageError
@@ -15,7 +15,6 @@ from internav_data.records.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
-
 
 _MOST: Final = 10**12
 _LIMITS: Final[dict[str, tuple[float, float]]] = {
@@ -25,17 +24,16 @@ _LIMITS: Final[dict[str, tuple[float, float]]] = {
     "goal_embedding": (1, 8192),
     "depth_limit_m": (0.1, 1000.0),
     "goal_scale_m": (0.1, 1000.0),
-    "end_chance": (1e-6, 0.5),
-    "interact_chance": (1e-6, 0.49),
+    "initial_done_probability": (1e-6, 0.5),
+    "initial_interaction_probability": (1e-6, 0.49),
     "nie_objects": (1, 64),
-    "environments": (1, 65536),
-    "steps": (1, _MOST),
-    "kl_limit": (0.0, _MOST),
+    "num_envs": (1, 65536),
+    "target_kl": (0.0, _MOST),
     "gamma": (0.0, 1.0),
-    "lam": (0.0, 1.0),
+    "gae_lambda": (0.0, 1.0),
     "auxiliary_share": (0.0, 1.0),
     "single_room_share": (0.0, 1.0),
-    "critic_rollouts": (0, _MOST),
+    "critic_warmup_rollouts": (0, _MOST),
     "max_steps": (1, 10_000),
     "workers": (0, 1024),
     "threads": (1, 1024),
@@ -100,76 +98,101 @@ class AgentConfig:
     """Rollouts between copies of global into the intent policy (K)."""
     forbidden: tuple[Literal["push", "pick"], ...] = ()
     """Options that are never opened."""
-    end_chance: float = 0.01
+    initial_done_probability: float = 0.01
     """Chance at the start that a decision ends the episode, the same for every learner. Uniform
     heads would end episodes after about ten steps."""
-    interact_chance: float = 0.045
+    initial_interaction_probability: float = 0.045
     """Share at the start of Push, and of Pick, among what does not end the episode; Navigate has
     the rest."""
     nie_objects: int = 6
     """Objects that `nie` looks at: the nearest in sight."""
     nie_weight: float = 3.0
     """Of the L1 loss on `nie`'s predicted keypoints (released code)."""
+    RENAMED: ClassVar[dict[str, str]] = {
+        "end_chance": "initial_done_probability",
+        "interact_chance": "initial_interaction_probability",
+    }
+    """Fields of earlier versions, and their names today."""
 
 
 @dataclass(frozen=True, slots=True)
 class PPOConfig:
     """Rollouts and updates."""
 
-    environments: int = 16
+    num_envs: int = 16
     """Stepped side by side."""
-    steps: int = 64
+    num_steps: int = 64
     """Of each environment in a rollout."""
-    epochs: int = 3
+    update_epochs: int = 3
     """Passes over a rollout (the paper's k)."""
-    minibatches: int = 4
+    num_minibatches: int = 4
     """Of whole environments, a pass."""
-    clip: float = 0.2
+    clip_coef: float = 0.2
     """How far the ratio of probabilities may leave 1 before it earns nothing."""
-    clip_value: bool = False
-    """Clip values by `clip` too. 0.1 against returns near 10 throttles the critic."""
-    value_coefficient: float = 0.5
+    clip_vloss: bool = False
+    """Clip values by `clip_coef` too. 0.1 against returns near 10 throttles the critic."""
+    vf_coef: float = 0.5
     """Of half the squared error of values."""
-    entropy_coefficient: float = 0.01
+    ent_coef: float = 0.01
     """Of the entropy that is rewarded."""
     gamma: float = 0.99
     """Discount a step."""
-    lam: float = 0.95
+    gae_lambda: float = 0.95
     """Decay of generalised advantages (lambda)."""
-    gradient_norm: float = 0.5
+    max_grad_norm: float = 0.5
     """Longer gradients are cut to this length."""
-    kl_limit: float | None = 0.03
+    target_kl: float | None = 0.03
     """Updates on a rollout stop before the step whose minibatch is farther from the rollout's
     policy than this; none: never."""
     normalise_advantages: bool = True
     """To mean 0 and deviation 1, over a rollout."""
-    critic_rollouts: int = 10
+    critic_warmup_rollouts: int = 10
     """First rollouts after a start whose critic is new: they train the critic alone."""
+    RENAMED: ClassVar[dict[str, str]] = {
+        "environments": "num_envs",
+        "steps": "num_steps",
+        "epochs": "update_epochs",
+        "minibatches": "num_minibatches",
+        "clip": "clip_coef",
+        "clip_value": "clip_vloss",
+        "value_coefficient": "vf_coef",
+        "entropy_coefficient": "ent_coef",
+        "lam": "gae_lambda",
+        "gradient_norm": "max_grad_norm",
+        "kl_limit": "target_kl",
+        "critic_rollouts": "critic_warmup_rollouts",
+    }
+    """Fields of earlier versions, and their names today."""
 
 
 @dataclass(frozen=True, slots=True)
 class CloningConfig:
-    """Cloning the dataset's expert (`--init-from expert`)."""
+    """Cloning the dataset's expert (`--pretrain bc`)."""
 
     frames: int = 150_000
     """Of the expert, an epoch."""
     epochs: int = 4
     """Passes over them."""
-    environments: int = 16
+    num_envs: int = 16
     """Experts replayed side by side."""
-    steps: int = 16
+    num_steps: int = 16
     """Frames of each in an update, its GRUs carried from one update to the next."""
     learning_rate: float = 1e-3
     """Of Adam; falls to 0 in a straight line."""
     sync_every: int = 100
     """Updates between copies of global into the intent policy."""
+    RENAMED: ClassVar[dict[str, str]] = {
+        "environments": "num_envs",
+        "steps": "num_steps",
+    }
+    """Fields of earlier versions, and their names today."""
 
 
 @dataclass(frozen=True, slots=True)
 class StagesConfig:
     """Environment steps, and how the stages share them; auxiliary ones count."""
 
-    steps: int = 300_000
+    total_timesteps: int = 300_000
     """In all stages together, the same for every method."""
     auxiliary_share: float = 0.1
     """On the three auxiliary tasks; flat methods: the main task in single rooms."""
@@ -183,19 +206,28 @@ class StagesConfig:
     """Of joint training of a hierarchy."""
     decay_over: Literal["stage", "all"] = "stage"
     """What the learning rate falls to 0 over: each stage, with a fresh Adam, or all steps."""
+    RENAMED: ClassVar[dict[str, str]] = {
+        "steps": "total_timesteps",
+    }
+    """Fields of earlier versions, and their names today."""
 
 
 @dataclass(frozen=True, slots=True)
 class DataConfig:
     """Which episodes of the dataset, and what they pay."""
 
-    where: tuple[str, ...] = ()
+    filter: tuple[str, ...] = ()
     """Conditions on columns that all must hold, as "shortest_path_m<=6": training, validation."""
     failed_done_reward: float = 0.0
     """Of Done away from the goal (-1 in the released configuration)."""
-    houses_kept: int = 512
+    house_cache_size: int = 512
     """Houses that a process keeps ready; those of 1 to 3 rooms take 10 ms and 0.1 MB each, and the
     distances to each of their goals besides."""
+    RENAMED: ClassVar[dict[str, str]] = {
+        "where": "filter",
+        "houses_kept": "house_cache_size",
+    }
+    """Fields of earlier versions, and their names today."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,10 +280,10 @@ class CampConfig:
         for key, (value, low, high) in bounds_of(self).items():
             if not low <= value <= high:
                 raise UsageError(f"{key} is {value}: expected {low} … {high}")
-        if self.ppo.environments % self.ppo.minibatches:
+        if self.ppo.num_envs % self.ppo.num_minibatches:
             raise UsageError(
-                f"ppo.minibatches is {self.ppo.minibatches}: minibatches are of whole "
-                f"environments, so it must divide ppo.environments ({self.ppo.environments})"
+                f"ppo.num_minibatches is {self.ppo.num_minibatches}: minibatches are of whole "
+                f"environments, so it must divide ppo.num_envs ({self.ppo.num_envs})"
             )
         least = 36 if self.network.encoder == "paper" else 16
         if self.network.image_size < least:
@@ -309,9 +341,14 @@ def _paper() -> CampConfig:
     return CampConfig(
         network=NetworkConfig(300, "paper", hidden=512, shared_encoder=False),
         ppo=PPOConfig(
-            environments=12, steps=30, epochs=1, minibatches=1, clip=0.1, clip_value=True
+            num_envs=12,
+            num_steps=30,
+            update_epochs=1,
+            num_minibatches=1,
+            clip_coef=0.1,
+            clip_vloss=True,
         ),
-        stages=StagesConfig(steps=10_000_000, side_by_side=False, decay_over="all"),
+        stages=StagesConfig(total_timesteps=10_000_000, side_by_side=False, decay_over="all"),
     )
 
 

@@ -58,7 +58,7 @@ class TrainingData:
         found = load_dataset(self.path, "train", conditions or None)
         if not len(found):
             what = "scenes of a single room" if single_room else "training episodes"
-            what += " for which --where holds" if self._where else ""
+            what += " for which --filter holds" if self._where else ""
             advice = (
                 "generate some (--rooms 1-3), or train --stages all"
                 if single_room
@@ -91,14 +91,14 @@ class TrainingData:
         if not limit or not len(episodes):
             return None
         size, ids = config.network.image_size, agent.wants_ids
-        player = AgentPolicy(method, agent, size, greedy=False, ids=ids)
+        policy = AgentPolicy(method, agent, size, greedy=False, ids=ids)
         settings = EvaluationConfig(
-            batch=min(config.ppo.environments, limit),
+            batch=min(config.ppo.num_envs, limit),
             workers=config.run.workers,
             max_steps=config.run.max_steps,
             limit=limit,
         )
-        results = evaluate(player, episodes, settings)
+        results = evaluate(policy, episodes, settings)
         means = {
             name: sum(float(getattr(each, name)) for each in results) / len(results)
             for name in _MEANS
@@ -110,5 +110,5 @@ def _arguments(config: CampConfig, *, ids: bool) -> dict[str, Any]:
     return {
         "image_size": config.network.image_size, "max_steps": config.run.max_steps, "ids": ids,
         "failed_done_reward": config.data.failed_done_reward,
-        "house_cache_size": config.data.houses_kept,
+        "house_cache_size": config.data.house_cache_size,
     }  # fmt: skip

@@ -185,7 +185,8 @@ def reward_parts(means: Mapping[str, float]) -> dict[str, float]:
 
 
 DECISIVE: Final[tuple[str, ...]] = (
-    "action_probs", "intent", "option", "choice", "decide", "end_chance", "forced", "plan", "meant",
+    "action_probs", "intent", "option", "choice", "decide", "done_probability", "forced", "plan",
+    "meant",
 )  # fmt: skip
 """What `decisions` reads of a record, where it is there."""
 
@@ -193,13 +194,13 @@ DECISIVE: Final[tuple[str, ...]] = (
 def decisions(record: Mapping[str, Tensor], rewards: Tensor) -> Row:
     """Return what an agent decided in a rollout, of what it recorded and was paid: (T, n, …).
 
-    `end_chance` is P(Done), the chance of ending the episode; `intent_kl` is the divergence of the
-    decision from what was meant, KL(P(omega) || P(omega')), where there is a decision; shares are
-    of all steps, lengths in actions.
+    `done_probability` is P(Done), the chance of ending the episode; `intent_kl` is the divergence
+    of the decision from what was meant, KL(P(omega) || P(omega')), where there is a decision;
+    shares are of all steps, lengths in actions.
     """
     said: Row = {"reward": float(rewards.mean())}
     if "action_probs" in record:
-        said["end_chance"] = float(record["action_probs"][..., DONE].mean())
+        said["done_probability"] = float(record["action_probs"][..., DONE].mean())
         if "intent" in record:
             said["intent_kl"] = divergence(record["action_probs"], record["intent"])
     if "option" not in record or "decide" not in record:
@@ -211,7 +212,11 @@ def decisions(record: Mapping[str, Tensor], rewards: Tensor) -> Row:
     }
     interacting = (option == PUSH) | (option == PICK)
     opened = int((interacting & decide).sum())
-    said |= {"end_chance": float(record["end_chance"][decide].mean()) if decide.any() else 0.0}
+    said |= {
+        "done_probability": float(record["done_probability"][decide].mean())
+        if decide.any()
+        else 0.0
+    }
     said["interactions"] = opened
     if opened:
         said["interaction_length"] = float(interacting.sum()) / opened

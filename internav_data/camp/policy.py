@@ -1,4 +1,4 @@
-"""Who can be evaluated: oracles by name, and trained agents from a run's folder."""
+"""Policies to evaluate: reference policies by name, and trained agents from a run's folder."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from internav_data.evaluation.archive import About
 from internav_data.evaluation.evaluate import episode_generator
-from internav_data.evaluation.reference_policies import ORACLES, oracle
+from internav_data.evaluation.reference_policies import REFERENCE_POLICIES, reference_policy
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import ACTIONS
 
@@ -43,7 +43,7 @@ _NOTED: Final = {
 class EvaluatedPolicy:
     """Somebody to evaluate, and what is known of them."""
 
-    player: Policy
+    policy: Policy
     about: About
 
 
@@ -87,14 +87,14 @@ class AgentPolicy:
         self._seed, self._state = seed, self._agent.initial_state(count)
         self._starts, self._draws = np.ones(count, np.bool_), [None] * count
 
-    def start(self, seat: int, episode: Episode) -> None:
+    def start(self, slot: int, episode: Episode) -> None:
         """See `Policy`."""
-        self._starts[seat] = True
-        self._draws[seat] = episode_generator(self._seed, episode)
+        self._starts[slot] = True
+        self._draws[slot] = episode_generator(self._seed, episode)
 
     def act(self, observations: Observations) -> NDArray[np.int64]:
         """See `Policy`. Two numbers are drawn a step, used or not: for an option, an action."""
-        import torch  # noqa: PLC0415 - oracles do without
+        import torch  # noqa: PLC0415 - reference policies do without
 
         device = next((p.device for p in self._agent.parameters()), torch.device("cpu"))
         seen = {name: torch.tensor(array, device=device) for name, array in observations.items()}
@@ -113,18 +113,18 @@ class AgentPolicy:
         actions: NDArray[np.int64] = step.action.cpu().numpy()
         return actions
 
-    def notes(self, seat: int) -> list[Note]:
+    def notes(self, slot: int) -> list[Note]:
         """Return what led to a seat's last action: chances of options, intent, of actions."""
         told: list[Note] = []
         for name, (title, taken) in _NOTED.items():
             noted = self._record.get(name)
             if noted is None:
                 continue
-            shares = tuple(float(share) for share in noted[seat].reshape(-1).tolist())
+            shares = tuple(float(share) for share in noted[slot].reshape(-1).tolist())
             names = _NAMES.get(len(shares))
             chosen = self._record.get(taken)
             if names is not None:
-                told.append((title, names, shares, -1 if chosen is None else int(chosen[seat])))
+                told.append((title, names, shares, -1 if chosen is None else int(chosen[slot])))
         return told
 
 
@@ -136,7 +136,7 @@ def candidate(
     greedy: bool = False,
     without_intent: bool = False,
 ) -> EvaluatedPolicy:
-    """Return an oracle by its name, or the agent of a run's folder.
+    """Return a reference policy by its name, or the agent of a run's folder.
 
     Raises
     ------
@@ -145,14 +145,16 @@ def candidate(
     """
     about = About(
         name=who, method=who, dataset=dataset.fingerprint, split=dataset.split or "all",
-        seed=settings.seed, max_steps=settings.max_steps, oracle=True,
+        seed=settings.seed, max_steps=settings.max_steps, is_reference=True,
     )  # fmt: skip
-    if who in ORACLES:
-        return EvaluatedPolicy(oracle(who, dataset), about)
+    if who in REFERENCE_POLICIES:
+        return EvaluatedPolicy(reference_policy(who, dataset), about)
+    if "planner" in who.split(","):
+        raise UsageError("the reference policy planner is now called shortest_path")
     if not Path(who).exists():
         raise UsageError(
-            f"{who}: neither a run's folder nor an oracle; expected what `camp-train` wrote, or "
-            f"some of {', '.join(ORACLES)} with commas between them"
+            f"{who}: neither a run's folder nor a reference policy; expected what `camp-train` "
+            f"wrote, or some of {', '.join(REFERENCE_POLICIES)} with commas between them"
         )
     agent = _loaded(Path(who))
     about = replace(_facts(agent, about), greedy=greedy, without_intent=without_intent)
@@ -165,10 +167,10 @@ def candidate(
     return EvaluatedPolicy(AgentPolicy(about.name, agent, size, greedy=greedy, ids=ids), about)
 
 
-def oracles_beside(dataset: Dataset[Episode]) -> list[str]:
-    """Return the oracles that go beside a trained agent: those that the dataset has."""
+def reference_policies_beside(dataset: Dataset[Episode]) -> list[str]:
+    """Return the reference policies that go beside a trained agent: those that the dataset has."""
     experts = dataset.to_table(["expert"]).column("expert")
-    return ["expert", "planner"] if experts.null_count < len(experts) else ["planner"]
+    return ["expert", "shortest_path"] if experts.null_count < len(experts) else ["shortest_path"]
 
 
 def row_name(about: About) -> str:
@@ -196,7 +198,8 @@ def _loaded(run: Path) -> Any:  # noqa: ANN401 - an Agent, with what its checkpo
         if error.name != _CHECKPOINT:
             raise
         raise UsageError(
-            f"{run}: this version cannot read trained runs; evaluate {', '.join(ORACLES)}"
+            f"{run}: this version cannot read trained runs; "
+            f"evaluate {', '.join(REFERENCE_POLICIES)}"
         ) from None
     return module.load_agent(run)
 
@@ -213,7 +216,7 @@ def _facts(agent: object, about: About) -> About:
     return replace(
         about,
         method=method,
-        oracle=False,
+        is_reference=False,
         intent=agent_config(agent, "agent", "intent", "") if has_intent else "",
         sync_every=agent_config(agent, "agent", "sync_every", None) if has_intent else None,
         training_seed=seed,

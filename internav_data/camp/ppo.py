@@ -68,8 +68,8 @@ def update(
     Returns
     -------
     dict
-        Means over the minibatches: `policy_loss`, `value_loss`, `entropy`, `kl`, `clip_share`,
-        `extra_loss`, `gradient_norm` (before it is cut); then `ratio_error` (of the first
+        Means over the minibatches: `policy_loss`, `value_loss`, `entropy`, `kl`, `clip_fraction`,
+        `extra_loss`, `grad_norm` (before it is cut); then `ratio_error` (of the first
         minibatch: how far a ratio is from 1), `explained_variance`, `updates` (steps taken) and
         `stopped` (1 if the KL stopped them).
 
@@ -87,20 +87,20 @@ def update(
     parameters = agent.critics() if critic_only else agent.optimised()
     told: list[dict[str, float]] = []
     stopped = False
-    for columns in minibatches(orders, config.minibatches, rollout.rewards.device):
+    for columns in minibatches(orders, config.num_minibatches, rollout.rewards.device):
         goals = advantages[:, columns], returns[:, columns]
         losses, said = _losses(agent, rollout, columns, goals, config, reduce)
         told.append(said)
         # Stop before the step that would be taken on too distant a policy.
-        limit = math.inf if critic_only or config.kl_limit is None else config.kl_limit
+        limit = math.inf if critic_only or config.target_kl is None else config.target_kl
         stopped = said["kl"] > limit
         if stopped:
             break
         loss = losses["value"] if critic_only else sum(losses.values(), losses["value"] * 0.0)
-        said["gradient_norm"] = step(optimiser, loss, parameters, config.gradient_norm, reduce)
+        said["grad_norm"] = step(optimiser, loss, parameters, config.max_grad_norm, reduce)
     means = {name: _mean([said[name] for said in told if name in said]) for name in told[0]}
     return {
-        "gradient_norm": 0.0,  # where not a single step was taken
+        "grad_norm": 0.0,  # where not a single step was taken
         **means,
         "ratio_error": told[0]["ratio_error"],
         "explained_variance": explained,
@@ -180,19 +180,19 @@ def _losses(
     check_finite(columns, now.log_prob, now.value)
     log_ratio = now.log_prob - rollout.log_probs[:, columns]
     ratio = log_ratio.exp()
-    clipped = ratio.clamp(1.0 - config.clip, 1.0 + config.clip)
+    clipped = ratio.clamp(1.0 - config.clip_coef, 1.0 + config.clip_coef)
     gain = torch.minimum(ratio * advantages, clipped * advantages)
     errors = (now.value - returns).square()
-    if config.clip_value:
+    if config.clip_vloss:
         before = rollout.values[:, columns]
-        near = before + (now.value - before).clamp(-config.clip, config.clip)
+        near = before + (now.value - before).clamp(-config.clip_coef, config.clip_coef)
         errors = torch.maximum(errors, (near - returns).square())
     extra = torch.zeros_like(gain) if now.loss is None else now.loss
     count = reduce(gain.new_tensor(float(gain.numel())))
     sums = {
         "policy": -gain.sum() / count,
-        "value": config.value_coefficient * 0.5 * errors.sum() / count,
-        "entropy": -config.entropy_coefficient * now.entropy.sum() / count,
+        "value": config.vf_coef * 0.5 * errors.sum() / count,
+        "entropy": -config.ent_coef * now.entropy.sum() / count,
         "extra": extra.sum() / count,
     }
     with torch.no_grad():
@@ -203,7 +203,7 @@ def _losses(
             "extra_loss": sums["extra"],
             # An estimate that is never negative: http://joschu.net/blog/kl-approx.html
             "kl": (ratio - 1.0 - log_ratio).sum() / count,
-            "clip_share": (ratio != clipped).float().sum() / count,
+            "clip_fraction": (ratio != clipped).float().sum() / count,
         }
         whole = reduce(torch.stack(list(said.values()))).tolist()
     far = float((ratio.detach() - 1.0).abs().max())

@@ -114,5 +114,5 @@ class Rollout:
         """Return the generalised advantages, (T, n)."""
         return advantages_of(
             self.rewards, self.values, self.last_value, self.terminated, self.truncated,
-            self.final_values, gamma=config.gamma, lam=config.lam,
+            self.final_values, gamma=config.gamma, lam=config.gae_lambda,
         )  # fmt: skip

@@ -119,7 +119,7 @@ def resume(
     place = _place(since)
     if asked.get("clones") and not place.clones:
         raise UsageError(
-            f"{request.out}: this run began without the expert; leave --init-from out, or choose "
+            f"{request.out}: this run began without the expert; leave --pretrain out, or choose "
             "another --out"
         )
     if asked.get("parts") is not None:
@@ -152,7 +152,7 @@ def forecast(request: Request) -> list[tuple[str, int, float]]:
         found.append(("cloning", 0, updates * seconds))
     for stage in stages:
         now = trainer.open(stage)
-        trainer.place.critics[stage.critic] = given.critic_rollouts  # not new: whole updates
+        trainer.place.critics[stage.critic] = given.critic_warmup_rollouts  # not new: whole updates
         try:
             trainer.update(now)
             began = time.perf_counter()
@@ -161,7 +161,7 @@ def forecast(request: Request) -> list[tuple[str, int, float]]:
             each = (time.perf_counter() - began) / _MEASURED
         finally:
             now.task.task.close()
-        steps = stage.updates * given.environments * given.steps
+        steps = stage.updates * given.num_envs * given.num_steps
         found.append((stage.name, steps, each * stage.updates))
     return found
 
@@ -178,19 +178,19 @@ def _prepared(
     # Nothing here draws from torch's own generator, but a user's agent may.
     drawn = generator(config.seed, Purpose.TRAINING, attempt=TrainingStream.TORCH).integers(2**62)
     torch.manual_seed(int(drawn))
-    data = TrainingData(request.dataset, config.data.where)
+    data = TrainingData(request.dataset, config.data.filter)
     with torch.device("meta"):
         agent = make_agent(request.method, config)
     if not agent.optimised():
         names = ", ".join(name for name in agent_names() if name != request.method)
         raise UsageError(f"method {request.method!r} has nothing to learn; expected one of {names}")
     if not request.parts and not request.clones:
-        raise UsageError("--stages cloning: there is nothing to clone without --init-from expert")
+        raise UsageError("--stages cloning: there is nothing to clone without --pretrain bc")
     hierarchical = isinstance(agent, Hierarchy)
     stages = plan(config, request.parts, hierarchical=hierarchical) if request.parts else []
     if request.clones and config.agent.forbidden:
         raise UsageError(
-            "agent.forbidden and --init-from expert: the expert does what is forbidden; leave one "
+            "agent.forbidden and --pretrain bc: the expert does what is forbidden; leave one "
             "of them out"
         )
     for single in {stage.single_room for stage in stages}:

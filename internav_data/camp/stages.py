@@ -64,11 +64,11 @@ def plan(config: CampConfig, parts: Sequence[str], *, hierarchical: bool) -> lis
         An unknown part, or more tasks side by side than environments.
     """
     check_parts(parts)
-    given, count = config.stages, config.ppo.environments
+    given, count = config.stages, config.ppo.num_envs
     names = list(TASKS) if hierarchical and not given.side_by_side else []
     if hierarchical and given.side_by_side and given.auxiliary_share and count < len(TASKS):
         raise UsageError(
-            f"ppo.environments is {count}: three auxiliary tasks side by side need 3 at least; "
+            f"ppo.num_envs is {count}: three auxiliary tasks side by side need 3 at least; "
             "or set stages.side_by_side=false"
         )
     shares = [
@@ -77,7 +77,7 @@ def plan(config: CampConfig, parts: Sequence[str], *, hierarchical: bool) -> lis
         (("single", -1), given.single_room_share),
         (("all", -1), 1.0 - given.auxiliary_share - given.single_room_share),
     ]
-    whole = max(1, round(given.steps / (count * config.ppo.steps)))
+    whole = max(1, round(given.total_timesteps / (count * config.ppo.num_steps)))
     stages, share_before = [], 0.0
     for (part, task), share in shares:
         first, last = round(whole * share_before), round(whole * (share_before + share))
@@ -88,8 +88,8 @@ def plan(config: CampConfig, parts: Sequence[str], *, hierarchical: bool) -> lis
         stages.append(_stage(config, part, task, last - first, over, hierarchical=hierarchical))
     if not stages:
         raise UsageError(
-            f"stages.steps is {given.steps}: less than one update of {count * config.ppo.steps} "
-            f"steps is left for {', '.join(parts)}"
+            f"stages.total_timesteps is {given.total_timesteps}: less than one update of "
+            f"{count * config.ppo.num_steps} steps is left for {', '.join(parts)}"
         )
     return stages
 
@@ -122,7 +122,7 @@ def _stage(
     hierarchical: bool,
 ) -> TrainingStage:
     auxiliary = part == "auxiliary" and hierarchical
-    count, given = config.ppo.environments, config.stages
+    count, given = config.ppo.num_envs, config.stages
     tasks: tuple[int, ...] = ()
     if auxiliary:
         side_by_side = tuple(sorted(TASKS)[k * len(TASKS) // count] for k in range(count))

@@ -99,11 +99,11 @@ class Trainer:
     ) -> None:
         self.run, self.data, self.method, self.config = run, data, method, config
         self.place, self.since, self._tell, self._interrupted = place, since, tell, interrupted
-        self.ranks, self._count = ranks, config.ppo.environments
-        self.own = ranks.share(self._count, "ppo.environments")
-        if len(self.own) % config.ppo.minibatches:
+        self.ranks, self._count = ranks, config.ppo.num_envs
+        self.own = ranks.share(self._count, "ppo.num_envs")
+        if len(self.own) % config.ppo.num_minibatches:
             raise UsageError(
-                f"ppo.minibatches is {config.ppo.minibatches}: it must divide the "
+                f"ppo.num_minibatches is {config.ppo.num_minibatches}: it must divide the "
                 f"{len(self.own)} environments of each of {ranks.size} processes"
             )
         self.agent = make_agent(method, config)
@@ -178,17 +178,17 @@ class Trainer:
         over = place.done / stage.updates
         over = stage.decay_from + (stage.decay_to - stage.decay_from) * over
         ppo.set_rate(now.optimiser, stage.rate, over)
-        uniforms = uniforms_of(self.config.seed, place.updates, self.own, config.steps)
+        uniforms = uniforms_of(self.config.seed, place.updates, self.own, config.num_steps)
         rollout = now.collector.collect(uniforms)
         collected = time.perf_counter() - began
         learnt = place.critics.get(stage.critic, 0)
-        new = learnt < config.critic_rollouts and bool(now.learner.critics())
-        orders = orders_of(self.config.seed, place.updates, config.epochs, len(self.own))
+        new = learnt < config.critic_warmup_rollouts and bool(now.learner.critics())
+        orders = orders_of(self.config.seed, place.updates, config.update_epochs, len(self.own))
         said = ppo.update(
             now.learner, now.optimiser, rollout, config, orders,
             critic_only=new, reduce=self.ranks.reduce,
         )  # fmt: skip
-        steps = config.environments * config.steps
+        steps = config.num_envs * config.num_steps
         place.done, place.updates = place.done + 1, place.updates + 1
         place.environment_steps += steps
         place.critics[stage.critic] = learnt + 1

@@ -72,7 +72,8 @@ def from_mapping(
     Parameters
     ----------
     config
-        A frozen dataclass.
+        A frozen dataclass. Its class may have `RENAMED`, which maps names of earlier versions to
+        those of fields: an old name is refused with a line that gives the new one.
     values
         Nested values by field name.
     where
@@ -80,7 +81,7 @@ def from_mapping(
     elsewhere
         Names that are options of the command line only.
     prefix
-        Of the config's own key, ending in a dot; empty at the top.
+        Dotted key of the config itself, ending in a dot; empty at the top.
 
     Raises
     ------
@@ -89,13 +90,14 @@ def from_mapping(
 
     """
     hints = typing.get_type_hints(type(config))
+    fields = {field.name for field in dataclasses.fields(config)}
     renamed: Mapping[str, str] = getattr(type(config), "RENAMED", {})
     changes: dict[str, Any] = {}
     for name, value in values.items():
         key = prefix + name
         if name in renamed:
             raise UsageError(f"{where}: '{key}' is called '{prefix}{renamed[name]}' now")
-        if name not in hints:
+        if name not in fields:
             raise _unknown(key, where, known_keys(config, prefix), elsewhere)
         current = getattr(config, name)
         if dataclasses.is_dataclass(current) and not isinstance(current, type):

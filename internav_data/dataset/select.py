@@ -39,7 +39,7 @@ def condition(text: str) -> Condition:
     """
     found = _CONDITION.fullmatch(text)
     if found is None:
-        raise UsageError(f"--where {text!r}: expected COLUMN=VALUE, as in room_count<=3")
+        raise UsageError(f"--filter {text!r}: expected COLUMN=VALUE, as in room_count<=3")
     name, operator, word = found.groups()
     value: object = _WORDS.get(word.lower(), word)
     for kind in (float, int):

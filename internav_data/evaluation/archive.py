@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 ABOUT: Final = "evaluation.json"
 EPISODES: Final = "episodes.parquet"
-FORMAT: Final = 1
+FORMAT: Final = 2
 _BYTES_AT_MOST: Final = 1_000_000
 _ROWS_AT_MOST: Final = 5_000_000
 _DEPTH: Final = 3
@@ -34,7 +34,7 @@ class About:
     name: str
     """Of its row, as in `camp --intent none`."""
     method: str
-    """camp, ppo, ppo-intent, hrl, nie, a user's own; or one of the oracles."""
+    """camp, ppo, ppo-intent, hrl, nie, a user's own; or a reference policy."""
     dataset: str
     """Fingerprint of the selected episodes (`Dataset.fingerprint`)."""
     split: str
@@ -42,7 +42,8 @@ class About:
     """Of the evaluation."""
     max_steps: int
     greedy: bool = False
-    oracle: bool = False
+    is_reference: bool = False
+    """A reference policy, not a trained agent."""
     intent: str = ""
     """How the intent was made: integrated, policy, recursive, none; empty without one."""
     sync_every: int | None = None

@@ -43,7 +43,7 @@ class Policy(Protocol):
     def begin(self, count: int, seed: int) -> None:
         """Take `count` seats; all that is random derives from `seed` and the episode."""
 
-    def start(self, seat: int, episode: Episode) -> None:
+    def start(self, slot: int, episode: Episode) -> None:
         """Forget what happened in a seat: an episode begins there."""
 
     def act(self, observations: Observations) -> NDArray[np.int64]:
@@ -97,7 +97,7 @@ def chosen(count: int, limit: int | None) -> list[int]:
 
 
 def evaluate(
-    player: Policy,
+    policy: Policy,
     dataset: Dataset[Episode],
     settings: EvaluationConfig | None = None,
     tell: Tell | None = None,
@@ -132,14 +132,14 @@ def evaluate(
         )
     numbers = chosen(len(dataset), settings.limit)
     count = min(settings.batch, len(numbers))
-    masks = {"ids": True} if getattr(player, "ids", False) else {}
+    masks = {"ids": True} if getattr(policy, "ids", False) else {}
     env = make_vector(
-        count, dataset, min(settings.workers, count), image_size=player.image_size,
+        count, dataset, min(settings.workers, count), image_size=policy.image_size,
         autoreset=False, copy=False, max_steps=settings.max_steps, **masks,
     )  # fmt: skip
     try:
-        player.begin(count, settings.seed)
-        return _Round(env, player, dataset, numbers, settings.seed).played(tell)
+        policy.begin(count, settings.seed)
+        return _Round(env, policy, dataset, numbers, settings.seed).played(tell)
     finally:
         env.close()
 
@@ -150,12 +150,12 @@ class _Round:
     def __init__(
         self,
         env: Any,  # noqa: ANN401 - either vector environment
-        player: Policy,
+        policy: Policy,
         dataset: Dataset[Episode],
         numbers: Sequence[int],
         seed: int,
     ) -> None:
-        self._env, self._player, self._dataset, self._seed = env, player, dataset, seed
+        self._env, self._player, self._dataset, self._seed = env, policy, dataset, seed
         self._numbers, self._next = numbers, 0
         self._episodes: list[Episode | None] = [None] * env.num_envs
         self._ids: list[str] = [""] * env.num_envs
@@ -165,42 +165,42 @@ class _Round:
 
     def played(self, tell: Tell | None) -> list[EpisodeResult]:
         env, count = self._env, self._env.num_envs
-        for seat in range(count):
-            self._seat(seat)
+        for slot in range(count):
+            self._fill_slot(slot)
         seen, _ = env.reset(seed=self._seed, options={"episode_id": self._ids})
         while any(episode is not None for episode in self._episodes):
             actions = np.array(self._player.act(seen), dtype=np.int64)
             idle = [episode is None for episode in self._episodes]
             actions[idle] = Action.WAIT
-            for seat, action in enumerate(actions.tolist()):
-                self._actions[seat].append(action)
+            for slot, action in enumerate(actions.tolist()):
+                self._actions[slot].append(action)
             seen, _, terminated, truncated, infos = env.step(actions)
             over = terminated | truncated
             if not over.any():
                 continue
-            for seat in np.flatnonzero(over).tolist():
-                self._ended(seat, infos)
-                self._seat(seat)
+            for slot in np.flatnonzero(over).tolist():
+                self._ended(slot, infos)
+                self._fill_slot(slot)
             seen, _ = env.reset(options={"reset_mask": over, "episode_id": self._ids})
             if tell is not None:
                 tell(len(self._found), len(self._numbers))
         return [self._found[number] for number in self._numbers]
 
-    def _seat(self, seat: int) -> None:
+    def _fill_slot(self, slot: int) -> None:
         """Give a seat the next episode; where there is none its last one stays, and is waited."""
-        self._actions[seat] = []
+        self._actions[slot] = []
         if self._next == len(self._numbers):
-            self._episodes[seat] = None
+            self._episodes[slot] = None
             return
-        self._playing[seat] = number = self._numbers[self._next]
+        self._playing[slot] = number = self._numbers[self._next]
         episode = self._dataset[number]
         self._next += 1
-        self._episodes[seat], self._ids[seat] = episode, episode.episode_id
-        self._player.start(seat, episode)
+        self._episodes[slot], self._ids[slot] = episode, episode.episode_id
+        self._player.start(slot, episode)
 
-    def _ended(self, seat: int, infos: Mapping[str, Any]) -> None:
-        episode = self._episodes[seat]
+    def _ended(self, slot: int, infos: Mapping[str, Any]) -> None:
+        episode = self._episodes[slot]
         if episode is None:
             return
-        said = {name: column[seat] for name, column in infos["metrics"].items() if name[0] != "_"}
-        self._found[self._playing[seat]] = result_of(episode, said, self._actions[seat])
+        said = {name: column[slot] for name, column in infos["metrics"].items() if name[0] != "_"}
+        self._found[self._playing[slot]] = result_of(episode, said, self._actions[slot])

@@ -1,4 +1,4 @@
-"""Rows that bound every column: the dataset's expert, a planner that never interacts, chance."""
+"""Reference policies: the dataset's expert, the shortest path without interaction, and chance."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     Node = tuple[int, int]
     ActionPlanner = Callable[[Episode], Sequence[int]]
 
-ORACLES: Final = ("expert", "planner", "random")
+REFERENCE_POLICIES: Final = ("expert", "shortest_path", "random")
 _DIRECTIONS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))
 _TURNS: Final[tuple[tuple[int, ...], ...]] = (
     (),
@@ -36,30 +36,32 @@ _TURNS: Final[tuple[tuple[int, ...], ...]] = (
 """What turns the agent by so many quarters, counter-clockwise."""
 
 
-def oracle(name: str, dataset: Dataset[Episode]) -> Policy:
-    """Return one of `ORACLES` for a dataset.
+def reference_policy(name: str, dataset: Dataset[Episode]) -> Policy:
+    """Return one of `REFERENCE_POLICIES` for a dataset.
 
     Raises
     ------
     UsageError
-        There is no such oracle, or the dataset has no experts.
+        There is no such policy, or the dataset has no experts.
     """
     if name == "random":
-        return RandomPlayer()
-    if name == "planner":
-        return ScriptedPlayer(name, planner_of(dataset))
+        return RandomPolicy()
+    if name == "shortest_path":
+        return ScriptedPolicy(name, shortest_path_planner(dataset))
     if name == "expert":
         expert = dataset.to_table(["expert"]).column("expert")
         if len(expert) and expert.null_count == len(expert):
             raise UsageError(
                 f"{dataset.path}: no episode has an expert (the dataset is of a version without, "
-                "or was made so); generate it anew, or evaluate planner and random alone"
+                "or was made so); generate it anew, or evaluate shortest_path and random alone"
             )
-        return ScriptedPlayer(name, expert_actions)
-    raise UsageError(f"no oracle is called {name!r}; there are {', '.join(ORACLES)}")
+        return ScriptedPolicy(name, expert_actions)
+    raise UsageError(
+        f"no reference policy is called {name!r}; there are {', '.join(REFERENCE_POLICIES)}"
+    )
 
 
-class ScriptedPlayer:
+class ScriptedPolicy:
     """Knows at an episode's start what it will do.
 
     Parameters
@@ -81,16 +83,16 @@ class ScriptedPlayer:
         """See `Policy`."""
         self._left = [deque() for _ in range(count)]
 
-    def start(self, seat: int, episode: Episode) -> None:
+    def start(self, slot: int, episode: Episode) -> None:
         """See `Policy`."""
-        self._left[seat] = deque(self._plan(episode))
+        self._left[slot] = deque(self._plan(episode))
 
     def act(self, observations: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:  # noqa: ARG002
         """See `Policy`."""
         return np.array([left.popleft() if left else Action.DONE for left in self._left], np.int64)
 
 
-class RandomPlayer:
+class RandomPolicy:
     """Takes each of the twelve actions with the same chance, Done included."""
 
     name = "random"
@@ -104,9 +106,9 @@ class RandomPlayer:
         """See `Policy`."""
         self._seed, self._draws = seed, [None] * count
 
-    def start(self, seat: int, episode: Episode) -> None:
+    def start(self, slot: int, episode: Episode) -> None:
         """See `Policy`."""
-        self._draws[seat] = episode_generator(self._seed, episode)
+        self._draws[slot] = episode_generator(self._seed, episode)
 
     def act(self, observations: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:  # noqa: ARG002
         """See `Policy`."""
@@ -122,7 +124,7 @@ def expert_actions(episode: Episode) -> Sequence[int]:
     return (int(Action.DONE),) if episode.expert is None else episode.expert.actions
 
 
-def planner_of(dataset: Dataset[Episode]) -> ActionPlanner:
+def shortest_path_planner(dataset: Dataset[Episode]) -> ActionPlanner:
     """Return what plans the shortest way on the lattice, things as they lie, touching none."""
     from internav_data.envs.source import open_source  # noqa: PLC0415 - the camera's kernels
     from internav_data.world import World  # noqa: PLC0415

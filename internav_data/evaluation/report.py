@@ -109,7 +109,7 @@ _PIXELS: Final = 560
 
 
 def methods_of(evaluations: Sequence[Evaluation]) -> Methods:
-    """Return evaluations by row, checked to be comparable; an oracle counts once.
+    """Return evaluations by row, checked to be comparable; a reference policy counts once.
 
     Raises
     ------
@@ -117,12 +117,12 @@ def methods_of(evaluations: Sequence[Evaluation]) -> Methods:
         They are not of the same episodes, or one is there twice.
     """
     kept: list[Evaluation] = []
-    oracles: set[str] = set()
+    references: set[str] = set()
     for each in evaluations:
-        if each.about.oracle:
-            if each.about.name in oracles:
+        if each.about.is_reference:
+            if each.about.name in references:
                 continue
-            oracles.add(each.about.name)
+            references.add(each.about.name)
         kept.append(each)
     check_comparable(kept)
     return by_method(kept)
@@ -155,7 +155,7 @@ def text_of(methods: Methods) -> str:
 def data_of(methods: Methods) -> dict[str, Any]:
     """Return the same as plain data."""
     return {
-        "format": 1,
+        "format": 2,
         "tables": [as_json(table) for table in tables_of(methods)],
         "figures": {name: _all_figures(found) for name, found in methods.items()},
         "differences": differences_json(methods),

@@ -56,7 +56,7 @@ def differences(methods: Methods, group: str, measure: str) -> list[Difference]:
     Over seeds where both have two at least; over scenes where there are just two runs, one
     each, and the words say that it is about these checkpoints.
     """
-    trained = {name: found for name, found in methods.items() if not found[0].about.oracle}
+    trained = {name: found for name, found in methods.items() if not found[0].about.is_reference}
     said = []
     for first, second in combinations(trained, 2):
         values = [figures(trained[name], group, measure) for name in (first, second)]
@@ -95,7 +95,7 @@ def fairness(methods: Methods) -> tuple[list[str], list[list[str]]]:
     headings = ["", "seeds", "environment steps", "expert frames", "parameters", "training"]
     rows = []
     for name, found in methods.items():
-        if found[0].about.oracle:
+        if found[0].about.is_reference:
             continue
         about = found[0].about
         times = [e.about.training_s for e in found if e.about.training_s is not None]
@@ -121,7 +121,7 @@ def as_json(methods: Methods) -> list[dict[str, Any]]:
 
 def _one_run(methods: Methods) -> list[str]:
     """Say of rows with a single run how well their episodes pin them down."""
-    trained = {name: found for name, found in methods.items() if not found[0].about.oracle}
+    trained = {name: found for name, found in methods.items() if not found[0].about.is_reference}
     lines = []
     for name, found in (trained or methods).items():
         if len(found) > 1:
@@ -162,7 +162,7 @@ def _sentence(each: Difference) -> str:
 def _resolved(methods: Methods) -> list[str]:
     """Say which differences so many seeds and episodes could have shown."""
     group, measure = PRIMARY
-    trained = [f for f in methods.values() if not f[0].about.oracle]
+    trained = [f for f in methods.values() if not f[0].about.is_reference]
     values = [figures(found, group, measure) for found in trained]
     values = [each for each in values if each]
     if not values:

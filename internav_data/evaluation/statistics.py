@@ -188,7 +188,7 @@ def check_comparable(evaluations: Sequence[Evaluation]) -> None:
     first = evaluations[0]
     known = {name: getattr(first.about, name) for name in ("dataset", "split", "max_steps")}
     ids = [result.episode_id for result in first.results]
-    greedy = next((e.about.greedy for e in evaluations if not e.about.oracle), False)
+    greedy = next((e.about.greedy for e in evaluations if not e.about.is_reference), False)
     seen: set[tuple[str, int | None]] = set()
     for each in evaluations:
         name = each.about.name
@@ -200,7 +200,7 @@ def check_comparable(evaluations: Sequence[Evaluation]) -> None:
                 )
         if [result.episode_id for result in each.results] != ids:
             raise UsageError(f"{name} and {first.about.name} played other episodes (--limit?)")
-        if not each.about.oracle and each.about.greedy != greedy:
+        if not each.about.is_reference and each.about.greedy != greedy:
             raise UsageError(f"{name}: --greedy must be given for all runs, or for none")
         key_of = (name, each.about.training_seed)
         if key_of in seen:

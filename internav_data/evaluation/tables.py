@@ -89,7 +89,7 @@ class Row:
 
     name: str
     source: str
-    """ours, oracle or paper."""
+    """ours, reference or paper."""
     cells: tuple[Cell, ...]
 
 
@@ -196,7 +196,7 @@ def _table(
     rows = []
     for name, found in methods.items():
         cells = tuple(cell(found, group, measure) for group in groups for measure in columns)
-        rows.append(Row(name, "oracle" if found[0].about.oracle else "ours", cells))
+        rows.append(Row(name, "reference" if found[0].about.is_reference else "ours", cells))
     for name, values in paper.items():
         cells = tuple(
             _paper_cell(columns[k % len(columns)], values[k]) if k < len(values) else
@@ -219,7 +219,7 @@ def _notes(
     notes = [f"No episode is {name}: n = 0." for name, count in groups if not count]
     if any(len(found) > 1 for found in methods.values()):
         notes.append("±: half of the 95 % t interval over training seeds.")
-    if any(not found[0].about.oracle and len(found) == 1 for found in methods.values()):
+    if any(not found[0].about.is_reference and len(found) == 1 for found in methods.values()):
         notes.append("One training seed: nothing is said about how another would do.")
     return (*notes, NOT_COMPARABLE)
 

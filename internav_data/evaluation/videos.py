@@ -28,17 +28,17 @@ FPS: Final = 6.0
 class _Noting:
     """Plays as another does, and keeps what led to each action."""
 
-    def __init__(self, player: Policy) -> None:
-        self.name, self.image_size = player.name, player.image_size
-        self.ids = getattr(player, "ids", False)
-        self._player = player
+    def __init__(self, policy: Policy) -> None:
+        self.name, self.image_size = policy.name, policy.image_size
+        self.ids = getattr(policy, "ids", False)
+        self._player = policy
         self.steps: list[list[Note]] = []
 
     def begin(self, count: int, seed: int) -> None:
         self._player.begin(count, seed)
 
-    def start(self, seat: int, episode: Episode) -> None:
-        self._player.start(seat, episode)
+    def start(self, slot: int, episode: Episode) -> None:
+        self._player.start(slot, episode)
 
     def act(self, observations: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
         actions = self._player.act(observations)
@@ -48,9 +48,9 @@ class _Noting:
         return actions
 
 
-def films(
+def videos(
     folder: Path,
-    player: Policy,
+    policy: Policy,
     results: Sequence[EpisodeResult],
     dataset: Dataset[Episode],
     settings: EvaluationConfig,
@@ -69,7 +69,7 @@ def films(
 
     for word, result in picked(results, each=1):
         only = load_dataset(dataset.path, dataset.split, [("episode_id", "=", result.episode_id)])
-        noting = _Noting(player)
+        noting = _Noting(policy)
         alone = EvaluationConfig(settings.seed, batch=1, max_steps=settings.max_steps)
         (again,) = evaluate(noting, only, alone)
         (episode,) = episodes_by_id(only, [result.episode_id]).values()
@@ -77,7 +77,7 @@ def films(
         panel = bars_panel(steps, SIZE) if any(steps) else None
         replay = Replay.of(
             only.scene(episode.scene_id), episode, only.assets, again.actions,
-            title=player.name, push_model=push_model_of(only),
+            title=policy.name, push_model=push_model_of(only),
         )  # fmt: skip
         path = folder / f"{word}-{result.episode_id.replace('/', '-')}.{kind}"
         write_video(path, replay.frames(size=SIZE, fps=FPS, panel=panel), FPS)

@@ -71,7 +71,7 @@ class Page:
         headings
             Headings of all columns.
         rows
-            CSS class of each row (ours, oracle, paper), and its cells.
+            CSS class of each row (ours, reference, paper), and its cells.
         """
         text = ['<div class="wide"><table><thead>']
         if groups:

@@ -95,7 +95,7 @@ def config():
         # Goals of noise are a small input: what is compared to 1e-6 is not to be amplified by it.
         sizes = {
             "network": {"image_size": 16, "hidden": 12, "goal_scale_m": 10.0},
-            "ppo": {"environments": 4, "minibatches": 2, "steps": 8},
+            "ppo": {"num_envs": 4, "num_minibatches": 2, "num_steps": 8},
         }
         tiny = from_mapping(preset("small"), sizes, "test")
         return from_mapping(tiny, changes, "test")

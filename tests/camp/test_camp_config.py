@@ -15,11 +15,15 @@ def test_the_paper_preset_is_the_papers():
     paper.check()
     assert (paper.network.image_size, paper.network.hidden) == (300, 512)
     assert not paper.network.shared_encoder
-    assert (paper.ppo.clip, paper.ppo.clip_value, paper.ppo.epochs) == (0.1, True, 1)
-    assert (paper.agent.sync_every, paper.ppo.minibatches, paper.ppo.steps) == (3, 1, 30)
+    assert (paper.ppo.clip_coef, paper.ppo.clip_vloss, paper.ppo.update_epochs) == (0.1, True, 1)
+    assert (paper.agent.sync_every, paper.ppo.num_minibatches, paper.ppo.num_steps) == (3, 1, 30)
     stages = paper.stages
     assert (stages.learning_rate, stages.joint_learning_rate) == (3e-4, 1e-4)
-    assert stages.steps * stages.auxiliary_share == stages.steps * stages.single_room_share == 1e6
+    assert (
+        stages.total_timesteps * stages.auxiliary_share
+        == stages.total_timesteps * stages.single_room_share
+        == 1e6
+    )
 
 
 def test_the_small_preset_is_the_sheets():
@@ -28,8 +32,8 @@ def test_the_small_preset_is_the_sheets():
     assert (small.network.image_size, small.network.hidden) == (64, 128)
     assert small.network.shared_encoder
     ppo = small.ppo
-    assert (ppo.environments, ppo.steps, ppo.epochs, ppo.minibatches) == (16, 64, 3, 4)
-    assert (ppo.clip, ppo.clip_value) == (0.2, False)
+    assert (ppo.num_envs, ppo.num_steps, ppo.update_epochs, ppo.num_minibatches) == (16, 64, 3, 4)
+    assert (ppo.clip_coef, ppo.clip_vloss) == (0.2, False)
 
 
 def test_plain_data_is_read_back():
@@ -41,10 +45,10 @@ def test_plain_data_is_read_back():
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"ppo": {"clp": 0.1}}, "did you mean 'ppo.clip'"),
-        ({"ppo": {"clip": "much"}}, "expected a number"),
-        ({"ppo": {"environments": 0}}, "ppo.environments is 0"),
-        ({"ppo": {"minibatches": 5}}, "must divide"),
+        ({"ppo": {"clip_cof": 0.1}}, "did you mean 'ppo.clip_coef'"),
+        ({"ppo": {"clip_coef": "much"}}, "expected a number"),
+        ({"ppo": {"num_envs": 0}}, "ppo.num_envs is 0"),
+        ({"ppo": {"num_minibatches": 5}}, "must divide"),
         ({"ppo": {"gamma": 1.5}}, "expected 0.0 … 1.0"),
         ({"network": {"encoder": "paper", "image_size": 32}}, "needs 36 pixels"),
         ({"agent": {"intent": "some"}}, "expected one of"),
@@ -56,6 +60,18 @@ def test_plain_data_is_read_back():
 def test_what_cannot_be_meant_is_refused(changes, said):
     with pytest.raises(UsageError, match=said.replace(".", r"\.")):
         from_mapping(preset("small"), changes, "file")
+
+
+@pytest.mark.parametrize("part", [field.name for field in dataclasses.fields(CampConfig)])
+def test_old_keys_are_refused_with_a_line_that_names_the_new_one(part):
+    kind = type(getattr(CampConfig(), part))
+    for old, new in getattr(kind, "RENAMED", {}).items():
+        assert old not in kind.__dataclass_fields__
+        assert new in kind.__dataclass_fields__
+        with pytest.raises(
+            UsageError, match=rf"^file: '{part}.{old}' is called '{part}.{new}' now$"
+        ):
+            from_mapping(preset("small"), {part: {old: 1}}, "file")
 
 
 def test_unknown_presets_are_refused():

@@ -177,12 +177,12 @@ def test_a_config_larger_than_its_weights_takes_no_memory(kept):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"format": 2}, "format 2: this release reads 1"),
+        ({"format": 1}, "format 1: this release reads 2"),
         ({"method": "ppo"}, "another agent's weights"),
         ({"method": 3}, "expected a method"),
         ({"config": []}, "expected a JSON object"),
         ({"config": {"speed": 1}}, "no key 'speed'"),
-        ({"config": {"ppo": {"steps": 0}}}, "ppo.steps is 0"),
+        ({"config": {"ppo": {"num_steps": 0}}}, "ppo.num_steps is 0"),
         ({"files": {}}, "weights.safetensors is missing"),
         ({"progress": None}, "expected a method, files and progress"),
     ],

@@ -37,7 +37,7 @@ def diary(fake):
 @pytest.mark.parametrize("method", ["ppo", "ppo-intent", "hrl", "camp"])
 def test_cuts_are_valued_before_the_reset_and_ends_are_not(diary, config, method):
     """By what was seen last and the hidden states after the last step, worked out step by step."""
-    env, agent = diary(), make_agent(method, config(agent={"end_chance": 0.05}))
+    env, agent = diary(), make_agent(method, config(agent={"initial_done_probability": 0.05}))
     collector = Collector(env, agent)
     collector.begin(env.reset()[0])
     uniforms = uniforms_of(0, 0, range(4), 30)
@@ -136,7 +136,7 @@ def test_a_real_environment_is_lived_in(houses, config):
             4, houses, image_size=16, autoreset=False, copy=copied, max_steps=15, ids=True
         )
         for method in ("camp", "nie"):
-            agent = make_agent(method, config(agent={"interact_chance": 0.3}))
+            agent = make_agent(method, config(agent={"initial_interaction_probability": 0.3}))
             collector = Collector(env, agent, seed=5)
             collector.begin(env.reset(seed=5)[0])
             rollout = collector.collect(uniforms_of(0, 0, range(4), 40))

@@ -56,7 +56,9 @@ def test_mixtures_sum_to_one_and_masked_actions_have_no_chance(collected, method
 
 def test_the_mixture_is_equation_7_by_hand(collected):
     """Navigate's and Pick's rotations add; all four Dones are one entry."""
-    agent, _, (_, rollout) = collected("camp", changes={"agent": {"interact_chance": 0.3}})
+    agent, _, (_, rollout) = collected(
+        "camp", changes={"agent": {"initial_interaction_probability": 0.3}}
+    )
     batch = rollout.batch
     record = batch.record
     ran = ran_of(agent, batch)
@@ -74,7 +76,9 @@ def test_the_mixture_is_equation_7_by_hand(collected):
 @pytest.mark.parametrize("method", ["camp", "hrl"])
 def test_what_is_drawn_has_the_probability_of_its_parts(collected, method):
     """An option counts where it was decided, an action always; Done by global has no action."""
-    agent, _, lived = collected(method, changes={"agent": {"interact_chance": 0.3}}, rollouts=4)
+    agent, _, lived = collected(
+        method, changes={"agent": {"initial_interaction_probability": 0.3}}, rollouts=4
+    )
     kinds = set()
     for rollout in lived:
         record, ran = rollout.batch.record, ran_of(agent, rollout.batch)
@@ -154,7 +158,9 @@ def test_no_gradient_flows_from_intents_to_action_policies(collected):
 @pytest.mark.parametrize("method", ["camp", "hrl"])
 def test_who_does_not_execute_gets_no_gradient(collected, method):
     """Other advantages for Push's actions change no gradient of Navigate's or Pick's actor."""
-    agent, _, (_, rollout) = collected(method, changes={"agent": {"interact_chance": 0.3}})
+    agent, _, (_, rollout) = collected(
+        method, changes={"agent": {"initial_interaction_probability": 0.3}}
+    )
     option = rollout.batch.record["option"]
     assert set(option.unique().tolist()) >= {NAVIGATE, PUSH, PICK}
 
@@ -263,7 +269,9 @@ def test_forbidden_options_are_never_opened_nor_meant(collected):
 
 
 def test_hrl_decides_at_every_step_and_its_interactions_never_hand_back(collected):
-    agent, _, lived = collected("hrl", rollouts=4, changes={"agent": {"interact_chance": 0.3}})
+    agent, _, lived = collected(
+        "hrl", rollouts=4, changes={"agent": {"initial_interaction_probability": 0.3}}
+    )
     assert not hasattr(agent, "intent")
     options = torch.cat([rollout.batch.record["option"] for rollout in lived])
     assert {PUSH, PICK} <= set(options.unique().tolist())
@@ -280,11 +288,16 @@ def test_hrl_decides_at_every_step_and_its_interactions_never_hand_back(collecte
 @pytest.mark.parametrize("chance", [0.01, 0.05])
 def test_every_learner_ends_an_episode_with_the_same_chance(fake, config, method, chance):
     env = fake()
-    agent = make_agent(method, config(agent={"end_chance": chance, "interact_chance": 0.045}))
+    agent = make_agent(
+        method,
+        config(
+            agent={"initial_done_probability": chance, "initial_interaction_probability": 0.045}
+        ),
+    )
     collector = Collector(env, agent)
     collector.begin(env.reset()[0])
     record = collector.collect(uniforms_of(0, 0, range(4), 1)).batch.record
-    assert record["end_chance"].numpy() == pytest.approx(chance, rel=0.03)
+    assert record["done_probability"].numpy() == pytest.approx(chance, rel=0.03)
     if method in {"hrl", "camp"} and chance == 0.01:
         plan = record["plan"][0, 0].tolist()
         assert plan[:3] == pytest.approx([0.9, 0.045, 0.045], rel=0.03)

@@ -154,7 +154,7 @@ def test_frames_begin_where_episodes_do(experts, config):
 def test_experts_are_learnt_by_every_learner(experts, config, method):
     agent = make_agent(method, config(network={"hidden": 32}))
     cloning = dataclasses.replace(
-        config().cloning, frames=4 * 16 * 30, epochs=2, environments=4, steps=16,
+        config().cloning, frames=4 * 16 * 30, epochs=2, num_envs=4, num_steps=16,
         learning_rate=2e-2, sync_every=10,
     )  # fmt: skip
     optimiser = torch.optim.Adam(agent.optimised(), 1e-3)
@@ -177,7 +177,7 @@ def test_each_update_goes_on_from_the_last_ones_hidden_states(experts, config, m
         return said
 
     monkeypatch.setattr(agent, "evaluate", watched)
-    cloning = dataclasses.replace(config().cloning, frames=96, epochs=1, environments=4, steps=8)
+    cloning = dataclasses.replace(config().cloning, frames=96, epochs=1, num_envs=4, num_steps=8)
     shown = Demonstrations(experts(), agent, EXPERTS.__getitem__)
     list(clone(agent, torch.optim.Adam(agent.optimised()), shown, cloning, 0))
     assert len(lived) == 3

@@ -27,7 +27,7 @@ LAST, ENOUGH = 300, 0.9
 
 @pytest.fixture
 def settings(config):
-    sizes = {"environments": ENVIRONMENTS, "steps": STEPS, "minibatches": 4}
+    sizes = {"num_envs": ENVIRONMENTS, "num_steps": STEPS, "num_minibatches": 4}
     return config(network={"image_size": SIZE, "hidden": 64}, ppo=sizes)
 
 
@@ -41,8 +41,8 @@ def lives(agent, env, settings):
         set_rate(optimiser, RATE, number / ROLLOUTS)
         rollout = collector.collect(uniforms_of(settings.seed, number, range(env.num_envs), STEPS))
         ended += [episode.metrics["success"] for episode in rollout.finished]
-        orders = orders_of(settings.seed, number, settings.ppo.epochs, env.num_envs)
-        new = number < settings.ppo.critic_rollouts
+        orders = orders_of(settings.seed, number, settings.ppo.update_epochs, env.num_envs)
+        new = number < settings.ppo.critic_warmup_rollouts
         update(agent, optimiser, rollout, settings.ppo, orders, critic_only=new)
         if (number + 1) % settings.agent.sync_every == 0:
             agent.synchronise()

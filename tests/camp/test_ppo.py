@@ -24,7 +24,7 @@ def adam(agent, rate=1e-3):
 
 
 def learnt(agent, rollout, config, optimiser=None, rollout_number=0, **more):
-    orders = orders_of(0, rollout_number, config.epochs, rollout.rewards.shape[1])
+    orders = orders_of(0, rollout_number, config.update_epochs, rollout.rewards.shape[1])
     return update(agent, optimiser or adam(agent), rollout, config, orders, **more)
 
 
@@ -36,7 +36,7 @@ def parameters(agent):
 def test_the_first_ratio_is_one_and_an_update_changes_what_is_optimised(collected, config, method):
     agent, _, (_, rollout) = collected(method, steps=16)
     before = parameters(agent)
-    said = learnt(agent, rollout, dataclasses.replace(config().ppo, kl_limit=None))
+    said = learnt(agent, rollout, dataclasses.replace(config().ppo, target_kl=None))
     assert said["ratio_error"] < 1e-5
     assert said["updates"] == 6
     assert all(np.isfinite(list(said.values())))
@@ -73,11 +73,11 @@ def test_the_kl_stops_updates_before_the_step_that_offends(collected, config):
     """Parameters are those after the steps that were within the limit, not one more."""
     agent, _, (_, rollout) = collected("ppo", steps=16)
     start = copy.deepcopy(agent)
-    loose = dataclasses.replace(config().ppo, kl_limit=None, entropy_coefficient=0.0)
+    loose = dataclasses.replace(config().ppo, target_kl=None, ent_coef=0.0)
     counts = {}
     for limit in (1e-12, MIDDLE, None):
         one = copy.deepcopy(start)
-        strict = dataclasses.replace(loose, kl_limit=limit)
+        strict = dataclasses.replace(loose, target_kl=limit)
         said = learnt(one, rollout, strict, adam(one, 3e-3))
         counts[limit] = int(said["updates"])
         assert said["stopped"] == (limit is not None)
@@ -86,7 +86,7 @@ def test_the_kl_stops_updates_before_the_step_that_offends(collected, config):
         orders = orders_of(0, 0, 3, 4)
         batches = [half for order in orders for half in (order[:2], order[2:])]
         for columns in batches[: counts[limit]]:
-            single = dataclasses.replace(loose, minibatches=1)
+            single = dataclasses.replace(loose, num_minibatches=1)
             _part(two, optimiser, rollout, single, columns)
         assert all(
             torch.equal(a, b) for a, b in zip(one.parameters(), two.parameters(), strict=True)
@@ -113,7 +113,7 @@ def _part(agent, optimiser, rollout, config, columns):
 def test_a_step_is_that_of_the_textbook(collected, config):
     agent, _, (_, rollout) = collected("ppo")
     other = copy.deepcopy(agent)
-    ppo = dataclasses.replace(config().ppo, epochs=1, minibatches=1, entropy_coefficient=0.0)
+    ppo = dataclasses.replace(config().ppo, update_epochs=1, num_minibatches=1, ent_coef=0.0)
     learnt(agent, rollout, ppo)
     _part(other, adam(other), rollout, ppo, [0, 1, 2, 3])
     for one, two in zip(agent.parameters(), other.parameters(), strict=True):
@@ -124,7 +124,9 @@ def test_clipped_values_are_the_larger_error(collected, config):
     agent, _, (_, rollout) = collected("ppo")
     with torch.no_grad():
         agent.policy.critic.bias += 3.0
-    ppo = dataclasses.replace(config().ppo, epochs=1, minibatches=1, clip_value=True, clip=0.1)
+    ppo = dataclasses.replace(
+        config().ppo, update_epochs=1, num_minibatches=1, clip_vloss=True, clip_coef=0.1
+    )
     returns = rollout.advantages(ppo) + rollout.values
     now = agent.evaluate(rollout.batch).value.detach()
     near = rollout.values + (now - rollout.values).clamp(-0.1, 0.1)
@@ -141,7 +143,7 @@ def test_two_ranks_of_half_the_batch_are_one_rank(monkeypatch, collected, config
     """
     monkeypatch.setitem(globals(), "adam", _gradient_step)
     agent, _, (_, rollout) = collected(method)
-    ppo = dataclasses.replace(config().ppo, epochs=1, minibatches=1)
+    ppo = dataclasses.replace(config().ppo, update_epochs=1, num_minibatches=1)
     whole = copy.deepcopy(agent)
     said = learnt(whole, rollout, ppo)
     halves = [_columns(rollout, part) for part in ([0, 1], [2, 3])]
@@ -150,7 +152,7 @@ def test_two_ranks_of_half_the_batch_are_one_rank(monkeypatch, collected, config
     for rank in ranks:
         for one, two in zip(whole.parameters(), rank.parameters(), strict=True):
             torch.testing.assert_close(one, two, atol=1e-6, rtol=0)
-    for name in ("policy_loss", "value_loss", "entropy", "gradient_norm", "explained_variance"):
+    for name in ("policy_loss", "value_loss", "entropy", "grad_norm", "explained_variance"):
         assert told[0][name] == told[1][name] == pytest.approx(said[name], abs=1e-5)
 
 
@@ -245,7 +247,7 @@ def test_a_critic_learns_what_is_paid(config, fake):
     agent = make_agent("ppo", config())
     collector = Collector(env, agent)
     collector.begin(env.reset()[0])
-    ppo = dataclasses.replace(config().ppo, gamma=1.0, clip=0.2, entropy_coefficient=0.0)
+    ppo = dataclasses.replace(config().ppo, gamma=1.0, clip_coef=0.2, ent_coef=0.0)
     optimiser = adam(agent, 1e-2)
     for number in range(30):
         rollout = collector.collect(uniforms_of(0, number, range(4), 16))

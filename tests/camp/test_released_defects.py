@@ -16,7 +16,9 @@ from internav_data.records.errors import NotFiniteError  # noqa: E402
 
 def test_defect_1_no_option_lives_on_a_module(collected):
     """Replayed log-probabilities are the rollout's, and a time-out ends an interaction."""
-    agent, _, lived = collected("camp", rollouts=4, changes={"agent": {"interact_chance": 0.4}})
+    agent, _, lived = collected(
+        "camp", rollouts=4, changes={"agent": {"initial_interaction_probability": 0.4}}
+    )
     assert {name for name, _ in agent.named_buffers()} == {"mask", "table", "tail"}
     before = {k: v for k, v in vars(agent).items() if not k.startswith("_")}
     inside = False
@@ -92,7 +94,7 @@ def test_defect_5_no_synchronisation_within_an_update(collected, config, monkeyp
     ppo = config().ppo
     update(
         agent, torch.optim.Adam(agent.optimised(), 1e-2), rollout, ppo,
-        orders_of(0, 0, ppo.epochs, 4),
+        orders_of(0, 0, ppo.update_epochs, 4),
     )  # fmt: skip
     assert not calls
     after = list(agent.intent.parameters())

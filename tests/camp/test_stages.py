@@ -12,7 +12,7 @@ from internav_data.records.errors import UsageError
 
 
 def steps_of(stages, config):
-    each = config.ppo.environments * config.ppo.steps
+    each = config.ppo.num_envs * config.ppo.num_steps
     return {stage.name: stage.updates * each for stage in stages}
 
 
@@ -21,9 +21,11 @@ def test_every_method_gets_the_same_steps(name):
     config = preset(name)
     deep, flat = (plan(config, PARTS, hierarchical=deep) for deep in (True, False))
     assert sum(steps_of(deep, config).values()) == sum(steps_of(flat, config).values())
-    assert sum(steps_of(deep, config).values()) == pytest.approx(config.stages.steps, rel=1e-2)
+    assert sum(steps_of(deep, config).values()) == pytest.approx(
+        config.stages.total_timesteps, rel=1e-2
+    )
     single = sum(n for stage, n in steps_of(flat, config).items() if stage != "all")
-    assert single == pytest.approx(0.2 * config.stages.steps, rel=0.05)
+    assert single == pytest.approx(0.2 * config.stages.total_timesteps, rel=0.05)
 
 
 def test_the_papers_stages_are_one_policy_after_the_other():
@@ -69,10 +71,10 @@ def test_parts_follow_each_other(parts):
 
 
 def test_what_leaves_nothing_to_do_is_refused():
-    tiny = from_mapping(preset("small"), {"stages": {"steps": 1000}}, "test")
+    tiny = from_mapping(preset("small"), {"stages": {"total_timesteps": 1000}}, "test")
     with pytest.raises(UsageError, match="less than one update of 1024"):
         plan(tiny, ("auxiliary",), hierarchical=True)
-    two = from_mapping(preset("small"), {"ppo": {"environments": 2, "minibatches": 1}}, "test")
+    two = from_mapping(preset("small"), {"ppo": {"num_envs": 2, "num_minibatches": 1}}, "test")
     with pytest.raises(UsageError, match="3 at least"):
         plan(two, PARTS, hierarchical=True)
 

@@ -26,7 +26,7 @@ LEARNERS = [
 @pytest.fixture
 def curious(config):
     """Let interactions be likely, so that rollouts begin and end within them."""
-    return {"agent": {"interact_chance": 0.3}}
+    return {"agent": {"initial_interaction_probability": 0.3}}
 
 
 @pytest.mark.parametrize(("method", "told"), LEARNERS)

@@ -30,9 +30,12 @@ from internav_data.records.errors import (  # noqa: E402
 
 SMALL = {
     "network": {"image_size": 16, "hidden": 12},
-    "ppo": {"environments": 4, "minibatches": 2, "steps": 8, "epochs": 2, "critic_rollouts": 1},
-    "cloning": {"frames": 64, "epochs": 2, "environments": 4, "steps": 8, "sync_every": 2},
-    "stages": {"steps": 320, "auxiliary_share": 0.3, "single_room_share": 0.3},
+    "ppo": {
+        "num_envs": 4, "num_minibatches": 2, "num_steps": 8, "update_epochs": 2,
+        "critic_warmup_rollouts": 1,
+    },
+    "cloning": {"frames": 64, "epochs": 2, "num_envs": 4, "num_steps": 8, "sync_every": 2},
+    "stages": {"total_timesteps": 320, "auxiliary_share": 0.3, "single_room_share": 0.3},
     "run": {
         "max_steps": 12, "checkpoint_every": 3, "validate_every": 2, "validation_episodes": 2,
         "tensorboard": False,
@@ -162,7 +165,7 @@ def test_what_is_not_finite_stops_and_leaves_the_last_checkpoint(request_for, mo
     ("asked", "words"),
     [
         ({"method": "ppo"}, "run of method 'camp', asked for 'ppo'"),
-        ({"config": {"ppo": {"steps": 9}}}, "ppo.steps is 8 in this run, asked for 9"),
+        ({"config": {"ppo": {"num_steps": 9}}}, "ppo.num_steps is 8 in this run, asked for 9"),
         ({"parts": ("all",)}, "stage auxiliary is not finished"),
     ],
 )
@@ -198,7 +201,7 @@ def test_episodes_are_those_that_are_asked_for(scenes):
     near = TrainingData(scenes, ["shortest_path_m<=3"]).episodes()
     assert 0 < len(near) < len(TrainingData(scenes).episodes())
     assert all(episode.shortest_path_m <= 3.0 for episode in near)
-    with pytest.raises(UsageError, match="for which --where holds"):
+    with pytest.raises(UsageError, match="for which --filter holds"):
         TrainingData(scenes, ["shortest_path_m<=0"])
     with pytest.raises(UsageError, match="COLUMN=VALUE"):
         TrainingData(scenes, ["near"])
@@ -227,14 +230,14 @@ def test_a_dataset_without_outcomes_is_refused(scenes, monkeypatch):
 
 def test_settings_come_from_preset_file_options_and_overrides(tmp_path):
     file = tmp_path / "mine.toml"
-    file.write_text("[ppo]\nsteps = 32\nepochs = 2\n")
+    file.write_text("[ppo]\nnum_steps = 32\nupdate_epochs = 2\n")
     config = config_of(
-        "small", file, ["ppo.epochs=5"], {"seed": 3, "data.where": ("mode=blocked",)}
+        "small", file, ["ppo.update_epochs=5"], {"seed": 3, "data.filter": ("mode=blocked",)}
     )
-    assert (config.ppo.steps, config.ppo.epochs, config.seed) == (32, 5, 3)
-    assert config.data.where == ("mode=blocked",)
-    with pytest.raises(UsageError, match=r"ppo\.stepz.*ppo\.steps"):
-        config_of("small", None, ["ppo.stepz=1"])
+    assert (config.ppo.num_steps, config.ppo.update_epochs, config.seed) == (32, 5, 3)
+    assert config.data.filter == ("mode=blocked",)
+    with pytest.raises(UsageError, match=r"ppo\.num_stepz.*ppo\.num_steps"):
+        config_of("small", None, ["ppo.num_stepz=1"])
     with pytest.raises(UsageError, match="expected 0"):
         config_of("small", None, [], {"seed": -1})
 
@@ -244,12 +247,13 @@ def test_two_ranks_train_what_one_does(request_for, scenes, tmp_path):
     file = tmp_path / "small.toml"
     file.write_text(
         "[network]\nimage_size = 16\nhidden = 12\n"
-        "[ppo]\nenvironments = 6\nminibatches = 1\nsteps = 8\nepochs = 2\ncritic_rollouts = 1\n"
-        "[cloning]\nframes = 48\nepochs = 1\nenvironments = 6\nsteps = 8\n"
-        "[stages]\nsteps = 288\nauxiliary_share = 0.3\nsingle_room_share = 0.3\n"
+        "[ppo]\nnum_envs = 6\nnum_minibatches = 1\nnum_steps = 8\n"
+        "update_epochs = 2\ncritic_warmup_rollouts = 1\n"
+        "[cloning]\nframes = 48\nepochs = 1\nnum_envs = 6\nnum_steps = 8\n"
+        "[stages]\ntotal_timesteps = 288\nauxiliary_share = 0.3\nsingle_room_share = 0.3\n"
         "[run]\nmax_steps = 12\nvalidation_episodes = 0\ntensorboard = false\n"
     )
-    words = ["internav_cli.camp_train", scenes, "--config", file, "--init-from", "expert"]
+    words = ["internav_cli.camp_train", scenes, "--config", file, "--pretrain", "bc"]
     words += ["--device", "cpu", "--preset", "small", "--out"]
     torchrun = ["torch.distributed.run", "--standalone", "--nproc-per-node", "2", "-m"]
     for out, start in (("one", []), ("two", torchrun)):

@@ -22,18 +22,18 @@ def call(calling):
     return calling(main)
 
 
-def test_oracles_are_measured_and_compared(call, dataset, tmp_path):
-    code, out, err = call("expert,planner,random", dataset, "--split", "val", "--out", "a")
+def test_reference_policies_are_measured_and_compared(call, dataset, tmp_path):
+    code, out, err = call("expert,shortest_path,random", dataset, "--split", "val", "--out", "a")
     assert code == 0, err
     assert "| expert | 100.0 |" in out
     assert "No episode is N >= 4 rooms: n = 0." in out
-    names = ["expert", "planner", "random", "report.html", "tables.json", "tables.md"]
+    names = ["expert", "random", "report.html", "shortest_path", "tables.json", "tables.md"]
     assert sorted(p.name for p in (tmp_path / "a").iterdir()) == names
     assert (tmp_path / "a" / "tables.md").read_text().strip() == out.strip()
     code, out, err = call("compare", "a", "--json")
     assert code == 0, err
     rows = json.loads(out)["tables"][0]["rows"]
-    assert [row["name"] for row in rows if row["source"] == "oracle"] == names[:3]
+    assert [row["name"] for row in rows if row["source"] == "reference_policy"] == names[:3]
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a"], "compare writes where told alone"
     code, out, err = call("compare", "a", "--dataset", dataset, "--out", "b")
     assert code == 0, err
@@ -48,14 +48,14 @@ def test_nothing_is_overwritten_unless_told(call, dataset, tmp_path):
     assert (code, out) == (2, "")
     assert "--force" in err
     assert (tmp_path / "evaluation-val" / "tables.json").read_bytes() == before
-    assert call("planner", dataset, "--split", "val", "--force")[0] == 0
+    assert call("shortest_path", dataset, "--split", "val", "--force")[0] == 0
     kept = [p.parent.name for p in (tmp_path / "evaluation-val").glob("*/evaluation.json")]
-    assert kept == ["planner"], "what was there before is no part of what is there now"
+    assert kept == ["shortest_path"], "what was there before is no part of what is there now"
 
 
 def test_the_same_call_gives_the_same_files(call, dataset, tmp_path):
     for out, batch in (("a", 1), ("b", 7)):
-        words = ("random,planner", dataset, "--split", "val", "--out", out, "--batch", batch)
+        words = ("random,shortest_path", dataset, "--split", "val", "--out", out, "--batch", batch)
         assert call(*words)[0] == 0
     files = sorted(p.relative_to(tmp_path / "a") for p in (tmp_path / "a").rglob("*.*"))
     assert len(files) == 7
@@ -65,7 +65,9 @@ def test_the_same_call_gives_the_same_files(call, dataset, tmp_path):
 
 def test_episodes_can_be_chosen(call, dataset, tmp_path):
     def count(*words):
-        code, out, err = call("planner", dataset, "--split", "val", "--json", "--force", *words)
+        code, out, err = call(
+            "shortest_path", dataset, "--split", "val", "--json", "--force", *words
+        )
         assert code == 0, err
         return json.loads(out)["tables"][0]["episodes"]
 
@@ -74,24 +76,28 @@ def test_episodes_can_be_chosen(call, dataset, tmp_path):
     assert count("--episodes-per-scene", 2) == {
         "all": 2, "N >= 4 rooms": 0, "non-interactive": 1, "blocked": 1,
     }  # fmt: skip
-    assert count("--where", "mode=blocked", "--where", "room_count<=3")["non-interactive"] == 0
+    assert count("--filter", "mode=blocked", "--filter", "room_count<=3")["non-interactive"] == 0
 
 
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        (("best", "DATA"), 2, ["best", "expert, planner, random"]),
+        (("best", "DATA"), 2, ["best", "expert, shortest_path, random"]),
         (("random,best", "DATA"), 2, ["random,best"]),
         (("random", "nowhere"), 5, ["nowhere"]),
         (("random", "DATA", "--split", "dev"), 2, ["--split"]),
-        (("random", "DATA", "--where", "room_count>7"), 2, ["room_count", "stats"]),
-        (("random", "DATA", "--where", "rooms=1"), 2, ["rooms"]),
-        (("random", "DATA", "--where", "rooms"), 2, ["COLUMN=VALUE"]),
+        (("random", "DATA", "--filter", "room_count>7"), 2, ["room_count", "stats"]),
+        (("random", "DATA", "--filter", "rooms=1"), 2, ["rooms"]),
+        (("random", "DATA", "--filter", "rooms"), 2, ["COLUMN=VALUE"]),
         (("random", "DATA", "--limit", "0"), 2, ["1 or more"]),
         (("random", "DATA", "--batch", "0"), 2, ["batch"]),
         (("random", "DATA", "--max-steps", "-1"), 2, ["max_steps"]),
         (("random", "DATA", "--seed", "-1"), 2, ["seed"]),
         (("random", "DATA", "--unknown"), 2, ["--unknown"]),
+        (("random", "DATA", "--where", "a=1"), 2, ["--where is now called --filter"]),
+        (("random", "DATA", "--no-oracles"), 2, ["now called --no-reference-policies"]),
+        (("random", "DATA", "--oracles"), 2, ["--oracles is now called --reference-policies"]),
+        (("expert,planner", "DATA"), 2, ["planner is now called shortest_path"]),
         (("random",), 5, ["internav-dataset", "internav-gen generate"]),
         (("compare",), 2, ["RUNS"]),
         (("compare", "nowhere"), 2, ["nowhere", "camp-eval RUN DATASET"]),
@@ -111,7 +117,7 @@ def test_what_cannot_be_meant_is_one_line(call, dataset, tmp_path, words, code, 
 
 def test_evaluations_of_other_episodes_are_not_compared(call, dataset):
     assert call("random", dataset, "--split", "val", "--out", "a")[0] == 0
-    assert call("planner", dataset, "--split", "test", "--out", "b")[0] == 0
+    assert call("shortest_path", dataset, "--split", "test", "--out", "b")[0] == 0
     code, out, err = call("compare", "a", "b")
     assert (code, out) == (2, "")
     assert "dataset" in err or "split" in err
@@ -145,7 +151,7 @@ def test_a_dataset_without_experts_says_so(call, tmp_path_factory, dataset):
     assert (code, text) == (2, "")
     (line,) = beside_the_dataset(err)
     assert "no episode has an expert" in line
-    assert call("planner", out, "--split", "val")[0] == 0
+    assert call("shortest_path", out, "--split", "val")[0] == 0
 
 
 def test_help_is_fast_and_has_examples():

@@ -18,8 +18,8 @@ from internav_cli.camp_train import main
 TRAIN = Path(sys.executable).with_name("camp-train")
 TINY = (
     "--device", "cpu", "--method", "ppo", "--set", "network.image_size=16",
-    "--set", "network.hidden=8", "--set", "ppo.environments=4", "--set", "ppo.minibatches=1",
-    "--set", "ppo.steps=8", "--set", "run.validation_episodes=1", "--set", "run.max_steps=10",
+    "--set", "network.hidden=8", "--set", "ppo.num_envs=4", "--set", "ppo.num_minibatches=1",
+    "--set", "ppo.num_steps=8", "--set", "run.validation_episodes=1", "--set", "run.max_steps=10",
     "--set", "run.tensorboard=false", "--set", "run.checkpoint_every=1",
 )  # fmt: skip
 
@@ -71,13 +71,16 @@ def test_a_run_is_trained_and_measured(call, dataset, tmp_path):
         ((), 5, ["internav-dataset", "internav-gen generate"]),
         (("DATA", "--method", "sarsa"), 2, ["sarsa", "ppo-intent"]),
         (("DATA", "--method", "random"), 2, ["nothing to learn"]),
-        (("DATA", "--set", "ppo.step=3"), 2, ["ppo.step", "ppo.steps"]),
-        (("DATA", "--set", "ppo.steps=zero"), 2, ["ppo.steps", "whole number"]),
-        (("DATA", "--set", "ppo.minibatches=5"), 2, ["minibatches", "divide"]),
+        (("DATA", "--set", "ppo.num_step=3"), 2, ["ppo.num_step", "ppo.num_steps"]),
+        (("DATA", "--set", "ppo.num_steps=zero"), 2, ["ppo.num_steps", "whole number"]),
+        (("DATA", "--set", "ppo.num_minibatches=5"), 2, ["minibatches", "divide"]),
         (("DATA", "--config", "nowhere.toml"), 2, ["nowhere.toml"]),
+        (("DATA", "--set", "ppo.steps=9"), 2, ["'ppo.steps' is called 'ppo.num_steps' now"]),
+        (("DATA", "--init-from", "expert"), 2, ["--init-from is now called --pretrain bc"]),
+        (("DATA", "--where", "room_count=1"), 2, ["--where is now called --filter"]),
         (("DATA", "--stages", "all,single"), 2, ["--stages", "order"]),
-        (("DATA", "--where", "shortest_path_m<=0"), 2, ["no training episodes", "--where"]),
-        (("DATA", "--where", "room=1"), 2, ["room"]),
+        (("DATA", "--filter", "shortest_path_m<=0"), 2, ["no training episodes", "--filter"]),
+        (("DATA", "--filter", "room=1"), 2, ["room"]),
         (("DATA", "--device", "cuda"), 2, ["no GPU"]),
         (("DATA", "--resume", "--out", "nothing"), 2, ["nothing", "no last checkpoint"]),
         (("NOTHING",), 5, ["NOTHING", "manifest.json"]),

@@ -51,8 +51,8 @@ def test_whole_numbers_do_for_seconds(written):
 @pytest.mark.parametrize(
     ("change", "word"),
     [
-        ({"format": 2}, "format 1"),
-        ({"format": None}, "format 1"),
+        ({"format": 1}, "format 2"),
+        ({"format": None}, "format 2"),
         ({"seed": "0"}, "seed"),
         ({"greedy": 1}, "greedy"),
         ({"name": None}, "name"),

@@ -6,14 +6,18 @@ import pytest
 from internav_data.dataset import load_dataset
 from internav_data.envs.single import InterNavEnv
 from internav_data.evaluation.evaluate import EvaluationConfig, chosen, episode_generator, evaluate
-from internav_data.evaluation.reference_policies import RandomPlayer, ScriptedPlayer, oracle
+from internav_data.evaluation.reference_policies import (
+    RandomPolicy,
+    ScriptedPolicy,
+    reference_policy,
+)
 from internav_data.records.errors import UsageError
 
 SHORT = EvaluationConfig(batch=3, max_steps=30)
 
 
-class Looking(RandomPlayer):
-    """Draws as `RandomPlayer` does, and ends where what it sees is bright: pictures matter."""
+class Looking(RandomPolicy):
+    """Draws as `RandomPolicy` does, and ends where what it sees is bright: pictures matter."""
 
     image_size = 16
 
@@ -71,7 +75,7 @@ def test_what_was_done_can_be_played_again(played_data, alone):
 
 
 def test_long_episodes_are_cut_off(played_data):
-    turning = ScriptedPlayer("turning", lambda _: [1] * 100)
+    turning = ScriptedPolicy("turning", lambda _: [1] * 100)
     results = evaluate(turning, played_data, EvaluationConfig(max_steps=7, limit=4))
     assert [(r.steps, r.success, r.path_m) for r in results] == [(7, False, 0.0)] * 4
     assert [len(r.actions) for r in results] == [7] * 4
@@ -80,14 +84,16 @@ def test_long_episodes_are_cut_off(played_data):
 def test_seats_of_ended_episodes_wait_for_the_last(played_data):
     """One long episode among short ones, over many more steps than an idle seat may wait."""
     first = played_data[0].episode_id
-    script = ScriptedPlayer("one long", lambda e: [1] * 40 if e.episode_id == first else [11])
+    script = ScriptedPolicy("one long", lambda e: [1] * 40 if e.episode_id == first else [11])
     results = evaluate(script, played_data, EvaluationConfig(batch=16, max_steps=40))
     assert [r.steps for r in results] == [40] + [1] * (len(played_data) - 1)
 
 
 def test_progress_is_told(played_data):
     told = []
-    evaluate(oracle("random", played_data), played_data, SHORT, lambda *said: told.append(said))
+    evaluate(
+        reference_policy("random", played_data), played_data, SHORT, lambda *said: told.append(said)
+    )
     assert told[-1] == (len(played_data), len(played_data))
     assert [done for done, _ in told] == sorted({done for done, _ in told})
 
@@ -120,10 +126,10 @@ def test_random_numbers_belong_to_the_episode(hand_episode):
 )
 def test_settings_that_cannot_be_meant(played_data, wrong):
     with pytest.raises(UsageError, match=next(iter(wrong))):
-        evaluate(RandomPlayer(), played_data, EvaluationConfig(**wrong))
+        evaluate(RandomPolicy(), played_data, EvaluationConfig(**wrong))
 
 
 def test_nothing_to_play_says_so(played_data):
     empty = load_dataset(played_data.path, filters=[("room_count", ">", 9)])
     with pytest.raises(UsageError, match=r"room_count.*stats"):
-        evaluate(RandomPlayer(), empty)
+        evaluate(RandomPolicy(), empty)

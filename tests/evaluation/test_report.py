@@ -8,7 +8,7 @@ import pytest
 
 from internav_data.evaluation.archive import About, Evaluation
 from internav_data.evaluation.evaluate import EvaluationConfig, evaluate
-from internav_data.evaluation.reference_policies import oracle
+from internav_data.evaluation.reference_policies import reference_policy
 from internav_data.evaluation.report import (
     data_of,
     find_log,
@@ -21,7 +21,7 @@ from internav_data.evaluation.report import (
     write_page,
     write_texts,
 )
-from internav_data.evaluation.videos import films
+from internav_data.evaluation.videos import videos
 from internav_data.records.errors import UsageError
 
 
@@ -34,13 +34,15 @@ def settings():
 def played(played_data, settings):
     found = []
     for name in ("expert", "random"):
-        results = evaluate(oracle(name, played_data), played_data, settings)
-        about = About(name, name, played_data.fingerprint, "all", 0, 25, oracle=name == "expert")
+        results = evaluate(reference_policy(name, played_data), played_data, settings)
+        about = About(
+            name, name, played_data.fingerprint, "all", 0, 25, is_reference=name == "expert"
+        )
         found.append(Evaluation(about, tuple(results)))
     return found
 
 
-def test_oracles_count_once(played, row, evaluation):
+def test_reference_policies_count_once(played, row, evaluation):
     methods = methods_of([played[0], played[1], played[0]])
     assert list(methods) == ["expert", "random"]
     assert [len(found) for found in methods.values()] == [1, 1]
@@ -120,20 +122,20 @@ def test_logs_are_read_forgivingly(tmp_path):
     assert shown_first(["kl", "z/success", "a"])[0] == "z/success"
 
 
-def test_films_show_the_episodes_that_were_played(played_data, played, settings, tmp_path):
+def test_videos_show_the_episodes_that_were_played(played_data, played, settings, tmp_path):
     class Telling:
         name, image_size = "telling", 1
 
         def __init__(self):
-            self._inner = oracle("random", played_data)
+            self._inner = reference_policy("random", played_data)
             self.begin, self.start, self.act = (
                 self._inner.begin, self._inner.start, self._inner.act,
             )  # fmt: skip
 
-        def notes(self, seat):
-            return [("option", ("a", "b"), (0.25, 0.75), seat)]
+        def notes(self, slot):
+            return [("option", ("a", "b"), (0.25, 0.75), slot)]
 
     short = dataclasses.replace(settings, max_steps=25)
-    files = list(films(tmp_path, Telling(), played[1].results[:3], played_data, short))
+    files = list(videos(tmp_path, Telling(), played[1].results[:3], played_data, short))
     assert [path.name.split("-")[0] for path in files] == ["best", "median", "worst"]
     assert all(path.read_bytes().startswith(b"GIF89a") for path in files)

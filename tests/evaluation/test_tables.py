@@ -153,7 +153,7 @@ def test_methods_are_compared_over_seeds(runs):
     methods = {
         "camp": [runs("camp", k, 0.6 + 0.1 * (k % 2)) for k in range(5)],
         "ppo": [runs("ppo", k, 0.2 + 0.1 * (k % 2)) for k in range(5)],
-        "expert": [runs("expert", None, 1.0, oracle=True)],
+        "expert": [runs("expert", None, 1.0, is_reference=True)],
     }
     (found,) = differences(methods, "blocked", "success")
     assert (found.first, found.second, found.unit) == ("camp", "ppo", "seeds")
@@ -199,7 +199,7 @@ def test_costs_stand_beside(runs):
     methods = {
         "camp": [runs("camp", k, 0.5, training_s=60.0 * (k + 1), **given) for k in range(3)],
         "ppo": [runs("ppo", 0, 0.5)],
-        "expert": [runs("expert", None, 1.0, oracle=True)],
+        "expert": [runs("expert", None, 1.0, is_reference=True)],
     }
     _, rows = fairness(methods)
     assert rows == [

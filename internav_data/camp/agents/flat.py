@@ -55,7 +55,7 @@ class PPOAgent(Agent):
         self.hidden = config.network.hidden
         self.encoder = Encoder(config.network)
         self.policy = self._policy(
-            self.encoder.size + extra, start_chances(config.agent.end_chance)
+            self.encoder.size + extra, start_chances(config.agent.initial_done_probability)
         )
 
     def _policy(self, inputs: int, chances: list[float]) -> RecurrentActorCritic:
@@ -76,7 +76,7 @@ class PPOAgent(Agent):
         choice = drawn(log_probs, None if uniforms is None else uniforms[:, 1])
         probs = log_probs.exp()
         record = {name: noted[0] for name, noted in record.items()}
-        record |= {"choice": choice, "action_probs": probs, "end_chance": probs[:, DONE]}
+        record |= {"choice": choice, "action_probs": probs, "done_probability": probs[:, DONE]}
         return AgentStep(
             choice,
             log_probs.gather(-1, choice.unsqueeze(-1)).squeeze(-1),

@@ -93,7 +93,9 @@ class Hierarchy(Agent):
         count = 1 if network.shared_encoder else 3
         self.encoders = nn.ModuleList(Encoder(network) for _ in range(count))
         size = Encoder.size_of(network)
-        moves, options = start_chances(told.end_chance, told.interact_chance)
+        moves, options = start_chances(
+            told.initial_done_probability, told.initial_interaction_probability
+        )
         even = [1.0 / len(ACTIONS_OF[PUSH])] * len(ACTIONS_OF[PUSH])  # hand-backs end nothing
         self.navigate = RecurrentActorCritic(size, self.hidden, moves)
         self.push = RecurrentActorCritic(size + OPTION_INPUTS, self.hidden, even)
@@ -140,7 +142,7 @@ class Hierarchy(Agent):
             opened, used, forced = opened * 0, used * 0, forced & False
         # For logs alone: what is planned, what was meant, and the chance that this ends it all.
         ending = (plan[:, STOP].exp() + plan[:, NAVIGATE].exp() * acts[:, 0, DONE].exp()) * decide
-        record |= {"forced": forced, "plan": plan.exp(), "end_chance": ending}
+        record |= {"forced": forced, "plan": plan.exp(), "done_probability": ending}
         if ran.meant is not None:
             record["meant"] = ran.meant[0]
         after = {"hidden": ran.hidden, "open": opened, "used": used}

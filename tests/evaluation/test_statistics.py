@@ -110,11 +110,11 @@ def test_scenes_alone_find_false_winners_and_seeds_do_not(row):
 def test_what_cannot_be_compared_is_refused(row, evaluation):
     first = evaluation([row(0), row(1)], training_seed=0)
     good = evaluation([row(0), row(1)], training_seed=1)
-    oracle = evaluation([row(0), row(1)], "expert", oracle=True)
+    reference_policy = evaluation([row(0), row(1)], "expert", is_reference=True)
     greedy = evaluation([row(0), row(1)], "ppo", greedy=True)
-    check_comparable([first, good, oracle])
-    check_comparable([greedy, oracle])
-    check_comparable([oracle, greedy])
+    check_comparable([first, good, reference_policy])
+    check_comparable([greedy, reference_policy])
+    check_comparable([reference_policy, greedy])
     wrong = [
         (evaluation([row(0)], training_seed=1), "other episodes"),
         (evaluation([row(0), row(1)], "ppo", dataset="e"), "dataset"),
@@ -125,7 +125,7 @@ def test_what_cannot_be_compared_is_refused(row, evaluation):
     ]
     for other, word in wrong:
         with pytest.raises(UsageError, match=word):
-            check_comparable([oracle, first, other])
+            check_comparable([reference_policy, first, other])
 
 
 def test_seeds_are_gathered_by_method(row, evaluation):

@@ -7,7 +7,7 @@ import types
 import numpy as np
 import pytest
 
-from internav_data.camp.policy import AgentPolicy, candidate, oracles_beside, row_name
+from internav_data.camp.policy import AgentPolicy, candidate, reference_policies_beside, row_name
 from internav_data.evaluation.evaluate import EvaluationConfig, episode_generator, evaluate
 from internav_data.records.errors import UsageError
 
@@ -26,7 +26,9 @@ def make():
     config = dataclasses.replace(
         base,
         network=dataclasses.replace(base.network, image_size=16, hidden=8),
-        agent=dataclasses.replace(base.agent, end_chance=0.1, interact_chance=0.2),
+        agent=dataclasses.replace(
+            base.agent, initial_done_probability=0.1, initial_interaction_probability=0.2
+        ),
     )
 
     def made(method, **changes):
@@ -38,7 +40,7 @@ def make():
     return made
 
 
-def player(agent, *, greedy=False):
+def policy(agent, *, greedy=False):
     return AgentPolicy("someone", agent, 16, greedy=greedy)
 
 
@@ -47,19 +49,19 @@ def test_agents_play_the_same_in_any_batch(played_data, make, method):
     agent = make(method)
     results = {
         batch: evaluate(
-            player(agent), played_data, EvaluationConfig(batch=batch, max_steps=12, limit=6)
+            policy(agent), played_data, EvaluationConfig(batch=batch, max_steps=12, limit=6)
         )
         for batch in (1, 4)
     }
     assert results[1] == results[4]
     assert len({r.steps for r in results[1]}) > 1
-    assert evaluate(player(agent), played_data, dataclasses.replace(SHORT, seed=1)) != results[1]
+    assert evaluate(policy(agent), played_data, dataclasses.replace(SHORT, seed=1)) != results[1]
 
 
 def test_greedy_draws_nothing(played_data, make):
     agent = make("camp")
-    first = evaluate(player(agent, greedy=True), played_data, SHORT)
-    other = evaluate(player(agent, greedy=True), played_data, dataclasses.replace(SHORT, seed=9))
+    first = evaluate(policy(agent, greedy=True), played_data, SHORT)
+    other = evaluate(policy(agent, greedy=True), played_data, dataclasses.replace(SHORT, seed=9))
     assert first == other
 
 
@@ -91,7 +93,7 @@ class Recorder:
 
 def test_state_begins_anew_with_each_episode_and_numbers_are_the_episodes(played_data):
     agent = Recorder()
-    results = evaluate(player(agent), played_data, EvaluationConfig(seed=5, batch=1, limit=3))
+    results = evaluate(policy(agent), played_data, EvaluationConfig(seed=5, batch=1, limit=3))
     assert [r.steps for r in results] == [4, 4, 4], "a state that leaked would end at once"
     assert agent.starts == [[k % 4 == 0] for k in range(12)]
     drawn = torch.cat(agent.uniforms).numpy()
@@ -106,10 +108,10 @@ def test_state_begins_anew_with_each_episode_and_numbers_are_the_episodes(played
 
 
 def test_what_led_to_an_action_can_be_shown(played_data, make):
-    agent = player(make("camp"))
+    agent = policy(make("camp"))
     agent.begin(2, 0)
-    for seat in range(2):
-        agent.start(seat, played_data[seat])
+    for slot in range(2):
+        agent.start(slot, played_data[slot])
     rng = np.random.default_rng(0)
     seen = {
         "rgb": rng.integers(0, 256, (2, 16, 16, 3), np.uint8),
@@ -149,7 +151,7 @@ def test_a_runs_facts_are_told(played_data, stored):
     run = stored("camp", intent="none")
     found = candidate(str(run), played_data, SHORT, greedy=True).about
     assert (found.name, found.method, found.intent) == ("camp --intent none", "camp", "none")
-    assert (found.greedy, found.oracle, found.split) == (True, False, "all")
+    assert (found.greedy, found.is_reference, found.split) == (True, False, "all")
     assert (found.environment_steps, found.training_s, found.training_seed) == (300, 2.5, 0)
     assert found.parameters > 0
     assert found.dataset == played_data.fingerprint
@@ -160,22 +162,22 @@ def test_the_intent_can_be_left_out_where_there_is_one(played_data, stored):
     with_it = candidate(str(run), played_data, SHORT)
     without = candidate(str(run), played_data, SHORT, without_intent=True)
     assert without.about.name == "camp --without-intent"
-    both = [evaluate(each.player, played_data, SHORT) for each in (with_it, without)]
+    both = [evaluate(each.policy, played_data, SHORT) for each in (with_it, without)]
     assert len(both[0]) == len(both[1]) == 6
     with pytest.raises(UsageError, match="no intent"):
         candidate(str(stored("ppo")), played_data, SHORT, without_intent=True)
 
 
 def test_names_of_rows(played_data):
-    about = candidate("planner", played_data, SHORT).about
-    assert (about.name, about.oracle) == ("planner", True)
+    about = candidate("shortest_path", played_data, SHORT).about
+    assert (about.name, about.is_reference) == ("shortest_path", True)
     ppo = dataclasses.replace(about, method="ppo-intent", intent="integrated", sync_every=5)
     assert row_name(ppo) == "ppo-intent --sync-every 5"
     cloned = dataclasses.replace(about, method="ppo", cloned_frames=9, environment_steps=0)
     assert row_name(cloned) == "ppo (cloned only)"
-    assert oracles_beside(played_data) == ["expert", "planner"]
+    assert reference_policies_beside(played_data) == ["expert", "shortest_path"]
 
 
-def test_who_is_neither_run_nor_oracle_is_told_so(played_data):
-    with pytest.raises(UsageError, match=r"no-such-run.*expert, planner, random"):
+def test_who_is_neither_run_nor_reference_policy_is_told_so(played_data):
+    with pytest.raises(UsageError, match=r"no-such-run.*expert, shortest_path, random"):
         candidate("no-such-run", played_data, SHORT)

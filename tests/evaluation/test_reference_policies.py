@@ -6,7 +6,12 @@ import pytest
 
 from internav_data.evaluation.evaluate import EvaluationConfig, evaluate
 from internav_data.evaluation.metrics import summary
-from internav_data.evaluation.reference_policies import nearest, oracle, planner_of, shortest
+from internav_data.evaluation.reference_policies import (
+    nearest,
+    reference_policy,
+    shortest,
+    shortest_path_planner,
+)
 from internav_data.navigation import Lattice
 from internav_data.records.errors import UsageError
 from internav_data.world import Action, HouseModel, World
@@ -17,8 +22,8 @@ INTERACTIONS = set(range(Action.PUSH_AHEAD, Action.DROP + 1))
 
 @pytest.fixture(scope="module")
 def rows(played_data):
-    names = ("expert", "planner", "random")
-    return {name: evaluate(oracle(name, played_data), played_data) for name in names}
+    names = ("expert", "shortest_path", "random")
+    return {name: evaluate(reference_policy(name, played_data), played_data) for name in names}
 
 
 def world_of(dataset, episode):
@@ -33,18 +38,18 @@ def test_the_expert_does_what_is_stored_and_solves_all(played_data, rows):
         assert result.path_m == pytest.approx(episode.expert.path_m)
 
 
-def test_the_planner_touches_nothing_and_walks_the_shortest_way(played_data, rows):
+def test_the_shortest_path_policy_touches_nothing_and_walks_the_shortest_way(played_data, rows):
     assert {e.mode for e in played_data} == {"blocked", "lengthened"}
-    for result, episode in zip(rows["planner"], played_data, strict=True):
+    for result, episode in zip(rows["shortest_path"], played_data, strict=True):
         assert not INTERACTIONS & set(result.actions)
         assert result.success == (episode.obstructed_path_steps is not None)
         if episode.obstructed_path_steps is not None:
             assert result.path_m == pytest.approx(0.25 * episode.obstructed_path_steps)
 
 
-def test_where_cut_off_the_planner_walks_as_near_as_it_can(played_data, rows):
+def test_where_cut_off_the_shortest_path_policy_walks_as_near_as_it_can(played_data, rows):
     blocked = 0
-    for result, episode in zip(rows["planner"], played_data, strict=True):
+    for result, episode in zip(rows["shortest_path"], played_data, strict=True):
         if episode.obstructed_path_steps is not None:
             continue
         blocked += 1
@@ -61,12 +66,12 @@ def test_where_cut_off_the_planner_walks_as_near_as_it_can(played_data, rows):
 
 
 def test_bounds_lie_as_they_should(rows):
-    """The planner bounds who does not interact; the expert all on the lattice."""
+    """The shortest path bounds those who do not interact; the expert all on the lattice."""
     for group in ("all", "blocked", "non-interactive"):
-        expert, planner, chance = (summary(rows[name], group).values for name in rows)
+        expert, shortest_path, chance = (summary(rows[name], group).values for name in rows)
         for name in ("success", "spl", "sts"):
-            assert expert[name] >= planner[name] >= chance[name]
-        assert expert["distance_m"] <= planner["distance_m"] <= chance["distance_m"]
+            assert expert[name] >= shortest_path[name] >= chance[name]
+        assert expert["distance_m"] <= shortest_path["distance_m"] <= chance["distance_m"]
 
 
 def fewest_by_networkx(lattice, start, goal):
@@ -119,33 +124,33 @@ def test_chance_is_even_and_of_the_episode(played_data, rows):
     counts = np.bincount([a for r in rows["random"] for a in r.actions], minlength=12)
     assert (counts > 0).all()
     assert (
-        evaluate(oracle("random", played_data), played_data, EvaluationConfig(batch=2))
+        evaluate(reference_policy("random", played_data), played_data, EvaluationConfig(batch=2))
         == rows["random"]
     )
-    player = oracle("random", played_data)
-    player.begin(1, 0)
+    policy = reference_policy("random", played_data)
+    policy.begin(1, 0)
     drawn = []
     for episode in list(played_data) * 50:
-        player.start(0, episode)
-        drawn += [int(player.act({})[0]) for _ in range(3)]
+        policy.start(0, episode)
+        drawn += [int(policy.act({})[0]) for _ in range(3)]
     many = []
-    player.start(0, played_data[0])
-    many = [int(player.act({})[0]) for _ in range(12_000)]
+    policy.start(0, played_data[0])
+    many = [int(policy.act({})[0]) for _ in range(12_000)]
     expected = 1000.0
     chi2 = ((np.bincount(many, minlength=12) - expected) ** 2 / expected).sum()
     assert chi2 < 31.3, "99.9 % of even chances with 11 degrees of freedom"
     assert drawn[:3] == drawn[len(played_data) * 3 : len(played_data) * 3 + 3], "keyed"
 
 
-def test_unknown_oracles_and_missing_experts(played_data, monkeypatch):
-    with pytest.raises(UsageError, match=r"expert, planner, random"):
-        oracle("best", played_data)
+def test_unknown_reference_policies_and_missing_experts(played_data, monkeypatch):
+    with pytest.raises(UsageError, match=r"expert, shortest_path, random"):
+        reference_policy("best", played_data)
     import pyarrow as pa
 
     gone = pa.table({"expert": pa.nulls(3, pa.struct([("steps", pa.int32())]))})
     monkeypatch.setattr(type(played_data), "to_table", lambda *_: gone)
-    with pytest.raises(UsageError, match=r"no episode has an expert.*planner and random"):
-        oracle("expert", played_data)
+    with pytest.raises(UsageError, match=r"no episode has an expert.*shortest_path and random"):
+        reference_policy("expert", played_data)
 
 
 def test_an_episode_without_expert_is_a_failure_not_a_gap(played_data):
@@ -157,5 +162,7 @@ def test_an_episode_without_expert_is_a_failure_not_a_gap(played_data):
 
 
 def test_a_plan_is_the_same_every_time(played_data):
-    plan = planner_of(played_data)
-    assert [plan(e) for e in played_data] == [planner_of(played_data)(e) for e in played_data]
+    plan = shortest_path_planner(played_data)
+    assert [plan(e) for e in played_data] == [
+        shortest_path_planner(played_data)(e) for e in played_data
+    ]
