@@ -108,7 +108,7 @@ def test_the_agent_that_ships_plays(small_dataset):
     shipped = ROOT / "examples" / "camp-small"
     found = candidate(str(shipped), dataset, settings, greedy=False, without_intent=False)
     assert (found.about.method, found.about.environment_steps) == ("camp", 60_416)
-    assert len(evaluate(found.player, dataset, settings)) == 2
+    assert len(evaluate(found.policy, dataset, settings)) == 2
 
 
 def test_tests_named_in_the_architecture_exist():
