@@ -12,24 +12,15 @@ Examples
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from internav_data.core.lazy import lazy_imports
 
 if TYPE_CHECKING:
     from internav_data.camp.checkpoint import load_agent
     from internav_data.dataset import Dataset, compute_stats, load_dataset
     from internav_data.generation import generate_episodes, generate_house
     from internav_data.records.version import __version__
-
-_HOMES = {
-    "__version__": "internav_data.records.version",
-    "Dataset": "internav_data.dataset",
-    "compute_stats": "internav_data.dataset",
-    "generate_episodes": "internav_data.generation",
-    "generate_house": "internav_data.generation",
-    "load_agent": "internav_data.camp.checkpoint",
-    "load_dataset": "internav_data.dataset",
-}
 
 __all__ = [
     "Dataset",
@@ -41,13 +32,12 @@ __all__ = [
     "load_dataset",
 ]
 
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever stands there
-    home = _HOMES.get(name)
-    if home is None:
-        raise AttributeError(f"module 'internav_data' has no attribute {name!r}")
-    return getattr(import_module(home), name)
-
-
-def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOMES])
+__getattr__, __dir__ = lazy_imports(
+    __name__,
+    {
+        "camp.checkpoint": ["load_agent"],
+        "dataset": ["Dataset", "compute_stats", "load_dataset"],
+        "generation": ["generate_episodes", "generate_house"],
+        "records.version": ["__version__"],
+    },
+)

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import gymnasium
 
+from internav_data.core.lazy import lazy_imports
+
 if TYPE_CHECKING:
     from internav_data.envs.auxiliary import AuxiliaryStart, auxiliary_starts
     from internav_data.envs.processes import InterNavProcesses
@@ -29,15 +31,6 @@ __all__ = [
 
 ENV_ID = "InterNav-v0"
 
-_HOMES = {
-    "AuxiliaryStart": "auxiliary",
-    "EpisodeSnapshot": "slot",
-    "InterNavEnv": "single",
-    "InterNavProcesses": "processes",
-    "InterNavVectorEnv": "vector",
-    "auxiliary_starts": "auxiliary",
-}
-
 
 def register() -> None:
     """Tell Gymnasium about the environments; a second time changes nothing."""
@@ -51,11 +44,14 @@ def register() -> None:
 
 register()
 
-
-def __getattr__(name: str) -> object:
-    """Import what is asked for: registering needs none of it."""
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module  # noqa: PLC0415
-
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+# Registering needs none of these.
+__getattr__, __dir__ = lazy_imports(
+    __name__,
+    {
+        "auxiliary": ["AuxiliaryStart", "auxiliary_starts"],
+        "processes": ["InterNavProcesses"],
+        "single": ["InterNavEnv"],
+        "slot": ["EpisodeSnapshot"],
+        "vector": ["InterNavVectorEnv"],
+    },
+)

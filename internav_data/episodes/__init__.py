@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from internav_data.core.lazy import lazy_imports
 from internav_data.episodes.config import EpisodeConfig
 
 if TYPE_CHECKING:
@@ -12,15 +13,11 @@ if TYPE_CHECKING:
 
 __all__ = ["EpisodeBatch", "EpisodeConfig", "SpawnSite", "build_batch", "build_episodes", "mode_of"]
 
-_HOMES = {"SpawnSite": "site"} | dict.fromkeys(
-    ("EpisodeBatch", "build_batch", "build_episodes", "mode_of"), "build"
+# A config alone needs neither numba nor Bullet.
+__getattr__, __dir__ = lazy_imports(
+    __name__,
+    {
+        "build": ["EpisodeBatch", "build_batch", "build_episodes", "mode_of"],
+        "site": ["SpawnSite"],
+    },
 )
-
-
-def __getattr__(name: str) -> object:
-    """Import what is asked for: a config alone needs neither numba nor Bullet."""
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module  # noqa: PLC0415
-
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from internav_data.core.lazy import lazy_imports
+
 if TYPE_CHECKING:
     from internav_data.generation.config import GenerationConfig, load_config
     from internav_data.generation.progress import GenerationProgress
@@ -21,21 +23,14 @@ __all__ = [
     "load_config",
 ]
 
-_HOMES = {
-    "GenerationConfig": "config",
-    "GenerationProgress": "progress",
-    "Report": "report",
-    "generate": "run",
-    "generate_episodes": "single",
-    "generate_house": "single",
-    "load_config": "config",
-}
-
-
-def __getattr__(name: str) -> object:
-    """Import what is asked for: worker processes and `--help` need little of it."""
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module  # noqa: PLC0415
-
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+# Worker processes and `--help` need little of this.
+__getattr__, __dir__ = lazy_imports(
+    __name__,
+    {
+        "config": ["GenerationConfig", "load_config"],
+        "progress": ["GenerationProgress"],
+        "report": ["Report"],
+        "run": ["generate"],
+        "single": ["generate_episodes", "generate_house"],
+    },
+)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from internav_data.core.lazy import lazy_imports
 from internav_data.houses.config import HouseConfig
 from internav_data.houses.quota import room_count
 from internav_data.records.splits import split_of_scene
@@ -14,13 +15,11 @@ if TYPE_CHECKING:
 
 __all__ = ["HouseConfig", "build_house", "load_floor_plan", "room_count", "split_of_scene"]
 
-_HOMES = {"build_house": "build", "load_floor_plan": "plan_file"}
-
-
-def __getattr__(name: str) -> object:
-    """Import what is asked for: a config alone needs no numba."""
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module  # noqa: PLC0415
-
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+# A config alone needs no numba.
+__getattr__, __dir__ = lazy_imports(
+    __name__,
+    {
+        "build": ["build_house"],
+        "plan_file": ["load_floor_plan"],
+    },
+)

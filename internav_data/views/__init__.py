@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from internav_data.core.lazy import lazy_imports
 from internav_data.views.episodes import draw_episode, episode_lines
 from internav_data.views.plan import draw_house, house_line
 from internav_data.views.sheets import contact_sheet, write_png
@@ -30,21 +31,13 @@ __all__ = [
     "write_video",
 ]
 
-_HOMES = {
-    "ActionList": "replay_actions",
-    "Moment": "replay_story",
-    "Replay": "replay",
-    "video_format": "video",
-    "read_actions": "replay_actions",
-    "replay_frames": "replay",
-    "write_video": "video",
-}
-
-
-def __getattr__(name: str) -> object:
-    """Import what is asked for: a picture of a house needs neither physics nor camera."""
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module  # noqa: PLC0415
-
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+# A picture of a house needs neither physics nor camera.
+__getattr__, __dir__ = lazy_imports(
+    __name__,
+    {
+        "replay": ["Replay", "replay_frames"],
+        "replay_actions": ["ActionList", "read_actions"],
+        "replay_story": ["Moment"],
+        "video": ["video_format", "write_video"],
+    },
+)
