@@ -1,4 +1,4 @@
-"""The shared words: frozen dataclasses that every other package speaks in."""
+"""Records that all rooms share: frozen dataclasses, seeds, errors, the version; imports none."""
 
 from internav_data.records.assets import RGB, Asset, Part, Shape
 from internav_data.records.episodes import (

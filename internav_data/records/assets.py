@@ -1,4 +1,4 @@
-"""What things are: an asset is made of convex parts."""
+"""Assets: objects of a catalogue, made of convex parts."""
 
 from __future__ import annotations
 
@@ -9,37 +9,42 @@ from internav_data.records.physics import Dynamics
 from internav_data.records.poses import Quaternion, Vec3
 
 Shape = Literal["box", "cylinder", "sphere", "hull"]
+"""Shapes of a part."""
 RGB = tuple[int, int, int]
+"""Red, green and blue, 0 to 255."""
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One convex piece of an asset: the convex hull of its corner points, everywhere.
+    """Convex piece of an asset: the convex hull of its corner points.
 
     Boxes have 8 corners, cylinders are 16-gon prisms along their own z, spheres are fixed
     polyhedra and hulls bring their own corners (`internav_data.geometry.part_corners`). Physics,
-    footprints, meshes and the camera all see this same polyhedron.
+    footprints, meshes and the camera all use this same polyhedron.
 
     Units: metres, in the asset's frame (origin on the floor under the middle of the asset's
     bounding box, z up).
     """
 
     shape: Shape
+    """Shape before scaling to `size`."""
     centre: Vec3
+    """Centre of the part, metres."""
     size: Vec3
-    """Full extents along the part's own axes, before `rotation`."""
+    """Full extents along the part's own axes, before `rotation`, metres."""
     rotation: Quaternion
-    """Turns the part about its centre: (x, y, z, w), w >= 0."""
+    """Rotation of the part about its centre: (x, y, z, w), w >= 0."""
     corners: tuple[Vec3, ...]
-    """Hulls only: corner points relative to `centre`, before `rotation`; () for other shapes."""
+    """Hulls only: corner points relative to `centre`, before `rotation`, metres; () otherwise."""
     colour: RGB
+    """Base colour."""
     material: str
     """wood, fabric, metal, plastic, ceramic, glass, leather, leaf, food, paper, screen or stone."""
 
 
 @dataclass(frozen=True, slots=True)
 class Asset:
-    """One thing that can stand in a house: its parts and what it weighs.
+    """Object that can stand in a house: its parts, mass and friction.
 
     Frame: the bounding box is centred on x = y = 0, its bottom is z = 0, its front looks along -y.
     """
@@ -47,17 +52,23 @@ class Asset:
     asset_id: str
     """Type and number, as `Chair_17`."""
     type: str
+    """Type of object, as `Chair`."""
     size: Vec3
     """Width (x), depth (y) and height (z) of the bounding box, metres."""
     mass_kg: float
+    """Mass, kilograms."""
     friction: float
+    """Coefficient of sliding friction; the engine multiplies the coefficients of two bodies."""
     pushable: bool
+    """Whether the agent's push can act on it."""
     pickable: bool
+    """Whether the agent can pick it up."""
     spawnable: bool
-    """One of the 20 obstacle types (or a user's own): may be spawned on an agent's way."""
+    """Whether it may be spawned as an obstacle: the 20 obstacle types, and a user's own assets."""
     blocks: bool
-    """False for what an agent walks over (rugs) or under: it has no footprint."""
+    """Whether it has a footprint: false for assets that an agent walks over (rugs) or under."""
     parts: tuple[Part, ...]
+    """Convex pieces; the asset is their union."""
 
     @property
     def dynamics(self) -> Dynamics:
@@ -65,5 +76,5 @@ class Asset:
         return Dynamics(self.mass_kg, self.friction, self.pushable, self.pickable)
 
     def __hash__(self) -> int:
-        """Assets key many caches; their id tells them apart, equality settles the rest."""
+        """Return the hash of the id: assets key many caches, and hashing all parts is slow."""
         return hash(self.asset_id)

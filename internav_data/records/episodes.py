@@ -1,4 +1,4 @@
-"""An episode: a start, a goal, and the obstacles between them."""
+"""Episodes: a start, a goal, and the obstacles between them."""
 
 from __future__ import annotations
 
@@ -10,32 +10,44 @@ from internav_data.records.physics import Dynamics
 from internav_data.records.poses import Pose, Quaternion, Vec2
 
 Mode = Literal["blocked", "lengthened"]
+"""Effect of an episode's obstacles on the lattice: no path to the goal, or a longer one."""
 Redraw = Literal["no two nodes far enough apart", "condition not reached", "no expert"]
-"""Why a start and goal were drawn again: none were found, spots or obstacles ran out before the
-mode's condition held, or the expert found no plan."""
+"""Reasons to draw a start and goal again: no nodes were found, tries or obstacles ran out before
+the mode's condition held, or the expert found no plan."""
 
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Where the agent begins: lattice node (i, j) = (x, y) / 0.25 m and a quarter turn."""
+    """Pose at which the agent begins: lattice node (i, j) = (x, y) / 0.25 m and a quarter turn."""
 
     i: int
+    """Index of the node along x."""
     j: int
+    """Index of the node along y."""
     x: float
+    """Position, metres."""
     y: float
+    """Position, metres."""
     yaw_deg: int
+    """Heading, 0, 90, 180 or 270 degrees: 0 looks along +x, counter-clockwise."""
     room: int
+    """Id of the room."""
 
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """The lattice node to reach."""
+    """Lattice node to reach."""
 
     i: int
+    """Index of the node along x."""
     j: int
+    """Index of the node along y."""
     x: float
+    """Position, metres."""
     y: float
+    """Position, metres."""
     room: int
+    """Id of the room."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,49 +55,65 @@ class NodePath:
     """Start, door centres and goal along one room path."""
 
     doors: tuple[int, ...]
+    """Ids of the doors that are passed, in order."""
     points: tuple[Vec2, ...]
-    """len(doors) + 2 points: the start, each door's centre, the goal."""
+    """Start, centre of each door, goal: len(doors) + 2 points, metres."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What one interaction with one obstacle would do, everything else as the episode starts."""
+    """Result of one interaction with one obstacle, all other objects as the episode starts."""
 
     action: str
     """push_east, push_north, push_west, push_south (world directions +x, +y, -x, -y) or pick."""
     success: bool
+    """Whether a push moved the obstacle by 5 cm or more, or the pick took it."""
     displacement_m: float
+    """Distance by which the obstacle moved, metres."""
     path_steps_after: int | None
-    """Lattice distance to the goal afterwards; None when cut off."""
+    """Lattice distance from start to goal afterwards, steps of 0.25 m; null when cut off."""
     path_m_after: float | None
-    """Any-angle distance to the goal afterwards; None when cut off."""
+    """Euclidean distance from start to goal afterwards, metres; null when cut off."""
     opened: bool
+    """Whether the lattice was cut off before and is no more."""
     seconds: float
+    """Simulated seconds until everything is at rest."""
     reason: str
-    """Why it failed; empty on success."""
+    """Reason of the failure; empty on success."""
 
 
 @dataclass(frozen=True, slots=True)
 class Obstacle:
-    """A thing spawned on the way, where it came to rest."""
+    """Object spawned on the path of an episode, where it came to rest."""
 
     asset_id: str
+    """Asset, as `Chair_17`."""
     type: str
+    """Type of the asset, as `Chair`."""
     x: float
+    """Position of the asset's frame at rest, metres."""
     y: float
+    """Position of the asset's frame at rest, metres."""
     z: float
+    """Position of the asset's frame at rest, metres above the floor."""
     quaternion: Quaternion
+    """Rotation of the asset's frame at rest: (x, y, z, w), w >= 0."""
     mass_kg: float
+    """Mass, kilograms."""
     friction: float
+    """Coefficient of sliding friction."""
     pushable: bool
+    """Whether the agent's push can act on it."""
     pickable: bool
+    """Whether the agent can pick it up."""
     segment: int
-    """Which segment of its node path it was spawned on (0 starts at the start)."""
+    """Segment of its node path on which it was spawned; segment 0 begins at the start."""
     settle_s: float
     """Certificate of the settle check: simulated seconds until at rest."""
     settle_penetration_m: float
-    """Certificate of the settle check: deepest contact at rest."""
+    """Certificate of the settle check: deepest contact at rest, metres."""
     outcomes: tuple[Outcome, ...] | None
+    """Outcomes of the four pushes and of pick; null where none were computed."""
 
     @property
     def dynamics(self) -> Dynamics:
@@ -94,67 +122,96 @@ class Obstacle:
 
     @property
     def pose(self) -> Pose:
-        """The pose of the asset's frame."""
+        """Pose of the asset's frame at rest."""
         return Pose(self.x, self.y, self.z, self.quaternion)
 
 
 @dataclass(frozen=True, slots=True)
 class Expert:
-    """Actions that reach the goal, replayed before they were stored."""
+    """Demonstration: actions that reach the goal, replayed before they were stored."""
 
     actions: tuple[int, ...]
+    """Numbers of the actions, the last one Done."""
     steps: int
+    """Number of actions."""
     pushes: int
+    """Number of pushes among them."""
     picks: int
+    """Number of pickups among them."""
     path_m: float
+    """Length walked, metres: 0.25 m for each MoveAhead."""
 
 
 @dataclass(frozen=True, slots=True)
 class Physics:
-    """Which engine answered the physical questions of an episode."""
+    """Engine of an episode's physics, and a summary of its settle checks."""
 
     engine: str
+    """Name of the engine."""
     build: str
+    """Version of the engine with which settling, pushes and outcomes were computed."""
     settle_s: float
     """Longest settle time of the episode's obstacles, simulated seconds."""
     penetration_m: float
-    """Deepest contact at rest."""
+    """Deepest contact of the episode's obstacles at rest, metres."""
 
 
 @dataclass(frozen=True, slots=True)
 class Episode:
-    """One task. Distances in metres or lattice steps of 0.25 m; None where the goal is cut off."""
+    """One task in one house: start, goal, obstacles, distances and an expert's actions.
+
+    Distances are metres or lattice steps of 0.25 m; null where the goal is cut off.
+    """
 
     episode_id: str
-    """`scene-000017/0003`."""
+    """Scene and index, as `scene-000017/0003`."""
     scene_id: str
+    """House of the episode, as `scene-000017`."""
     split: Split
+    """Split of the scene."""
     index: int
+    """Number of the episode within its scene, from 0."""
     seed: int
+    """Seed of the dataset."""
     room_count: int
+    """Number of rooms of the house."""
     mode: Mode
+    """Effect of the obstacles on the lattice: blocked (no path) or lengthened."""
     sealed: bool
-    """No way for the agent's disc, on the lattice or off it: `obstructed_path_m` is None."""
+    """Whether no path of the agent's disc exists, on the lattice or off it: `obstructed_path_m` is
+    null."""
     rooms_on_path: int
+    """Number of rooms on the shortest room path."""
     obstacle_count: int
+    """Number of obstacles."""
     shortest_path_m: float
+    """Euclidean distance from start to goal with every obstacle absent, metres: L of SPL."""
     shortest_path_steps: int
+    """Lattice distance from start to goal with every obstacle absent, steps of 0.25 m."""
     obstructed_path_m: float | None
+    """Euclidean distance from start to goal among the obstacles, metres; null when cut off."""
     obstructed_path_steps: int | None
+    """Lattice distance from start to goal among the obstacles, steps; null when cut off."""
     start: Start
+    """Pose at which the agent begins."""
     goal: Goal
+    """Node to reach."""
     room_paths: tuple[tuple[int, ...], ...]
     """Simple room paths, shortest first (by number of rooms, then room ids), at most 64."""
     room_paths_truncated: bool
-    """There were more than 64 room paths."""
+    """Whether there are more than 64 room paths."""
     node_paths: tuple[NodePath, ...]
-    """At most 64, in the order of `room_paths`."""
+    """Node paths in the order of `room_paths`, at most 64."""
     node_paths_truncated: bool
+    """Whether there are more than 64 node paths."""
     obstacles: tuple[Obstacle, ...]
+    """Spawned obstacles, in the order of spawning."""
     expert: Expert | None
+    """Actions that reach the goal; null where none were found."""
     physics: Physics
+    """Engine and settle certificates."""
 
     @property
     def interactive(self) -> bool:
-        """Whether the grid way is blocked, so that only an interaction opens it."""
+        """Whether the lattice is blocked, so that only an interaction opens a path."""
         return self.mode == "blocked"

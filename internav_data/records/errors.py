@@ -1,4 +1,4 @@
-"""Errors a user can mend. The command line prints them in one line and exits with their code."""
+"""Errors that a user can mend; the command line prints them in one line and exits with a code."""
 
 from __future__ import annotations
 
@@ -6,36 +6,37 @@ from typing import ClassVar
 
 
 class InternavError(Exception):
-    """Base of every error meant for a user: what, where, expected, got, what to do next."""
+    """Base of every error meant for a user; its text names the place, the cause and a remedy."""
 
     exit_code: ClassVar[int] = 1
+    """Exit status of the command line."""
 
 
 class UsageError(InternavError):
-    """An option, config key or argument that cannot be meant."""
+    """Option, config key or argument that is wrong."""
 
     exit_code: ClassVar[int] = 2
 
 
 class ValidationError(InternavError):
-    """A dataset that says something untrue."""
+    """Dataset whose contents are wrong by the validator's own computation."""
 
     exit_code: ClassVar[int] = 3
 
 
 class QuarantineError(InternavError):
-    """A scene that cannot be built within the stated bounds."""
+    """Scene that cannot be built within the stated numbers of tries."""
 
     exit_code: ClassVar[int] = 4
 
 
 class CorruptDataError(InternavError):
-    """A file that is damaged, edited, missing or of a version this release cannot read."""
+    """File that is damaged, edited, missing or of a version that this release cannot read."""
 
     exit_code: ClassVar[int] = 5
 
 
 class NotFiniteError(InternavError):
-    """Training met NaN or infinity: in what an environment said, or in a loss."""
+    """NaN or infinity in training: in an observation, a reward or a loss."""
 
     exit_code: ClassVar[int] = 6
