@@ -178,8 +178,7 @@ class Episode:
     mode: Mode
     """Effect of the obstacles on the lattice: blocked (no path) or lengthened."""
     sealed: bool
-    """Whether no path of the agent's disc exists, on the lattice or off it: `obstructed_path_m` is
-    null."""
+    """Whether the disc has no path on or off the lattice: `obstructed_path_m` is null."""
     rooms_on_path: int
     """Number of rooms on the shortest room path."""
     obstacle_count: int
