@@ -8,6 +8,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 import shapely
+from builders import UPRIGHT, asset, part
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -24,9 +25,8 @@ from internav_data.geometry import (
     yaw_quaternion,
 )
 from internav_data.geometry.footprints import convex_hull
-from internav_data.records import Asset, Part, Pose
+from internav_data.records import Pose
 
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 ROUNDING_M2 = 2e-7
 """Corners are put on a nanometre grid: so much area may that move."""
 
@@ -45,13 +45,11 @@ def parts(draw):
     centre = (draw(centimetres), draw(centimetres), draw(st.integers(-20, 220)) / 100)
     size = tuple(draw(sizes) for _ in range(3))
     turn = draw(st.just(UPRIGHT) | quaternions)
-    return Part(shape, centre, size, turn, (), (9, 9, 9), "wood")
+    return part(shape, centre, size, turn)
 
 
-def asset(*pieces, blocks=True):
-    return Asset(
-        "Thing_0", "Thing", (1.0, 1.0, 1.0), 1.0, 0.5, True, False, True, blocks, tuple(pieces)
-    )
+def made_of(*pieces, **changes):
+    return asset("Thing_0", *pieces, **changes)
 
 
 def slice_of(corners):
@@ -83,7 +81,7 @@ def union(polygons):
     return shapely.union_all([shapely.Polygon(p) for p in polygons if len(p) > 2])
 
 
-ROD = Part("cylinder", (0.0, -0.02, 0.0), (0.14, 0.01, 0.01), UPRIGHT, (), (9, 9, 9), "wood")
+ROD = part("cylinder", (0.0, -0.02, 0.0), (0.14, 0.01, 0.01))
 TILT = (0.13608276348795434, 0.13608276348795434, 0.5443310539518174, -0.816496580927726)
 
 
@@ -92,7 +90,7 @@ TILT = (0.13608276348795434, 0.13608276348795434, 0.5443310539518174, -0.8164965
 @example([ROD], 0.0, 0.0, TILT)
 def test_footprints_are_the_plans_of_what_stands_between_the_heights(pieces, x, y, turn):
     pose = Pose(x, y, 0.1, turn)
-    found = footprint(asset(*pieces), pose)
+    found = footprint(made_of(*pieces), pose)
     slices = [slice_of(transform(part_corners(p), pose)) for p in pieces]
     expected = shapely.union_all([s for s in slices if s.geom_type == "Polygon"])
     assert union(found).symmetric_difference(expected).area <= ROUNDING_M2
@@ -120,28 +118,28 @@ def test_hulls_are_shapelys(points):
 
 
 def box(x, y, z, w, d, h):
-    return Part("box", (x, y, z + h / 2), (w, d, h), UPRIGHT, (), (9, 9, 9), "wood")
+    return part("box", (x, y, z + h / 2), (w, d, h))
 
 
 def test_what_is_flat_hangs_high_or_does_not_block_is_no_obstacle():
     here = Pose(0.0, 0.0, 0.0, UPRIGHT)
-    assert len(footprint(asset(box(0, 0, 0, 2, 1, 0.0199)), here)) == 0
-    assert len(footprint(asset(box(0, 0, 0, 2, 1, 0.02)), here)) == 1
-    assert len(footprint(asset(box(0, 0, 1.81, 2, 1, 0.5)), here)) == 0
-    assert len(footprint(asset(box(0, 0, 1.8, 2, 1, 0.5)), here)) == 1
-    assert len(footprint(asset(box(0, 0, 0, 2, 1, 0.5), blocks=False), here)) == 0
+    assert len(footprint(made_of(box(0, 0, 0, 2, 1, 0.0199)), here)) == 0
+    assert len(footprint(made_of(box(0, 0, 0, 2, 1, 0.02)), here)) == 1
+    assert len(footprint(made_of(box(0, 0, 1.81, 2, 1, 0.5)), here)) == 0
+    assert len(footprint(made_of(box(0, 0, 1.8, 2, 1, 0.5)), here)) == 1
+    assert len(footprint(made_of(box(0, 0, 0, 2, 1, 0.5), blocks=False), here)) == 0
 
 
 def test_parts_hidden_by_others_of_the_same_thing_are_dropped():
     legs = [box(x, y, 0, 0.05, 0.05, 0.7) for x in (-0.4, 0.4) for y in (-0.2, 0.2)]
-    table = asset(*legs, box(0, 0, 0.7, 1.0, 0.6, 0.04))
+    table = made_of(*legs, box(0, 0, 0.7, 1.0, 0.6, 0.04))
     assert len(footprint(table, Pose(3.0, 2.0, 0.0, yaw_quaternion(30.0)))) == 1
-    twice = asset(box(0, 0, 0, 1, 1, 0.5), box(0, 0, 0.5, 1, 1, 0.5))
+    twice = made_of(box(0, 0, 0, 1, 1, 0.5), box(0, 0, 0.5, 1, 1, 0.5))
     assert len(footprint(twice, Pose(0.0, 0.0, 0.0, UPRIGHT))) == 1
 
 
 def test_a_turned_box_by_hand():
-    found = footprint(asset(box(0, 0, 0, 2, 1, 1)), Pose(5.0, 1.0, 0.0, yaw_quaternion(90.0)))
+    found = footprint(made_of(box(0, 0, 0, 2, 1, 1)), Pose(5.0, 1.0, 0.0, yaw_quaternion(90.0)))
     (corners,) = list(found)
     assert sorted(map(tuple, corners.round(9))) == [(4.5, 0.0), (4.5, 2.0), (5.5, 0.0), (5.5, 2.0)]
 
@@ -149,8 +147,8 @@ def test_a_turned_box_by_hand():
 def test_a_leaning_plank_counts_only_up_to_the_agents_head():
     # 4 m long, leaning at 45 degrees from the floor: 1.8 m high after 1.8 m.
     lean = (0.0, -math.sin(math.pi / 8), 0.0, math.cos(math.pi / 8))
-    rod = Part("box", (0.0, 0.0, 0.0), (8.0, 0.1, 0.001), lean, (), (9, 9, 9), "wood")
-    (corners,) = list(footprint(asset(rod), Pose(0.0, 0.0, 0.0, UPRIGHT)))
+    rod = part("box", (0.0, 0.0, 0.0), (8.0, 0.1, 0.001), lean)
+    (corners,) = list(footprint(made_of(rod), Pose(0.0, 0.0, 0.0, UPRIGHT)))
     assert corners[:, 0].min() == pytest.approx(0.02, abs=1e-3)
     assert corners[:, 0].max() == pytest.approx(1.8, abs=1e-3)
 
@@ -170,8 +168,8 @@ def test_a_houses_footprints_are_its_walls_then_its_things(hand_house):
 @settings(max_examples=60, deadline=None)
 @given(parts(), parts(), centimetres, centimetres, st.integers(0, 300))
 def test_clearance_is_shapelys_distance_up_to_a_limit(first, second, x, y, limit):
-    a = footprint(asset(first), Pose(0.0, 0.0, 0.0, UPRIGHT))
-    b = footprint(asset(second), Pose(x + 1, y, 0.0, UPRIGHT))
+    a = footprint(made_of(first), Pose(0.0, 0.0, 0.0, UPRIGHT))
+    b = footprint(made_of(second), Pose(x + 1, y, 0.0, UPRIGHT))
     apart = union(a).distance(union(b)) if len(a) and len(b) else math.inf
     if any(len(p) < 3 for p in [*a, *b]):
         return

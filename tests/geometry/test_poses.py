@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from builders import asset, part
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -23,7 +24,7 @@ from internav_data.geometry import (
     yaw_of,
     yaw_quaternion,
 )
-from internav_data.records import Asset, Part, Pose
+from internav_data.records import Pose
 
 quaternions = st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: sum(c * c for c in q) > 0.01)
 metres = st.floats(-50, 50)
@@ -75,10 +76,6 @@ def test_rounded_lengths_are_within_half_of_a_tenth_of_a_millimetre(value):
     assert not (found == 0.0 and math.copysign(1, found) < 0)
 
 
-def part(shape, centre, size, corners=()):
-    return Part(shape, centre, size, (0.0, 0.0, 0.0, 1.0), corners, (9, 9, 9), "wood")
-
-
 @pytest.mark.parametrize(("shape", "count"), [("box", 8), ("cylinder", 32), ("sphere", 50)])
 def test_corners_fill_the_bounding_box(shape, count):
     corners = part_corners(part(shape, (1.0, 2.0, 3.0), (0.4, 0.6, 0.8)))
@@ -89,17 +86,17 @@ def test_corners_fill_the_bounding_box(shape, count):
 
 def test_hulls_bring_their_own_corners():
     own = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    corners = part_corners(part("hull", (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), own))
+    corners = part_corners(part("hull", (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), corners=own))
     assert corners.tolist() == [[1, 1, 1], [2, 1, 1], [1, 2, 1], [1, 1, 2]]
 
 
 def test_an_assets_corners_are_its_parts_behind_each_other():
     two = (part("box", (0, 0, 0.5), (1, 1, 1)), part("cylinder", (2, 0, 0.5), (1, 1, 1)))
-    asset = Asset("A_0", "A", (1, 1, 1), 1.0, 0.5, True, False, True, True, two)
-    corners, starts = asset_corners(asset)
+    both = asset("Thing_0", *two)
+    corners, starts = asset_corners(both)
     assert starts.tolist() == [0, 8, 40]
     assert np.array_equal(corners[8:], part_corners(two[1]))
-    low, high = asset_bounds(asset)
+    low, high = asset_bounds(both)
     assert low == pytest.approx([-0.5, -0.5, 0.0])
     assert high == pytest.approx([2.5, 0.5, 1.0])
     with pytest.raises(ValueError, match="read-only"):
@@ -108,12 +105,10 @@ def test_an_assets_corners_are_its_parts_behind_each_other():
 
 def test_centre_of_mass_weighs_parts_by_their_volume():
     pair = (part("box", (0, 0, 0.5), (1, 1, 1)), part("box", (2, 0, 1.0), (0.5, 1, 2)))
-    asset = Asset("A_0", "A", (1, 1, 1), 1.0, 0.5, True, False, True, True, pair)
-    assert centre_of_mass(asset) == (1.0, 0.0, 0.75)
+    assert centre_of_mass(asset("Thing_0", *pair)) == (1.0, 0.0, 0.75)
 
 
 def test_centre_of_mass_of_a_hull_is_that_of_its_tetrahedron():
     own = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    only = (part("hull", (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), own),)
-    asset = Asset("A_0", "A", (1, 1, 1), 1.0, 0.5, True, False, True, True, only)
-    assert centre_of_mass(asset) == (1.25, 1.25, 1.25)
+    only = part("hull", (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), corners=own)
+    assert centre_of_mass(asset("Thing_0", only)) == (1.25, 1.25, 1.25)

@@ -4,37 +4,20 @@ import os
 
 import numpy as np
 import pytest
+from builders import UPRIGHT, asset, part, table
 
 from internav_data.geometry import yaw_quaternion
 from internav_data.physics import AgentCollider, Body, PhysicsScene, wall_body
 from internav_data.physics.engines.bullet import Bullet, bullet
 from internav_data.physics.engines.bullet_scene import SCENES_PER_WORLD, Builder, pybullet
-from internav_data.records import PUSH_SPECS, Asset, Part, Pose, Wall
+from internav_data.records import PUSH_SPECS, Pose, Wall
 
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-
-
-def part(shape, centre, size):
-    return Part(shape, centre, size, UPRIGHT, (), (120, 90, 60), "wood")
-
-
-def asset(name, parts, mass_kg):
-    return Asset(name, name, (1.0, 1.0, 1.0), mass_kg, 0.5, True, True, True, True, tuple(parts))
-
-
-def table(name, width, mass_kg):
-    half = width / 2.0 - 0.05
-    legs = [
-        part("box", (x, y, 0.2), (0.05, 0.05, 0.4)) for x in (-half, half) for y in (-half, half)
-    ]
-    return asset(name, [*legs, part("box", (0.0, 0.0, 0.42), (width, width, 0.04))], mass_kg)
-
-
+LEGS = {"leg_m": 0.05, "friction": 0.5}
 THINGS = (
-    table("table", 0.8, 9.0),
-    table("stool", 0.35, 4.0),
-    asset("bin", [part("cylinder", (0.0, 0.0, 0.25), (0.3, 0.3, 0.5))], 3.0),
-    asset("ball", [part("sphere", (0.0, 0.0, 0.12), (0.24, 0.24, 0.24))], 0.6),
+    table("Table_0", (0.8, 0.8, 0.44), mass_kg=9.0, **LEGS),
+    table("Stool_0", (0.35, 0.35, 0.44), mass_kg=4.0, **LEGS),
+    asset("Bin_0", part("cylinder", (0.0, 0.0, 0.25), (0.3, 0.3, 0.5)), mass_kg=3.0),
+    asset("Ball_0", part("sphere", (0.0, 0.0, 0.12), (0.24, 0.24, 0.24)), mass_kg=0.6),
 )
 
 

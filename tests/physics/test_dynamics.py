@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from builders import UPRIGHT, crate
 
 import internav_data
 from internav_data.catalog import catalogue
@@ -15,14 +16,10 @@ from internav_data.houses import HouseConfig, build_house
 from internav_data.physics import Body, push, settle
 from internav_data.physics.sweep import bounding_radius_m, centred_corners
 from internav_data.planner.push_heuristic import slide_m
-from internav_data.records import Asset, Dynamics, Part, Pose
+from internav_data.records import Dynamics, Pose
 from internav_data.world import Action, HouseModel, World
 
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-CRATE = Asset(
-    "dynamics crate", "Crate", (0.5, 0.4, 0.3), 6.0, 0.5, True, False, True, True,
-    (Part("box", (0.0, 0.0, 0.15), (0.5, 0.4, 0.3), UPRIGHT, (), (1, 2, 3), "wood"),),
-)  # fmt: skip
+CRATE = crate("Crate_0", (0.5, 0.4, 0.3), mass_kg=6.0, friction=0.5)
 SAFE = Dynamics(mass_kg=500.0, friction=0.5, pushable=True, pickable=False)
 """Too heavy for 200 N."""
 

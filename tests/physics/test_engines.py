@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from builders import UPRIGHT, crate
 
 from internav_data.geometry import centre_of_mass
 from internav_data.physics import (
@@ -18,15 +19,11 @@ from internav_data.physics import (
 from internav_data.physics.engines.bullet import bullet
 from internav_data.physics.result_cache import ResultCache
 from internav_data.physics.sweep import sweep_recorder
-from internav_data.records import Asset, Part, Pose
+from internav_data.records import Pose
 from internav_data.records.errors import UsageError
 from internav_data.world import Action, HouseModel, World
 
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-BOX = Asset(
-    "engine box", "Box", (0.4, 0.4, 0.4), 5.0, 0.5, True, False, True, True,
-    (Part("box", (0.0, 0.0, 0.2), (0.4, 0.4, 0.4), UPRIGHT, (), (1, 2, 3), "wood"),),
-)  # fmt: skip
+BOX = crate("Box_0", (0.4, 0.4, 0.4), mass_kg=5.0, friction=0.5)
 
 
 class Shift:

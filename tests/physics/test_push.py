@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from builders import UPRIGHT, chair, crate
 
 from internav_data.geometry import asset_corners, footprint, transform, yaw_quaternion
 from internav_data.physics import Body, push, wall_body
@@ -12,35 +13,18 @@ from internav_data.physics.engines.bullet import pybullet
 from internav_data.physics.kdop import overlap
 from internav_data.physics.push import AGENT_MIN_M
 from internav_data.physics.sweep import extent_of
-from internav_data.records import PUSH_SPECS, Asset, Part, Pose, Wall
+from internav_data.records import PUSH_SPECS, Pose, Wall
 from internav_data.world.visibility import axis_distance
 
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 GRAVITY = 9.81
 
 
-def part(shape, centre, size):
-    return Part(shape, centre, size, UPRIGHT, (), (120, 90, 60), "wood")
-
-
-def asset(name, parts, mass_kg, friction):
-    name = f"{name} {mass_kg} {friction}"
-    return Asset(
-        name, name, (1.0, 1.0, 1.0), mass_kg, friction, True, False, True, True, tuple(parts)
-    )
-
-
 def low_box(mass_kg, friction, size=(0.6, 0.5, 0.1)):
-    return asset(f"low {size}", [part("box", (0.0, 0.0, size[2] / 2), size)], mass_kg, friction)
+    return crate("Crate_0", size, mass_kg=mass_kg, friction=friction)
 
 
-def chair(mass_kg=6.0, friction=0.5):
-    legs = [
-        part("cylinder", (x, y, 0.1), (0.05, 0.05, 0.2)) for x in (-0.2, 0.2) for y in (-0.2, 0.2)
-    ]
-    seat = part("box", (0.0, 0.0, 0.22), (0.5, 0.5, 0.04))
-    back = part("box", (0.0, 0.24, 0.3), (0.5, 0.02, 0.12))
-    return asset("chair", [*legs, seat, back], mass_kg, friction)
+CHAIR = chair(seat_m=0.22, mass_kg=6.0, friction=0.5)
+"""So low that a push at its middle does not topple it."""
 
 
 def alone(box):
@@ -101,8 +85,8 @@ def test_a_thing_against_a_wall_stays():
 def test_a_push_north_is_a_push_east_turned():
     for heading in range(4):
         pose = Pose(3.0, 4.0, 0.001, yaw_quaternion(90 * heading))
-        there = push(Body.of(chair(), pose), heading, alone)
-        east = push(Body.of(chair(), STANDING), 0, alone)
+        there = push(Body.of(CHAIR, pose), heading, alone)
+        east = push(Body.of(CHAIR, STANDING), 0, alone)
         assert there.displacement_m == pytest.approx(east.displacement_m, abs=2e-4)
         assert there.seconds == east.seconds
         far = (there.pose.x - 3.0, there.pose.y - 4.0)
@@ -112,11 +96,11 @@ def test_a_push_north_is_a_push_east_turned():
 
 def test_a_free_push_is_the_one_in_a_scene_that_nothing_touches():
     wall = wall_body(Wall(3.0, 5.2, 6.0, 5.32, 0.0, 2.6))
-    free = push(Body.of(chair(), STANDING), 0, alone)
+    free = push(Body.of(CHAIR, STANDING), 0, alone)
     # The wall is gathered by hand though it is out of reach: Bullet must say the same.
-    beside = push(Body.of(chair(), STANDING), 0, lambda _: [(0, wall)])
+    beside = push(Body.of(CHAIR, STANDING), 0, lambda _: [(0, wall)])
     assert beside.displacement_m == pytest.approx(free.displacement_m, abs=1e-3)
-    assert push(Body.of(chair(), STANDING), 0, among(wall)) == free
+    assert push(Body.of(CHAIR, STANDING), 0, among(wall)) == free
 
 
 def test_what_is_met_is_pushed_too():
@@ -206,13 +190,11 @@ def test_energy_never_appears_from_nothing(monkeypatch):
         energies.append(total)
 
     monkeypatch.setattr(pybullet, "stepSimulation", watched)
-    tall = asset(
-        "tall", [part("box", (0.0, 0.0, 0.6), (0.25, 0.25, 1.2))], mass_kg=8.0, friction=0.6
-    )
+    tall = crate("Pillar_0", (0.25, 0.25, 1.2), mass_kg=8.0, friction=0.6)
     wall = wall_body(Wall(4.2, 0.0, 4.32, 8.0, 0.0, 2.6))
     other = Body.of(low_box(3.0, 0.5), Pose(3.7, 4.0, 0.001, UPRIGHT))
     scenes = [(alone, 0.002), (among(other, wall), 0.003)]
-    for thing, (near, height) in itertools.product((low_box(5.0, 0.5), chair(), tall), scenes):
+    for thing, (near, height) in itertools.product((low_box(5.0, 0.5), CHAIR, tall), scenes):
         # Heights (to the millimetre) that no other test uses: cached answers have no steps.
         push(Body.of(thing, Pose(3.0, 4.0, height, UPRIGHT)), 0, alone, PUSH_SPECS["kick"])
         alone_steps = len(energies)
@@ -230,9 +212,7 @@ def test_energy_never_appears_from_nothing(monkeypatch):
 
 
 def test_a_tall_thing_topples_and_lies_on_the_floor():
-    tall = asset(
-        "tall", [part("box", (0.0, 0.0, 0.6), (0.25, 0.25, 1.2))], mass_kg=8.0, friction=0.8
-    )
+    tall = crate("Pillar_0", (0.25, 0.25, 1.2), mass_kg=8.0, friction=0.8)
     pushed = push(Body.of(tall, STANDING), 0, alone, PUSH_SPECS["kick"])
     assert pushed.toppled
     corners, _ = asset_corners(tall)

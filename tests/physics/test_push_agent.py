@@ -3,6 +3,7 @@
 import itertools
 
 import pytest
+from builders import UPRIGHT, crate
 
 from internav_data.catalog import catalogue
 from internav_data.geometry import footprint, yaw_quaternion
@@ -12,22 +13,17 @@ from internav_data.physics.engines.bullet import Bullet
 from internav_data.physics.kdop import overlap
 from internav_data.physics.push import count_movers
 from internav_data.physics.sweep import extent_of
-from internav_data.records import Asset, Part, Pose, Wall
+from internav_data.records import Pose, Wall
 from internav_data.world import Action, HouseModel, World
 from internav_data.world.house_model import MAX_TANGENT_GRAPHS
 from internav_data.world.visibility import axis_distance
 
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 AHEAD = ((1, 0), (0, 1), (-1, 0), (0, -1))
 
 
-def box(name, size, mass_kg=6.0):
-    part = Part("box", (0.0, 0.0, size[2] / 2), size, UPRIGHT, (), (120, 90, 60), "wood")
-    return Asset(name, name, size, mass_kg, 0.5, True, False, True, True, (part,))
-
-
-CRATE = box("beside the agent", (0.5, 0.4, 0.2))
-SMALL = box("small beside the agent", (0.3, 0.3, 0.2), 2.0)
+CRATE = crate("Crate_0", (0.5, 0.4, 0.2), mass_kg=6.0, friction=0.5)
+SMALL = crate("Crate_1", (0.3, 0.3, 0.2), mass_kg=2.0, friction=0.5)
+SQUARE = crate("Crate_2", (0.4, 0.4, 0.2), mass_kg=6.0, friction=0.5)
 
 
 def among(*bodies):
@@ -95,20 +91,19 @@ def test_an_agent_that_something_comes_near_takes_part(solved):
 @pytest.mark.parametrize("heading", range(4))
 def test_the_agent_is_named_where_it_alone_hinders(heading):
     dx, dy = AHEAD[heading]
-    crate = box("square", (0.4, 0.4, 0.2))
     pose, agent = Pose(3.0, 4.0, 0.001, UPRIGHT), (3.0 + 0.405 * dx, 4.0 + 0.405 * dy)
-    hindered = push(Body.of(crate, pose), heading, among(), agent=agent, agent_gap_m=0.205)
+    hindered = push(Body.of(SQUARE, pose), heading, among(), agent=agent, agent_gap_m=0.205)
     assert (hindered.success, hindered.reason) == (False, "the agent is in the way")
     assert hindered.displacement_m < 0.02
-    assert push(Body.of(crate, pose), heading, among()).success
+    assert push(Body.of(SQUARE, pose), heading, among()).success
     # A wall that hinders by itself is named though the agent stands there too, behind the thing.
     x, y = 3.0 + 0.265 * dx, 4.0 + 0.265 * dy
     wall = wall_body(Wall(x - 0.06, y - 0.06, x + 0.06, y + 0.06, 0.0, 2.6))
     behind = (3.0 - 0.405 * dx, 4.0 - 0.405 * dy)
-    walled = push(Body.of(crate, pose), heading, among(wall), agent=behind, agent_gap_m=0.205)
+    walled = push(Body.of(SQUARE, pose), heading, among(wall), agent=behind, agent_gap_m=0.205)
     assert walled.reason == "something is in the way"
     # And what cannot be moved at all is too heavy, whoever stands there.
-    heavy = box("heavy", (0.4, 0.4, 0.2), 500.0)
+    heavy = crate("Safe_0", (0.4, 0.4, 0.2), mass_kg=500.0, friction=0.5)
     assert (
         push(Body.of(heavy, pose), heading, among(wall), agent=agent, agent_gap_m=0.2).reason
         == "too heavy"
@@ -116,10 +111,10 @@ def test_the_agent_is_named_where_it_alone_hinders(heading):
 
 
 def test_pulling_onto_the_agent_says_so_and_changes_nothing(hand_house):
-    crate = box("pulled", (0.6, 0.6, 0.3))
+    large = crate("Crate_3", (0.6, 0.6, 0.3), mass_kg=6.0, friction=0.5)
     world = World(
         HouseModel.of(hand_house),
-        [Body.of(crate, Pose(3.51, 1.0, 0.0, UPRIGHT))],
+        [Body.of(large, Pose(3.51, 1.0, 0.0, UPRIGHT))],
         (12, 4, 0),
         (1, 1),
     )
@@ -165,7 +160,7 @@ def test_a_crowd_is_what_may_be_moved():
     far = Body.of(SMALL, Pose(6.0, 4.0, 0.001, UPRIGHT))
     assert crowd_of(pose, [row[1], behind, far], wall) == (2, 0)
     # What is too heavy meets nothing.
-    heavy = box("heavy crowd", (0.5, 0.4, 0.2), 500.0)
+    heavy = crate("Safe_1", (0.5, 0.4, 0.2), mass_kg=500.0, friction=0.5)
     assert crowd_of(pose, row, wall, heavy) == (0, 0)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from builders import UPRIGHT, crate
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -31,31 +32,11 @@ from internav_data.physics.cache import (
 )
 from internav_data.physics.engines.bullet import bullet
 from internav_data.physics.result_cache import FILE_NAME, ResultCache
-from internav_data.records import PUSH_SPECS, Asset, Part, Pose
+from internav_data.records import PUSH_SPECS, Pose
 
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-
-
-BOX = Asset(
-    asset_id="box",
-    type="box",
-    size=(0.4, 0.4, 0.3),
-    mass_kg=3.0,
-    friction=0.5,
-    pushable=True,
-    pickable=True,
-    spawnable=True,
-    blocks=True,
-    parts=(Part("box", (0.0, 0.0, 0.15), (0.4, 0.4, 0.3), UPRIGHT, (), (9, 9, 9), "wood"),),
-)
-
-
+BOX = crate("Box_0", (0.4, 0.4, 0.3), mass_kg=3.0, friction=0.5, pickable=True)
 LONE = PhysicsScene((Body.of(BOX, Pose(0.0, 0.0, 0.001, UPRIGHT)),))
-
-
 PAIR = PhysicsScene((*LONE.bodies, Body.of(BOX, Pose(0.7, 0.1, 0.001, UPRIGHT))))
-
-
 FORCE = PUSH_SPECS["force"]
 
 

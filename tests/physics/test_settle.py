@@ -5,32 +5,12 @@ import subprocess
 import sys
 
 import pytest
+from builders import UPRIGHT, asset, box, chair, crate
 
 from internav_data.geometry import asset_corners, transform, yaw_quaternion
 from internav_data.physics import Body, PhysicsScene, get_engine, settle, wall_body
 from internav_data.physics.settle import MAX_PENETRATION_M
-from internav_data.records import Asset, Part, Pose, Wall
-
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-
-
-def part(shape, centre, size, rotation=UPRIGHT):
-    return Part(shape, centre, size, rotation, (), (120, 90, 60), "wood")
-
-
-def asset(name, parts, mass_kg=10.0):
-    return Asset(name, name, (1.0, 1.0, 1.0), mass_kg, 0.6, True, False, True, True, tuple(parts))
-
-
-def chair():
-    legs = [
-        part("cylinder", (x, y, 0.215), (0.05, 0.05, 0.43))
-        for x in (-0.2, 0.2)
-        for y in (-0.2, 0.2)
-    ]
-    seat = part("box", (0.0, 0.0, 0.45), (0.5, 0.5, 0.04))
-    back = part("box", (0.0, 0.24, 0.68), (0.5, 0.02, 0.42))
-    return asset("chair", [*legs, seat, back])
+from internav_data.records import Pose, Wall
 
 
 def nothing():
@@ -53,19 +33,17 @@ def test_a_chair_stays_where_it_was_put():
 
 def test_free_fall_takes_as_long_as_physics_says():
     # 1 cm falls in sqrt(2 h / g) = 45 ms = 11 steps; then ten calm steps follow.
-    box = asset("box", [part("box", (0.0, 0.0, 0.2), (0.4, 0.4, 0.4))])
-    rest = get_engine().settle(PhysicsScene((Body.of(box, Pose(0.0, 0.0, 0.01, UPRIGHT)),)))
+    cube = crate("Crate_0", (0.4, 0.4, 0.4))
+    rest = get_engine().settle(PhysicsScene((Body.of(cube, Pose(0.0, 0.0, 0.01, UPRIGHT)),)))
     assert rest.seconds >= math.sqrt(2 * 0.01 / 9.81) + 9 / 240
 
 
 def test_what_leans_over_is_refused():
     leaning = asset(
-        "leaning",
-        [
-            part("box", (0.0, 0.0, 0.05), (0.1, 0.1, 0.1)),
-            part("box", (0.3, 0.0, 0.6), (0.6, 0.2, 0.2)),
-            part("box", (0.0, 0.0, 0.35), (0.05, 0.05, 0.5)),
-        ],
+        "Lamp_0",
+        box((0.0, 0.0, 0.05), (0.1, 0.1, 0.1)),
+        box((0.3, 0.0, 0.6), (0.6, 0.2, 0.2)),
+        box((0.0, 0.0, 0.35), (0.05, 0.05, 0.5)),
     )
     assert settle(Body.of(leaning, Pose(1.0, 1.0, 0.0, UPRIGHT)), 0.01, nothing).refusal
 
@@ -86,10 +64,10 @@ def test_a_neighbour_out_of_reach_changes_nothing():
 
 def test_same_answer_in_a_fresh_process_and_after_any_history():
     script = (
-        "import sys; sys.path.insert(0, 'tests/physics'); from test_settle import *\n"
+        "import sys; sys.path[:0] = ['tests', 'tests/physics']; from test_settle import *\n"
         "n = int(sys.argv[1])\n"
-        "for k in range(n): settle(Body.of(asset(f'b{k}', [part('box', (0, 0, .1 + k / 50), "
-        "(.2, .3, .2 + k / 25))]), Pose(0, 0, 0, UPRIGHT)), 0.0, nothing)\n"
+        "for k in range(n): settle(Body.of(crate(f'Crate_{k}', (.2, .3, .2 + k / 25)), "
+        "Pose(0, 0, 0, UPRIGHT)), 0.0, nothing)\n"
         "e = get_engine()\n"
         "print(repr(e.settle(PhysicsScene((Body.of(chair(), Pose(0, 0, .01, UPRIGHT)),)))))"
     )
@@ -115,9 +93,9 @@ def test_nothing_is_printed_by_importing_the_engine():
 
 def test_assets_of_more_than_sixteen_parts_keep_them_all():
     # Bullet's shape arrays drop the seventeenth: here it alone carries the rest.
-    parts = [part("box", (0.0, 0.0, 0.5 + 0.01 * k), (0.2, 0.2, 0.01)) for k in range(20)]
-    parts.append(part("box", (0.0, 0.0, 0.1), (0.5, 0.5, 0.2)))
-    there = settle(Body.of(asset("stack", parts), Pose(0.0, 0.0, 0.0, UPRIGHT)), 0.01, nothing)
+    parts = [box((0.0, 0.0, 0.5 + 0.01 * k), (0.2, 0.2, 0.01)) for k in range(20)]
+    stack = asset("Stack_0", *parts, box((0.0, 0.0, 0.1), (0.5, 0.5, 0.2)))
+    there = settle(Body.of(stack, Pose(0.0, 0.0, 0.0, UPRIGHT)), 0.01, nothing)
     assert there.refusal == ""
-    corners, _ = asset_corners(asset("stack", parts))
+    corners, _ = asset_corners(stack)
     assert transform(corners, there.pose)[:, 2].min() == pytest.approx(0.001, abs=0.0011)

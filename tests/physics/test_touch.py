@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from builders import UPRIGHT, asset, box, table
 from shapely.geometry import MultiPoint, Point
 
 from internav_data.geometry import part_corners, rotation_matrix, yaw_quaternion
@@ -14,26 +15,19 @@ from internav_data.physics.frames import Frame
 from internav_data.physics.kdop import overlap
 from internav_data.physics.narrow_phase import met_on_path, prisms_of, prisms_of_collider
 from internav_data.physics.sweep import KEPT_M, centred_corners, extent_of, sweep_recorder
-from internav_data.records import Asset, Part, Pose
+from internav_data.records import Pose
 
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 MARGIN = 0.01
 
 
-def asset(name, *parts, mass_kg=6.0):
-    made = [Part("box", centre, size, UPRIGHT, (), (120, 90, 60), "wood") for centre, size in parts]
-    return Asset(name, name, (1.0, 1.0, 1.0), mass_kg, 0.5, True, False, True, True, tuple(made))
-
-
 CHAIR = asset(
-    "chair", ((0.0, 0.0, 0.22), (0.45, 0.45, 0.44)), ((0.21, 0.0, 0.6), (0.03, 0.45, 0.3))
+    "Chair_0",
+    box((0.0, 0.0, 0.22), (0.45, 0.45, 0.44)),
+    box((0.21, 0.0, 0.6), (0.03, 0.45, 0.3)),
+    mass_kg=6.0,
+    friction=0.5,
 )
-TABLE = asset(
-    "table",
-    ((0.0, 0.0, 0.72), (1.2, 0.8, 0.04)),
-    *(((x, y, 0.35), (0.05, 0.05, 0.7)) for x in (-0.55, 0.55) for y in (-0.35, 0.35)),
-    mass_kg=20.0,
-)
+TABLE = table(size=(1.2, 0.8, 0.74), leg_m=0.05, mass_kg=20.0, friction=0.5)
 
 
 def hulls(thing, middle, turn):

@@ -4,24 +4,16 @@ import math
 
 import numpy as np
 import pytest
+from builders import UPRIGHT, asset, crate, part
 from scipy.spatial import Delaunay
 
 from internav_data.geometry import part_corners, transform, yaw_quaternion
 from internav_data.geometry.headings import HEADINGS
-from internav_data.records import Asset, Part, Pose
+from internav_data.records import Pose
 from internav_data.world.occlusion import MAX_POINTS, occlusion_shape, placed_occlusion_shape
 from internav_data.world.visibility import CAMERA_M, REACH_M, Occluders, _hidden, camera_pose
 
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 SHAPES = ("box", "cylinder", "sphere")
-
-
-def asset(name, parts):
-    return Asset(name, name, (1.0, 1.0, 1.0), 5.0, 0.6, True, False, True, True, tuple(parts))
-
-
-def part(shape, centre, size, turn=UPRIGHT):
-    return Part(shape, centre, size, turn, (), (120, 90, 60), "wood")
 
 
 def some_asset(rng, name):
@@ -34,11 +26,11 @@ def some_asset(rng, name):
         )
         for _ in range(int(rng.integers(1, 6)))
     ]
-    return asset(name, parts)
+    return asset(name, *parts)
 
 
 def cube(side=0.3):
-    return asset(f"cube {side}", [part("box", (0.0, 0.0, side / 2), (side, side, side))])
+    return crate("Cube_0", (side, side, side))
 
 
 def test_rays_are_obstructed_where_samples_lie_inside_a_hull():
@@ -98,7 +90,7 @@ def test_reach_is_measured_in_the_plane():
 
 
 def test_the_horizon_decides_what_is_seen_of_the_floor():
-    flat = asset("flat", [part("box", (0.0, 0.0, 0.01), (0.02, 0.02, 0.02))])
+    flat = crate("Flat_0", (0.02, 0.02, 0.02))
     # Depression d is in view while |d - horizon| <= 45 degrees.
     for horizon in (-30, 0, 30, 60):
         for x in (0.35, 0.5, 0.8, 1.1, 1.2):
@@ -112,18 +104,18 @@ def test_the_horizon_decides_what_is_seen_of_the_floor():
 
 
 def test_what_stands_between_hides():
-    occluders = asset("occluders", [part("box", (0.0, 0.0, 0.9), (0.05, 2.0, 1.8))])
+    occluders = crate("Screen_0", (0.05, 2.0, 1.8))
     behind = (cube(), Pose(1.0, 0.0, 0.0, UPRIGHT))
     assert sees([behind])
     assert not sees([behind, (occluders, Pose(0.5, 0.0, 0.0, UPRIGHT))])
     assert sees([behind, (occluders, Pose(1.4, 0.0, 0.0, UPRIGHT))])
-    low = asset("low", [part("box", (0.0, 0.0, 0.05), (0.05, 2.0, 0.1))])
+    low = crate("Low_0", (0.05, 2.0, 0.1))
     assert sees([behind, (low, Pose(0.5, 0.0, 0.0, UPRIGHT))])
 
 
 def test_a_part_does_not_hide_its_own_centre():
     # All corners are out of reach: only the centre, inside the part, tells that it is there.
-    bench = asset("bench", [part("box", (0.0, 0.0, 0.2), (3.0, 0.4, 0.4))])
+    bench = crate("Bench_0", (3.0, 0.4, 0.4))
     across = Pose(0.9, 0.0, 0.0, yaw_quaternion(90))
     assert sees([(bench, across)])
     assert not sees([(bench, Pose(1.3, 0.0, 0.0, yaw_quaternion(90)))])

@@ -9,6 +9,7 @@ import sys
 import numpy as np
 import pytest
 import shapely
+from builders import UPRIGHT
 
 from internav_data.catalog import catalogue
 from internav_data.episodes import build_episodes
@@ -21,7 +22,6 @@ from internav_data.records.errors import UsageError
 from internav_data.world import ACTIONS, Action, HouseModel, World
 from internav_data.world.actions import actions_of_option
 
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 SCENES = (0, 1, 6)
 
 
@@ -325,7 +325,7 @@ def test_a_copy_in_mid_sequence_goes_on_in_the_same_way(worlds):
 
 def test_the_same_in_fresh_processes():
     script = (
-        "import sys; sys.path.insert(0, 'tests/world'); from test_world import *\n"
+        "import sys; sys.path[:0] = ['tests', 'tests/world']; from test_world import *\n"
         "for n in range(int(sys.argv[1])): played(0, n + 2, n, 60)\n"
         "print(played(1, 0, 4, 150), played(0, 1, 5, 150))"
     )
