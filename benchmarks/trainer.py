@@ -29,8 +29,8 @@ from internav_data.camp.agents.options import ACTIONS_OF, NAVIGATE, STOP
 from internav_data.camp.collect import Collector, orders_of, uniforms_of
 from internav_data.camp.config import from_mapping, preset
 from internav_data.camp.ppo import update
-from internav_data.camp.tasks import MainTask
 from internav_data.dataset import load_dataset
+from internav_data.envs import InterNavVectorEnv
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -101,19 +101,23 @@ def main() -> int:
     return 0 if result["update"]["agree"] else 1
 
 
-def lived(dataset: Path, method: str, config: CampConfig) -> tuple[Agent, MainTask, Collector]:
+def lived(
+    dataset: Path, method: str, config: CampConfig
+) -> tuple[Agent, InterNavVectorEnv, Collector]:
     """Return an agent among its environments."""
     agent = make_agent(method, config)
     episodes = load_dataset(dataset, "train")
     size, count = config.network.image_size, config.ppo.num_envs
-    env = MainTask(episodes, count, image_size=size, max_steps=MAX_STEPS, ids=agent.wants_ids)
+    env = InterNavVectorEnv(
+        count, episodes, size, autoreset=False, copy=False, ids=agent.wants_ids, max_steps=MAX_STEPS
+    )
     return agent, env, Collector(env, agent)
 
 
 def method_row(dataset: Path, method: str, config: CampConfig, rollouts: int) -> dict[str, Any]:
     """Train for some rollouts after one that warms up; say where the time went."""
     agent, env, collector = lived(dataset, method, config)
-    collector.begin(env.begin(0))
+    collector.begin(env.reset(seed=0)[0])
     optimiser = torch.optim.Adam(agent.optimised(), config.stages.joint_learning_rate)
     count, steps = config.ppo.num_envs, config.ppo.num_steps
 
@@ -177,7 +181,7 @@ def one_update(
 ) -> tuple[float, dict[str, float]]:
     """Return the seconds that an update took, and what was said of it."""
     agent, env, collector = lived(dataset, "camp", config)
-    collector.begin(env.begin(0))
+    collector.begin(env.reset(seed=0)[0])
     count = config.ppo.num_envs
     rollout = collector.collect(uniforms_of(0, 0, range(count), config.ppo.num_steps))
     env.close()

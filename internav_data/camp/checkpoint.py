@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
     from internav_data.camp.agents import Agent, State
     from internav_data.camp.config import CampConfig
+    from internav_data.envs.slot import EpisodeSnapshot
 
 FORMAT: Final = 2
 FOLDER: Final = "checkpoints"
@@ -400,12 +401,22 @@ def _rows(tensors: Mapping[str, Tensor], name: str, like: Tensor, own: range, co
     return kept[own.start : own.stop].to(like.device)
 
 
-def unpack_environments(progress: Mapping[str, Any], own: range) -> list[Any]:
-    """Return what the environments with these numbers were."""
+def unpack_environments(progress: Mapping[str, Any], own: range) -> list[EpisodeSnapshot]:
+    """Return the snapshots of the environments with these numbers.
+
+    Raises
+    ------
+    CorruptDataError
+        There are none, or fewer, or they are damaged.
+    """
+    from internav_data.envs.slot import EpisodeSnapshot  # noqa: PLC0415 - the camera's kernels
+
     states = progress.get("environments")
-    if not isinstance(states, list):
-        raise CorruptDataError("checkpoint: progress: environments: expected a list")
-    return states[own.start : own.stop]
+    if not isinstance(states, list) or len(states) < own.stop:
+        raise CorruptDataError(
+            f"checkpoint: progress: environments: expected a list of {own.stop} at least"
+        )
+    return [EpisodeSnapshot.from_json(state) for state in states[own.start : own.stop]]
 
 
 def unpack_random(tensors: Mapping[str, Tensor]) -> None:

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from internav_data.camp.collect import Environments
     from internav_data.camp.config import CloningConfig
     from internav_data.camp.ppo import Reduce
-    from internav_data.camp.tasks import Task
     from internav_data.camp.train import Trainer
     from internav_data.dataset import Dataset
     from internav_data.envs.types import Observations
@@ -211,16 +210,16 @@ def clone_expert(trainer: Trainer) -> None:
     place, config, agent = trainer.place, trainer.config, trainer.agent
     given, reduce = config.cloning, trainer.ranks.reduce
     count = given.num_envs
-    own, task, seen = _demonstrations(trainer)
+    own, env, seen = _demonstrations(trainer)
     optimiser = torch.optim.Adam(agent.optimised(), given.learning_rate)
     state: State = agent.initial_state(len(own))
     if place.stage == CLONING and trainer.since is not None:
         unpack_optimiser(trainer.since.training, optimiser)
         state = unpack_state(trainer.since.training, state, own, count)
         states = unpack_environments(trainer.since.progress, own)
-        frames = task.restore(states)
-        ids = [str(said["episode_id"]) for said in states]
-        seen.resume(frames, ids, [len(said["actions"]) for said in states])
+        frames, _ = env.restore(states)
+        ids = [state.episode_id for state in states]
+        seen.resume(frames, ids, [len(state.actions) for state in states])
         unpack_random(trainer.since.training)
     place.stage = CLONING
     held = [state]
@@ -238,7 +237,7 @@ def clone_expert(trainer: Trainer) -> None:
             last = said["update"] == said["updates"]
             due = place.cloned_updates % (_RARELY * config.run.checkpoint_every) == 0
             if stop or last or due or place.cloned_updates == 1:
-                trainer.save(optimiser, task, held[0])
+                trainer.save(optimiser, env, held[0])
             trainer.stop(stop)
     except NotFiniteError as error:
         raise NotFiniteError(
@@ -247,13 +246,13 @@ def clone_expert(trainer: Trainer) -> None:
             "checkpoint)"
         ) from error
     finally:
-        task.close()
+        env.close()
 
 
 def forecast_cloning(trainer: Trainer, measured: int) -> tuple[int, float]:
     """Return how many updates there will be, and the seconds that one takes, from a few of them."""
     given, agent = trainer.config.cloning, trainer.agent
-    _, task, seen = _demonstrations(trainer)
+    _, env, seen = _demonstrations(trainer)
     optimiser = torch.optim.Adam(agent.optimised(), given.learning_rate)
     updates = clone(agent, optimiser, seen, given, order_seed(trainer.config.seed, CLONING))
     try:
@@ -263,12 +262,13 @@ def forecast_cloning(trainer: Trainer, measured: int) -> tuple[int, float]:
             done += 1
         return whole, (time.perf_counter() - began) / max(done, 1)
     finally:
-        task.close()
+        env.close()
 
 
-def _demonstrations(trainer: Trainer) -> tuple[range, Task, Demonstrations]:
+def _demonstrations(trainer: Trainer) -> tuple[range, Environments, Demonstrations]:
     """Return this rank's environments, by number and opened, and experts in them."""
     config, agent = trainer.config, trainer.agent
     own = trainer.ranks.share(config.cloning.num_envs, "cloning.num_envs")
-    task = trainer.data.main(config, len(own), ids=agent.wants_ids)
-    return own, task, Demonstrations(task, agent, experts_of(trainer.data.episodes()))
+    tasks = ("interactive",) * len(own)
+    env = trainer.data.environments(config, tasks, ids=agent.wants_ids)
+    return own, env, Demonstrations(env, agent, experts_of(trainer.data.episodes()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.camp.agents import Agent
+    from internav_data.envs.slot import EpisodeSnapshot
     from internav_data.envs.types import Observations, Stepped
 
 
@@ -34,6 +36,15 @@ class Environments(Protocol):
 
     def step(self, actions: NDArray[np.int64]) -> Stepped:
         """Act everywhere; -1 waits."""
+
+    def state(self) -> Sequence[EpisodeSnapshot]:
+        """Return a snapshot of each environment."""
+
+    def restore(self, states: Sequence[EpisodeSnapshot]) -> tuple[Observations, dict[str, Any]]:
+        """Become the environments of snapshots."""
+
+    def close(self) -> None:
+        """End the environments' processes."""
 
 
 def uniforms_of(seed: int, rollout: int, environments: Sequence[int], steps: int) -> Tensor:
@@ -74,10 +85,13 @@ class Collector:
         What the agent remembers.
     starts : (n,) bool
         Where an episode begins at the next step.
+    env_s
+        Seconds that the environments took.
     """
 
     def __init__(self, env: Environments, agent: Agent, seed: int = 0) -> None:
         self.env, self.agent, self._seed = env, agent, seed
+        self.env_s = 0.0
         count = env.num_envs
         self.state = agent.initial_state(count)
         self.starts = torch.ones(count, dtype=torch.bool, device=agent.device)
@@ -112,7 +126,9 @@ class Collector:
             record.write(t, step.record)
             row = {"starts": self.starts, "values": step.value, "log_probs": step.log_prob}
             self.state = step.state
-            self._seen, rewards, ended, cut, infos = self.env.step(step.action.cpu().numpy())
+            acts, began = step.action.cpu().numpy(), time.perf_counter()
+            self._seen, rewards, ended, cut, infos = self.env.step(acts)
+            self.env_s += time.perf_counter() - began
             self._check({"reward": rewards})
             paid = torch.from_numpy(rewards.astype(np.float32))
             row |= {"rewards": paid, "final_values": torch.zeros_like(step.value)}
@@ -123,7 +139,9 @@ class Collector:
                     self._check(self._seen)
                     row["final_values"] = self._expected() * torch.from_numpy(cut).to(device)
                 finished += _finished(t, over, infos)
+                began = time.perf_counter()
                 self._seen, _ = self.env.reset(options={"reset_mask": over})
+                self.env_s += time.perf_counter() - began
             self.starts = torch.from_numpy(over).to(device)
             own.write(t, row)
         columns = own.columns

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from internav_data.camp.agents import Agent
+    from internav_data.camp.collect import Environments
     from internav_data.camp.config import CampConfig
     from internav_data.camp.stages import TrainingStage
-    from internav_data.camp.tasks import Task
     from internav_data.dataset import Dataset
     from internav_data.records import Episode
 
@@ -67,22 +67,27 @@ class TrainingData:
             raise UsageError(f"{self.path}: there are no {what}; {advice}")
         return found
 
-    def task(self, stage: TrainingStage, config: CampConfig, own: range, *, ids: bool) -> Task:
+    def of_stage(
+        self, stage: TrainingStage, config: CampConfig, own: range, *, ids: bool
+    ) -> Environments:
         """Return those environments of a stage whose numbers are in `own`."""
-        if not stage.tasks:
-            return self.main(config, len(own), ids=ids, single_room=stage.single_room)
-        from internav_data.camp.auxiliary_tasks import AuxiliaryTasks  # noqa: PLC0415 - the camera
+        tasks = stage.tasks[own.start : own.stop] or ("interactive",) * len(own)
+        return self.environments(config, tasks, ids=ids, single_room=stage.single_room)
 
-        episodes = self.episodes(single_room=stage.single_room)
-        tasks = stage.tasks[own.start : own.stop]
-        return AuxiliaryTasks(episodes, tasks, **_arguments(config, ids=ids))
+    def environments(
+        self, config: CampConfig, tasks: Sequence[str], *, ids: bool, single_room: bool = False
+    ) -> Environments:
+        """Return environments of the training split, a task each."""
+        from internav_data.envs.make import make_vector  # noqa: PLC0415 - the camera's kernels
 
-    def main(self, config: CampConfig, count: int, *, ids: bool, single_room: bool = False) -> Task:
-        """Return environments of the main task."""
-        from internav_data.camp.tasks import MainTask  # noqa: PLC0415 - the camera's kernels
-
-        episodes = self.episodes(single_room=single_room)
-        return MainTask(episodes, count, config.run.workers, **_arguments(config, ids=ids))
+        env: Any = make_vector(
+            len(tasks), self.episodes(single_room=single_room), min(config.run.workers, len(tasks)),
+            autoreset=False, copy=False, ids=ids, task=tuple(tasks),
+            image_size=config.network.image_size, max_steps=config.run.max_steps,
+            failed_done_reward=config.data.failed_done_reward,
+            house_cache_size=config.data.house_cache_size,
+        )  # fmt: skip
+        return env  # type: ignore[no-any-return] # what `Environments` asks is there
 
     def validate(self, agent: Agent, method: str, config: CampConfig) -> dict[str, float] | None:
         """Let an agent play the validation split: means over its episodes, None without any."""
@@ -104,11 +109,3 @@ class TrainingData:
             for name in _MEANS
         }
         return {**means, "episodes": float(len(results))}
-
-
-def _arguments(config: CampConfig, *, ids: bool) -> dict[str, Any]:
-    return {
-        "image_size": config.network.image_size, "max_steps": config.run.max_steps, "ids": ids,
-        "failed_done_reward": config.data.failed_done_reward,
-        "house_cache_size": config.data.house_cache_size,
-    }  # fmt: skip

@@ -160,7 +160,7 @@ def forecast(request: Request) -> list[tuple[str, int, float]]:
                 trainer.update(now)
             each = (time.perf_counter() - began) / _MEASURED
         finally:
-            now.task.task.close()
+            now.env.close()
         steps = stage.updates * given.num_envs * given.num_steps
         found.append((stage.name, steps, each * stage.updates))
     return found

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from internav_data.camp.agents.options import NAVIGATE, PICK, PUSH
 from internav_data.records import Purpose, TrainingStream, generator
 from internav_data.records.errors import UsageError
 
@@ -16,9 +15,9 @@ if TYPE_CHECKING:
 
 PARTS: Final = ("auxiliary", "single", "all")
 """What `--stages` can name, in order."""
-TASKS: Final = {NAVIGATE: "navigate", PUSH: "push", PICK: "pick"}
-"""Names of the auxiliary tasks, by the option that each is about."""
-_NUMBERS: Final = ("cloning", *PARTS, *(f"auxiliary-{name}" for name in TASKS.values()))
+TASKS: Final = ("navigate", "push", "pick")
+"""Auxiliary tasks, named after the policies that they train; see `internav_data.envs.tasks`."""
+_NUMBERS: Final = ("cloning", *PARTS, *(f"auxiliary-{name}" for name in TASKS))
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +27,8 @@ class TrainingStage:
     name: str
     part: str
     """Of `PARTS`."""
-    tasks: tuple[int, ...]
-    """The option that each environment is about; empty for the main task."""
+    tasks: tuple[str, ...]
+    """Task of each environment; empty for the main task."""
     single_room: bool
     """Only scenes of a single room."""
     rate: float
@@ -73,9 +72,9 @@ def plan(config: CampConfig, parts: Sequence[str], *, hierarchical: bool) -> lis
         )
     shares = [
         *((("auxiliary", task), given.auxiliary_share / len(names)) for task in names),
-        *([] if names else [(("auxiliary", -1), given.auxiliary_share)]),
-        (("single", -1), given.single_room_share),
-        (("all", -1), 1.0 - given.auxiliary_share - given.single_room_share),
+        *([] if names else [(("auxiliary", ""), given.auxiliary_share)]),
+        (("single", ""), given.single_room_share),
+        (("all", ""), 1.0 - given.auxiliary_share - given.single_room_share),
     ]
     whole = max(1, round(given.total_timesteps / (count * config.ppo.num_steps)))
     stages, share_before = [], 0.0
@@ -115,7 +114,7 @@ def order_seed(seed: int, stage: str) -> int:
 def _stage(
     config: CampConfig,
     part: str,
-    task: int,
+    task: str,
     updates: int,
     over: tuple[float, float],
     *,
@@ -123,11 +122,11 @@ def _stage(
 ) -> TrainingStage:
     auxiliary = part == "auxiliary" and hierarchical
     count, given = config.ppo.num_envs, config.stages
-    tasks: tuple[int, ...] = ()
+    tasks: tuple[str, ...] = ()
     if auxiliary:
-        side_by_side = tuple(sorted(TASKS)[k * len(TASKS) // count] for k in range(count))
-        tasks = side_by_side if task < 0 else (task,) * count
-    name = f"{part}-{TASKS[task]}" if task >= 0 else part
+        side_by_side = tuple(TASKS[k * len(TASKS) // count] for k in range(count))
+        tasks = (task,) * count if task else side_by_side
+    name = f"{part}-{task}" if task else part
     rate = given.joint_learning_rate if hierarchical and not auxiliary else given.learning_rate
     return TrainingStage(
         name, part, tasks, part != "all", rate, updates, name if auxiliary else "main", *over

@@ -26,7 +26,6 @@ from internav_data.camp.cloning import CLONING, clone_expert
 from internav_data.camp.collect import Collector, orders_of, uniforms_of
 from internav_data.camp.logging import EpisodeWindow, MetricsLogger, rates
 from internav_data.camp.stages import order_seed
-from internav_data.camp.tasks import Timed
 from internav_data.core.interrupts import InterruptedRunError
 from internav_data.records.errors import NotFiniteError, UsageError
 
@@ -38,12 +37,12 @@ if TYPE_CHECKING:
 
     from internav_data.camp.agents import Agent, State
     from internav_data.camp.checkpoint import TrainState
+    from internav_data.camp.collect import Environments
     from internav_data.camp.config import CampConfig
     from internav_data.camp.data import TrainingData
     from internav_data.camp.distributed import DistributedContext
     from internav_data.camp.logging import Row
     from internav_data.camp.stages import TrainingStage
-    from internav_data.camp.tasks import Task
 
     Tell = Callable[[Row], object]
 
@@ -58,7 +57,7 @@ class Running:
     learner: Agent
     optimiser: Optimizer
     collector: Collector
-    task: Timed
+    env: Environments
 
 
 class Trainer:
@@ -150,31 +149,31 @@ class Trainer:
         """Make a stage's environments and optimiser, as they were in the checkpoint if there is
         one."""  # noqa: D205, D209 - one sentence
         own = self.own
-        task = Timed(self.data.task(stage, self.config, own, ids=self.agent.wants_ids))
+        env = self.data.of_stage(stage, self.config, own, ids=self.agent.wants_ids)
         learner: Agent = self.agent
         if stage.tasks:
             tasks = stage.tasks[own.start : own.stop]
             learner = Auxiliary(self.agent, tasks, stage.tasks)  # type: ignore[arg-type] # `plan`
         optimiser = torch.optim.Adam(learner.optimised(), stage.rate)
         seed = order_seed(self.config.seed, stage.name) + own.start
-        collector = Collector(task, learner, seed)
+        collector = Collector(env, learner, seed)
         if self.since is None or not self.place.done:
             if not stage.tasks:
                 self.agent.synchronise()
-            collector.begin(task.task.begin(seed))
+            collector.begin(env.reset(seed=seed)[0])
         else:
             tensors, count = self.since.training, self._count
             unpack_optimiser(tensors, optimiser)
             collector.state = unpack_state(tensors, collector.state, own, count)
             collector.starts = unpack_starts(tensors, collector.starts, own, count)
-            collector.begin(task.task.restore(unpack_environments(self.since.progress, own)))
+            collector.begin(env.restore(unpack_environments(self.since.progress, own))[0])
             unpack_random(tensors)
-        return Running(stage, learner, optimiser, collector, task)
+        return Running(stage, learner, optimiser, collector, env)
 
     def update(self, now: Running) -> Row:
         """Take a rollout and learn from it; return what is to be logged."""
         place, config, stage = self.place, self.config.ppo, now.stage
-        began, now.task.spent_s = time.perf_counter(), 0.0
+        began, now.collector.env_s = time.perf_counter(), 0.0
         over = place.done / stage.updates
         over = stage.decay_from + (stage.decay_to - stage.decay_from) * over
         ppo.set_rate(now.optimiser, stage.rate, over)
@@ -201,7 +200,7 @@ class Trainer:
             "stage": stage.name, "stage_update": place.done,
             "learning_rate": stage.rate * (1.0 - over), "critic_only": int(new),
             "episode": self._window.row(), "decision": decided, "ppo": said,
-            "time": rates(steps, (now.task.spent_s, collected, spent)),
+            "time": rates(steps, (now.collector.env_s, collected, spent)),
         }  # fmt: skip
 
     def validate(self) -> float | None:
@@ -223,7 +222,7 @@ class Trainer:
         now, place, every = self.open(stage), self.place, self.config.run
         try:
             if not place.updates:
-                self.save(now.optimiser, now.task, now.collector)
+                self.save(now.optimiser, now.env, now.collector)
             while place.done < stage.updates:
                 self.write(self._finite(now))
                 last = place.done == stage.updates
@@ -231,10 +230,10 @@ class Trainer:
                 score = self.validate() if judged else None
                 stop = self.asked()
                 if last or stop or judged or place.done % every.checkpoint_every == 0:
-                    self.save(now.optimiser, now.task, now.collector, score)
+                    self.save(now.optimiser, now.env, now.collector, score)
                 self.stop(stop)
         finally:
-            now.task.task.close()
+            now.env.close()
 
     def _finite(self, now: Running) -> Row:
         try:
@@ -249,7 +248,7 @@ class Trainer:
     def save(
         self,
         optimiser: Optimizer,
-        task: Timed | Task,
+        env: Environments,
         of: Collector | State,
         score: float | None = None,
     ) -> None:
@@ -257,13 +256,13 @@ class Trainer:
 
         `score` says how good a validation has found it.
         """
-        task = task.task if isinstance(task, Timed) else task
         ranks = self.ranks
         state, starts = (of.state, of.starts) if isinstance(of, Collector) else (of, None)
         state = {name: ranks.joined(kept) for name, kept in state.items()}
         starts = None if starts is None else ranks.joined(starts)
         progress = {
-            **asdict(self.place), "environments": ranks.listed(task.state()),
+            **asdict(self.place),
+            "environments": ranks.listed([asdict(state) for state in env.state()]),
             "window": self._window.plain(), "log": self.log.position if self.log else 0,
             "dataset": self.data.fingerprint,
         }  # fmt: skip

@@ -1,4 +1,4 @@
-"""Where Push and Pick are learnt: beside an obstacle, opposite to the goal.
+"""Starts of the auxiliary tasks of Push and Pick: beside an obstacle, opposite to the goal.
 
 A pure function of an episode: no random numbers, so that a start is named by its number.
 """
@@ -11,17 +11,21 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 import numpy as np
 
 from internav_data.navigation import SPACING_M
+from internav_data.records import Purpose, TrainingStream, generator
+from internav_data.records.errors import UsageError
 from internav_data.world import HouseModel, World
 from internav_data.world.visibility import REACH_M
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from internav_data.envs.order import EpisodeOrder
+    from internav_data.envs.source import Source
     from internav_data.records import Asset, Episode, Pose, Vec2
 
 Kind = Literal["push", "pick"]
 CLEARED_STEPS: Final = 1
-"""An obstacle that was no closed door is cleared when the way falls by this: 0.25 m."""
+"""Drop of the path, in steps of 0.25 m, from which on an obstacle that did not block is cleared."""
 
 
 class AuxiliaryStart(NamedTuple):
@@ -52,7 +56,7 @@ def auxiliary_starts(
     episode
         The episode.
     assets
-        Of its obstacles.
+        Assets of its obstacles, by id.
     kind
         "push" or "pick".
     """
@@ -67,6 +71,46 @@ def auxiliary_starts(
     return tuple(starts)
 
 
+def next_start(
+    source: Source, order: EpisodeOrder, seed: int, position: int, kind: Kind
+) -> tuple[int, AuxiliaryStart, int]:
+    """Return the next episode that has a start, one of its starts, and the position after it.
+
+    The obstacle is drawn uniformly; the start is the first beside it.
+
+    Parameters
+    ----------
+    source
+        Episodes.
+    order
+        Their order.
+    seed
+        Seed of the environment.
+    position
+        Position in the order to begin at.
+    kind
+        "push" or "pick".
+
+    Raises
+    ------
+    UsageError
+        No episode has a start.
+    """
+    for _ in range(len(source.dataset)):
+        number = order.number(position)
+        position += 1
+        starts = source.auxiliary_starts(number, kind)
+        if starts:
+            obstacles = sorted({start.obstacle for start in starts})
+            rng = generator(seed, Purpose.TRAINING, attempt=TrainingStream.AUXILIARY, draw=position)
+            obstacle = obstacles[int(rng.integers(len(obstacles)))]
+            return number, next(s for s in starts if s.obstacle == obstacle), position
+    raise UsageError(
+        f"{source.dataset!r}: no obstacle to learn to {kind} in scenes of a single room; "
+        "generate more of them, or train --stages single,all"
+    )
+
+
 def world_at(
     model: HouseModel, episode: Episode, assets: Mapping[str, Asset], start: AuxiliaryStart
 ) -> World:
@@ -77,7 +121,13 @@ def world_at(
 
 
 def is_cleared(before: int | None, after: int | None) -> bool:
-    """Whether an obstacle is out of the way, by lattice distances from one and the same node."""
+    """Return whether an obstacle is out of the way.
+
+    Parameters
+    ----------
+    before, after
+        Lattice distance in steps from one and the same node to the goal; None where cut off.
+    """
     if after is None:
         return False
     return before is None or before - after >= CLEARED_STEPS

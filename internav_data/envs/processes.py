@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from gymnasium.vector import VectorEnv
 
-from internav_data.envs.slot import EpisodeSnapshot, check_options
+from internav_data.envs.slot import EpisodeSnapshot, check_options, task_names
 from internav_data.envs.spaces import layout
 from internav_data.envs.vector import (
     OPTIONS,
@@ -130,7 +130,7 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
         }
         self._buffers = _arrays(memory, num_envs, image_size, ids=ids)
         given = dict(arguments, dataset=dataset, image_size=image_size, autoreset=autoreset)
-        given["ids"] = ids
+        given["ids"], tasks = ids, task_names(arguments, num_envs)
         bounds = [num_envs * k // workers for k in range(workers + 1)]
         self._rows = list(itertools.pairwise(bounds))
         self._counts = [high - low for low, high in self._rows]
@@ -138,7 +138,9 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
         for rows in self._rows:
             here, there = start.Pipe()
             process = start.Process(  # type: ignore[attr-defined] # every context has it
-                target=_serve, args=(there, memory, num_envs, rows, given), daemon=True
+                target=_serve,
+                args=(there, memory, num_envs, rows, {**given, "task": tasks[slice(*rows)]}),
+                daemon=True,
             )
             process.start()
             there.close()

@@ -1,4 +1,4 @@
-"""Who plays on: the order of episodes, the one that is played now, and its state."""
+"""Environment slots: the order of episodes, the run of the present one, and its snapshot."""
 
 from __future__ import annotations
 
@@ -6,17 +6,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, TypedDict
 
-from internav_data.envs.episode import EpisodeRun, TaskConfig
+from internav_data.envs.auxiliary import next_start
+from internav_data.envs.episode import EpisodeRun
 from internav_data.envs.source import HOUSE_CACHE_SIZE, LOADED_HOUSES, Source, open_source
-from internav_data.records.errors import UsageError
+from internav_data.envs.tasks import TASKS, TaskConfig
+from internav_data.records.errors import CorruptDataError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from pathlib import Path
 
     from internav_data.dataset import Dataset
-    from internav_data.envs.episode import TaskStep
     from internav_data.envs.order import EpisodeOrder
+    from internav_data.envs.tasks import Task, TaskStep
     from internav_data.records import Episode, PushModel
 
 
@@ -25,6 +27,7 @@ class Arguments(TypedDict, total=False):
 
     split: str | None
     filters: list[tuple[str, str, object]] | None
+    task: str | Sequence[str]
     max_steps: int
     failed_done_reward: float
     push_model: PushModel
@@ -35,45 +38,91 @@ class Arguments(TypedDict, total=False):
 
 _RENAMED: Final = {"houses_kept": "house_cache_size"}
 """Arguments of earlier versions, and their names today."""
+_MAX_ACTIONS: Final = 100_000
+"""Number of actions of a snapshot that are read: more are no episode."""
 
 
 @dataclass(frozen=True, slots=True)
 class EpisodeSnapshot:
-    """All that an environment is: from it, any process can build it again."""
+    """Episode, actions and place in the order: any process can rebuild an environment from it."""
 
     episode_id: str
     actions: tuple[int, ...]
-    """So far, -1 for `wait`."""
+    """Actions so far; -1 waits."""
     seed: int
-    """Of the order of episodes."""
+    """Seed of the order of episodes."""
     position: int
-    """In that order, of the episode that comes next."""
+    """Position in that order of the episode that comes next."""
     start: tuple[int, int, int] | None = None
     """Node i, j and quarter turn, where it did not begin at the episode's own start."""
 
+    @staticmethod
+    def from_json(values: Mapping[str, Any]) -> EpisodeSnapshot:
+        """Read a snapshot that `dataclasses.asdict` and JSON have written.
+
+        Raises
+        ------
+        CorruptDataError
+            A value is missing or of another type.
+        """
+        try:
+            actions = tuple(int(action) for action in values["actions"][:_MAX_ACTIONS])
+            start = values["start"]
+            node = None if start is None else (int(start[0]), int(start[1]), int(start[2]))
+            seed, position = int(values["seed"]), int(values["position"])
+            return EpisodeSnapshot(str(values["episode_id"]), actions, seed, position, node)
+        except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
+            raise CorruptDataError(
+                f"environments: {error!r}: no state of an environment"
+            ) from error
+
 
 class EnvSlot:
-    """One environment without its pictures."""
+    """One environment of a batch, without its pictures.
+
+    Parameters
+    ----------
+    source
+        Episodes.
+    task
+        Reward, end and metrics of each episode.
+    config
+        Settings of the task.
+    episodes_per_house
+        Episodes of one house in a row.
+    shuffle
+        False for the order on disk.
+    """
 
     __slots__ = (
         "_config",
+        "_current",
         "_episodes_per_house",
         "_order",
         "_position",
         "_seed",
         "_shuffle",
-        "current",
+        "_task",
         "source",
     )
 
     def __init__(
-        self, source: Source, config: TaskConfig, *, episodes_per_house: int, shuffle: bool
+        self,
+        source: Source,
+        task: type[Task],
+        config: TaskConfig,
+        *,
+        episodes_per_house: int,
+        shuffle: bool,
     ) -> None:
-        self.source, self._config = source, config
-        self._episodes_per_house, self._shuffle = episodes_per_house, shuffle
+        self.source, self._task, self._config = source, task, config
+        # Few episodes have an obstacle to push: those tasks take any house next.
+        beside = task.start_beside is not None
+        self._episodes_per_house = 1 if beside else episodes_per_house
+        self._shuffle = shuffle or beside
         self._order: EpisodeOrder | None = None
         self._seed = self._position = 0
-        self.current: EpisodeRun | None = None
+        self._current: EpisodeRun | None = None
 
     @staticmethod
     def make(
@@ -86,14 +135,7 @@ class EnvSlot:
         UsageError
             An argument that cannot be meant, or is unknown.
         """
-        unknown = sorted(set(arguments) - set(Arguments.__annotations__))
-        if unknown and unknown[0] in _RENAMED:
-            raise UsageError(f"InterNav: {unknown[0]} is now called {_RENAMED[unknown[0]]}")
-        if unknown:
-            raise UsageError(
-                f"InterNav: no argument {unknown[0]!r}; there are "
-                f"{sorted(Arguments.__annotations__)}"
-            )
+        _check_names(arguments)
         episodes_per_house = arguments.get("episodes_per_house", 4)
         kept = arguments.get("house_cache_size", HOUSE_CACHE_SIZE)
         if min(count, episodes_per_house, kept) < 1:
@@ -101,6 +143,7 @@ class EnvSlot:
                 f"num_envs, episodes_per_house and house_cache_size: expected at least 1 each, "
                 f"got {count}, {episodes_per_house} and {kept}"
             )
+        tasks = [TASKS[name] for name in task_names(arguments, count)]
         LOADED_HOUSES.capacity = max(LOADED_HOUSES.capacity, kept)
         source = open_source(dataset, arguments.get("split"), arguments.get("filters"))
         config = TaskConfig(
@@ -111,25 +154,31 @@ class EnvSlot:
         config.check()
         shuffle = arguments.get("shuffle", True)
         return [
-            EnvSlot(source, config, episodes_per_house=episodes_per_house, shuffle=shuffle)
-            for _ in range(count)
+            EnvSlot(source, task, config, episodes_per_house=episodes_per_house, shuffle=shuffle)
+            for task in tasks
         ]
 
     @property
     def ordered(self) -> bool:
-        """Whether it knows its order."""
+        """Whether the slot has an order of episodes."""
         return self._order is not None
 
     @property
     def run(self) -> EpisodeRun:
-        """The episode being played."""
-        if self.current is None:
+        """Run of the present episode.
+
+        Raises
+        ------
+        UsageError
+            No episode has begun.
+        """
+        if self._current is None:
             raise UsageError("InterNav: nothing is played yet; call reset() first")
-        return self.current
+        return self._current
 
     def seed(self, seed: int) -> None:
         """Start an order of episodes from its beginning."""
-        self._seed, self._position = int(seed), 0
+        self._seed, self._position = int(seed), self._task.first_position
         self._order = self.source.order(
             self._seed, episodes_per_house=self._episodes_per_house, shuffle=self._shuffle
         )
@@ -140,37 +189,78 @@ class EnvSlot:
         actions: Iterable[int] = (),
         start: Sequence[int] | None = None,
     ) -> EpisodeRun:
-        """Begin the next episode, or a named one (which leaves the order where it is)."""
+        """Begin the next episode, or a named one, which leaves the order as it is.
+
+        Parameters
+        ----------
+        episode_id
+            None for the next of the order.
+        actions
+            Actions to take at once.
+        start
+            Node i, j and quarter turn; None for the start that the task chooses.
+
+        Raises
+        ------
+        UsageError
+            No such episode, or no order yet.
+        """
         if episode_id is not None:
             number = self.source.number_of(episode_id)
-        elif self._order is None:
-            raise UsageError("InterNav: no order of episodes yet; call reset() first")
         else:
-            number = self._order.number(self._position)
-            self._position += 1
-        episode = self.source.episode(number)
-        loaded_house, assets = self.source.loaded_house(episode), self.source.dataset.assets
-        self.current = EpisodeRun(episode, loaded_house, assets, self._config, start)
+            number, start = self._next()
+        episode, assets = self.source.episode(number), self.source.dataset.assets
+        loaded_house = self.source.loaded_house(episode)
+        run = EpisodeRun(episode, loaded_house, assets, self._config, start, self._task)
         for action in actions:
-            self.current.step(int(action))
-        return self.current
+            run.step(int(action))
+        self._current = run
+        return run
 
     def state(self) -> EpisodeSnapshot:
-        """Return all that this is."""
+        """Return a snapshot of the environment."""
         run = self.run
         return EpisodeSnapshot(
             run.episode.episode_id, tuple(run.actions), self._seed, self._position, run.start
         )
 
     def restore(self, state: EpisodeSnapshot) -> EpisodeRun:
-        """Become what a state says."""
+        """Become the environment of a snapshot."""
         self.seed(state.seed)
         self._position = state.position
         return self.begin(state.episode_id, state.actions, state.start)
 
+    def _next(self) -> tuple[int, Sequence[int] | None]:
+        """Return the number of the next episode and its start; None for the episode's own."""
+        if self._order is None:
+            raise UsageError("InterNav: no order of episodes yet; call reset() first")
+        kind = self._task.start_beside
+        if kind is None:
+            self._position += 1
+            return self._order.number(self._position - 1), None
+        number, start, self._position = next_start(
+            self.source, self._order, self._seed, self._position, kind
+        )
+        return number, (start.i, start.j, start.quarter)
+
+
+def task_names(arguments: Mapping[str, Any], count: int) -> list[str]:
+    """Return the task of each environment: one name for all, or a name each.
+
+    Raises
+    ------
+    UsageError
+        There is no such task, or another number of them.
+    """
+    given = arguments.get("task", "interactive")
+    names = [given] * count if isinstance(given, str) else list(given)
+    if len(names) != count or not set(names) <= set(TASKS):
+        raise UsageError(f"task: expected one of {list(TASKS)}, or {count} of them; got {given!r}")
+    return names
+
 
 def step_info(run: EpisodeRun, step: TaskStep) -> dict[str, Any]:
-    """Return what is said about a step."""
+    """Return the `info` of a step; with metrics at an episode's end."""
     last = run.last
     if last is None:
         return {}
@@ -180,12 +270,18 @@ def step_info(run: EpisodeRun, step: TaskStep) -> dict[str, Any]:
         "target": last.target,
     }
     if step.terminated or step.truncated:
-        info["metrics"] = run.metrics()
+        info["metrics"] = run.task.metrics()
     return info
 
 
 def check_options(options: Mapping[str, Any] | None, known: tuple[str, ...]) -> dict[str, Any]:
-    """Return reset's options, refused where they cannot be meant."""
+    """Return the options of `reset`.
+
+    Raises
+    ------
+    UsageError
+        An option that cannot be meant, or is unknown.
+    """
     if options is None:
         return {}
     if not isinstance(options, Mapping):
@@ -197,3 +293,13 @@ def check_options(options: Mapping[str, Any] | None, known: tuple[str, ...]) -> 
         if name in options and options.get("episode_id") is None:
             raise UsageError(f"options[{name!r}]: say of which episode, by options['episode_id']")
     return dict(options)
+
+
+def _check_names(arguments: Mapping[str, Any]) -> None:
+    unknown = sorted(set(arguments) - set(Arguments.__annotations__))
+    if unknown and unknown[0] in _RENAMED:
+        raise UsageError(f"InterNav: {unknown[0]} is now called {_RENAMED[unknown[0]]}")
+    if unknown:
+        raise UsageError(
+            f"InterNav: no argument {unknown[0]!r}; there are {sorted(Arguments.__annotations__)}"
+        )

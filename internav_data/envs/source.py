@@ -9,7 +9,7 @@ import hashlib
 import math
 from collections import OrderedDict
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -17,6 +17,7 @@ import numpy as np
 
 from internav_data.dataset import load_dataset
 from internav_data.dataset.manifest import MANIFEST
+from internav_data.envs.auxiliary import auxiliary_starts
 from internav_data.envs.order import EpisodeOrder, scene_bounds
 from internav_data.geometry import round_m
 from internav_data.navigation import SPACING_M
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.dataset import Dataset
+    from internav_data.envs.auxiliary import AuxiliaryStart, Kind
     from internav_data.records import Episode, House, PushModel
 
 
@@ -121,6 +123,8 @@ LOADED_HOUSES: Final = LoadedHouses()
 
 
 SOURCES_KEPT: Final = 8
+STARTS_KEPT: Final = 8192
+"""Episodes whose auxiliary starts are kept a source."""
 
 
 class Source:
@@ -128,6 +132,7 @@ class Source:
 
     def __init__(self, dataset: Dataset[Episode], digest: str) -> None:
         self.dataset, self._digest = dataset, digest
+        self.auxiliary_starts = lru_cache(STARTS_KEPT)(self._auxiliary_starts)
         if len(dataset) == 0:
             raise UsageError(
                 f"dataset {dataset.path}: no episodes for split={dataset.split!r}, "
@@ -182,6 +187,12 @@ class Source:
     def loaded_house(self, episode: Episode) -> LoadedHouse:
         """Return the house of an episode, ready for the environment."""
         return LOADED_HOUSES.of(self._digest, self.dataset.scene(episode.scene_id))
+
+    def _auxiliary_starts(self, number: int, kind: Kind) -> tuple[AuxiliaryStart, ...]:
+        """Return the starts of an episode; `auxiliary_starts` keeps the latest ones."""
+        episode = self.episode(number)
+        model = self.loaded_house(episode).model
+        return auxiliary_starts(model, episode, self.dataset.assets, kind)
 
 
 _SOURCES: OrderedDict[str, Source] = OrderedDict()

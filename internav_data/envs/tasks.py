@@ -1,94 +1,343 @@
-"""What is said about an episode at its end.
+"""Tasks: the reward, the end and the metrics of one episode.
 
-What the main task pays: plain arithmetic on distances, so that it can be checked by hand.
+A task watches one `World`: the environment steps the world and hands each result to `Task.step`.
+Rewards are plain arithmetic on distances, so that they can be checked by hand.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Final
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple
 
+from internav_data.envs.auxiliary import is_cleared
 from internav_data.navigation import SPACING_M
+from internav_data.records.errors import UsageError
 from internav_data.world.actions import INTERACTION_KINDS, ActionKind
+
+if TYPE_CHECKING:
+    from internav_data.envs.auxiliary import Kind
+    from internav_data.envs.source import ShortestPathField
+    from internav_data.records import Episode, PushModel
+    from internav_data.world import StepResult, World
+
+STEP: Final = -0.01
+"""Reward of every step, the last one and a wait included."""
+SUCCESS: Final = 10.0
+"""Reward of Done when the task is fulfilled."""
+OPENED: Final = 1.0
+"""Reward of an interaction that opens a path on the lattice; one that closes it costs as much."""
+CHOSEN_ACTION: Final = 0.1
+"""r_as, reward of the first successful interaction with an object, and r_af, cost of a failure."""
+
+
+@dataclass(frozen=True, slots=True)
+class TaskConfig:
+    """Settings of a task."""
+
+    max_steps: int = 500
+    """Number of steps after which an episode is truncated."""
+    failed_done_reward: float = 0.0
+    """Reward of Done away from the goal, besides the step's; -1 in the released configuration."""
+    push_model: PushModel = "force"
+
+    def check(self) -> None:
+        """Refuse settings that cannot be meant.
+
+        Raises
+        ------
+        UsageError
+            A setting is out of its bounds.
+        """
+        if self.max_steps < 1:
+            raise UsageError(f"max_steps: expected at least 1, got {self.max_steps}")
+        if not math.isfinite(self.failed_done_reward):
+            raise UsageError(
+                f"failed_done_reward: expected a number, got {self.failed_done_reward}"
+            )
+        if self.push_model not in {"force", "kick"}:
+            raise UsageError(f"push_model: expected 'force' or 'kick', got {self.push_model!r}")
+
+
+class TaskStep(NamedTuple):
+    """Reward and ends after one step."""
+
+    reward: float
+    terminated: bool
+    truncated: bool
 
 
 @dataclass(slots=True)
 class EpisodeStatistics:
-    """What is counted on the way."""
+    """Counters and sums over an episode."""
 
+    steps: int = 0
+    """Steps taken, Done and waits included."""
     moves: int = 0
-    """Successful ones only, each counted once."""
+    """Successful moves."""
     tried: dict[ActionKind, int] = field(
         default_factory=lambda: dict.fromkeys(INTERACTION_KINDS, 0)
     )
+    """Interactions by kind."""
     done: dict[ActionKind, int] = field(default_factory=lambda: dict.fromkeys(INTERACTION_KINDS, 0))
+    """Successful interactions by kind."""
     interaction_m: float = 0.0
+    """Sum of the finite drops of the lattice distance by interactions, metres."""
     openings: int = 0
+    """Interactions that opened a path to the goal where there was none."""
     closings: int = 0
+    """Interactions that closed the last path to the goal."""
     reward: float = 0.0
+    """Return so far."""
+    auxiliary_reward: float = 0.0
+    """Part of the return that only auxiliary tasks pay."""
+
+    def metrics(self) -> dict[str, float | int | bool]:
+        """Return the metrics that need no task."""
+        return {
+            "steps": self.steps,
+            "path_m": SPACING_M * self.moves,
+            "pushes_tried": self.tried["push"],
+            "pushes_done": self.done["push"],
+            "picks_tried": self.tried["pick"],
+            "picks_done": self.done["pick"],
+            "drops_tried": self.tried["drop"],
+            "drops_done": self.done["drop"],
+            "interaction_reward_m": self.interaction_m,
+            "openings": self.openings,
+            "closings": self.closings,
+            "return": self.reward,
+        }
 
 
-def metrics(
-    statistics: EpisodeStatistics,
-    *,
-    success: bool,
-    shortest_path_m: float,
-    steps: int,
-    distance_m: float,
-) -> dict[str, float | int | bool]:
-    """Return the metrics of one finished episode: their means over episodes are the paper's.
+class Task(ABC):
+    """Reward, end and metrics of one episode in one world.
 
     Parameters
     ----------
-    statistics
-        What was counted.
-    success
-        Done at the goal.
+    world
+        World at the episode's start; a task reads it and never changes it.
+    distances
+        Any-angle distances to the goal without obstacles.
+    config
+        Settings.
     shortest_path_m
-        L: any-angle distance from start to goal without obstacles.
-    steps
-        Steps taken, Done and waits included.
-    distance_m
-        Any-angle distance without obstacles from where the agent ended.
+        L of SPL, the distance from the start; looked up in `distances` if None.
+
+    Attributes
+    ----------
+    success : bool
+        Whether the task was fulfilled; known once Done was taken.
+    distance_m : float
+        Any-angle distance from the agent to the goal without obstacles, metres.
+    statistics : EpisodeStatistics
+        Counters and sums so far.
     """
-    path_m = SPACING_M * statistics.moves
-    return {
-        "success": success,
-        "distance_to_goal_m": distance_m,
-        "spl": shortest_path_m / max(path_m, shortest_path_m) if success else 0.0,
-        "sts": shortest_path_m / SPACING_M / steps if success else 0.0,
-        "steps": steps,
-        "path_m": path_m,
-        "pushes_tried": statistics.tried["push"],
-        "pushes_done": statistics.done["push"],
-        "picks_tried": statistics.tried["pick"],
-        "picks_done": statistics.done["pick"],
-        "drops_tried": statistics.tried["drop"],
-        "drops_done": statistics.done["drop"],
-        "interaction_reward_m": statistics.interaction_m,
-        "openings": statistics.openings,
-        "closings": statistics.closings,
-        "return": statistics.reward,
-    }
+
+    name: ClassVar[str]
+    """Key in `TASKS`, and value of the environments' argument `task`."""
+    start_beside: ClassVar[Kind | None] = None
+    """Interaction to be learnt; the agent begins beside an obstacle that it would act on."""
+    first_position: ClassVar[int] = 0
+    """Position of the first episode in the order of episodes."""
+
+    def __init__(
+        self,
+        world: World,
+        distances: ShortestPathField,
+        config: TaskConfig,
+        shortest_path_m: float | None = None,
+    ) -> None:
+        self.world, self.distances, self.config = world, distances, config
+        self.distance_m = distances.at(world.i, world.j)
+        self.shortest_path_m = self.distance_m if shortest_path_m is None else shortest_path_m
+        self.success = False
+        self.statistics = EpisodeStatistics()
+        self._lattice = world.lattice
+
+    @classmethod
+    def prepare(cls, episode: Episode) -> Episode:
+        """Return the episode as this task has it."""
+        return episode
+
+    @abstractmethod
+    def step(self, result: StepResult) -> tuple[float, bool]:
+        """Return the reward of an action that the world has just taken, and whether it ends."""
+
+    @abstractmethod
+    def metrics(self) -> dict[str, float | int | bool]:
+        """Return the metrics as of now; meant for the end."""
 
 
-STEP: Final = -0.01
-"""Every step, the last one and a `wait` included."""
-SUCCESS: Final = 10.0
-"""Done at the goal."""
-OPENED: Final = 1.0
-"""An interaction makes a way where there was none on the lattice; one that closes it costs it."""
+class InteractiveNavigation(Task):
+    """The main task: reach the goal, and move what is in the way (the paper's section 3)."""
+
+    name = "interactive"
+
+    def step(self, result: StepResult) -> tuple[float, bool]:
+        """Pay the step, and progress by a move, an interaction or Done."""
+        kind, reward = result.action.kind, STEP
+        self.statistics.steps += 1
+        if kind == "move":
+            reward += self._moved() if result.success else 0.0
+        elif kind in INTERACTION_KINDS:
+            reward += self._interacted(result)
+        elif kind == "done":
+            reward += self._ended(result)
+        self.statistics.reward += reward
+        self._lattice = self.world.lattice
+        return reward, kind == "done"
+
+    def metrics(self) -> dict[str, float | int | bool]:
+        """Return the metrics of the episode; their means over episodes are the paper's."""
+        statistics, length_m = self.statistics, self.shortest_path_m
+        path_m = SPACING_M * statistics.moves
+        return {
+            "success": self.success,
+            "distance_to_goal_m": self.distance_m,
+            "spl": length_m / max(path_m, length_m) if self.success else 0.0,
+            "sts": length_m / SPACING_M / statistics.steps if self.success else 0.0,
+            **statistics.metrics(),
+        }
+
+    def _moved(self) -> float:
+        """Return the drop of the any-angle distance without obstacles, metres."""
+        self.statistics.moves += 1
+        after = self.distances.at(self.world.i, self.world.j)
+        if math.isinf(after):
+            # Furniture was moved and let the agent into what is cut off else: the last distance
+            # stands, so that rewards still add up to start minus end on every loop.
+            return 0.0
+        before, self.distance_m = self.distance_m, after
+        return before - after
+
+    def _interacted(self, result: StepResult) -> float:
+        """Return what an interaction did to the path on the lattice, in reward."""
+        kind, statistics, world = result.action.kind, self.statistics, self.world
+        statistics.tried[kind] += 1
+        if not result.success:
+            return 0.0
+        statistics.done[kind] += 1
+        here = (world.i, world.j)
+        before = self._lattice.distance(here, world.goal)
+        after = world.lattice.distance(here, world.goal)
+        reward = interaction_reward(before, after)
+        if before is not None and after is not None:
+            statistics.interaction_m += reward
+        statistics.openings += before is None and after is not None
+        statistics.closings += before is not None and after is None
+        return reward
+
+    def _ended(self, result: StepResult) -> float:
+        """Return the reward of Done."""
+        self.success = result.success
+        return SUCCESS if result.success else self.config.failed_done_reward
 
 
-def move_reward(before_m: float, after_m: float) -> float:
-    """Pay the drop of the any-angle distance without obstacles, metres."""
-    return before_m - after_m
+class PointNavigation(InteractiveNavigation):
+    """Auxiliary task of Navigate: reach the goal, no obstacle about (the paper's section 5.2)."""
+
+    name = "navigate"
+    # Published training numbers left out the first episode of each order.
+    first_position = 1
+
+    @classmethod
+    def prepare(cls, episode: Episode) -> Episode:
+        """Return the episode without its obstacles."""
+        return replace(episode, obstacles=(), obstacle_count=0)
+
+    def metrics(self) -> dict[str, float | int | bool]:
+        """Return the main task's metrics, and success under the task's name."""
+        return {**super().metrics(), "auxiliary_reward": 0.0, "success_navigate": self.success}
+
+
+class _MoveAside(InteractiveNavigation):
+    """Auxiliary task: clear an obstacle away, and say Done (the paper's section 5.2).
+
+    It begins beside an obstacle, and Done is worth `SUCCESS` once the path from there is open, or
+    shorter by 0.25 m. The first success with each object pays r_as, each failure costs r_af.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        distances: ShortestPathField,
+        config: TaskConfig,
+        shortest_path_m: float | None = None,
+    ) -> None:
+        super().__init__(world, distances, config, shortest_path_m)
+        self._start = (world.i, world.j)
+        self._steps_before = self._path_steps()
+        self._rewarded: set[int] = set()
+
+    def step(self, result: StepResult) -> tuple[float, bool]:
+        """Pay as the main task does, and for the choice of interactions."""
+        reward, ended = super().step(result)
+        if result.action.kind in INTERACTION_KINDS:
+            extra = self._chosen(result)
+            self.statistics.auxiliary_reward += extra
+            self.statistics.reward += extra
+            reward += extra
+        return reward, ended
+
+    def metrics(self) -> dict[str, float | int | bool]:
+        """Return the metrics of the episode; it has no path to the goal, so no SPL and no STS."""
+        found = super().metrics()
+        del found["spl"], found["sts"]
+        extra = self.statistics.auxiliary_reward
+        return {**found, "auxiliary_reward": extra, f"success_{self.name}": self.success}
+
+    def _ended(self, result: StepResult) -> float:  # noqa: ARG002 - the goal is another one
+        self.success = is_cleared(self._steps_before, self._path_steps())
+        return SUCCESS * self.success
+
+    def _chosen(self, result: StepResult) -> float:
+        """Return r_as - r_af."""
+        if not result.success:
+            return -CHOSEN_ACTION
+        if result.target in self._rewarded:
+            return 0.0
+        self._rewarded.add(result.target)
+        return CHOSEN_ACTION
+
+    def _path_steps(self) -> int | None:
+        """Return the lattice distance from the episode's start to the goal, things as they lie."""
+        return self.world.lattice.distance(self._start, self.world.goal)
+
+
+class PushAside(_MoveAside):
+    """Auxiliary task of Push: push an obstacle out of the way."""
+
+    name = "push"
+    start_beside = "push"
+
+
+class PickAside(_MoveAside):
+    """Auxiliary task of Pick: carry an obstacle out of the way."""
+
+    name = "pick"
+    start_beside = "pick"
+
+
+TASKS: Final[dict[str, type[Task]]] = {
+    task.name: task for task in (InteractiveNavigation, PointNavigation, PushAside, PickAside)
+}
+"""Tasks by name."""
 
 
 def interaction_reward(before: int | None, after: int | None) -> float:
-    """Pay what an interaction did to the lattice distance (steps; None where cut off).
+    """Return what an interaction pays for its effect on the lattice distance to the goal.
 
-    The drop in metres while both are finite, +1 for opening the way, -1 for closing it.
+    Parameters
+    ----------
+    before, after
+        Lattice distance in steps; None where the goal is cut off.
+
+    Returns
+    -------
+    float
+        The drop in metres while both are finite, +1 for opening the path, -1 for closing it.
     """
     if before is None:
         return 0.0 if after is None else OPENED

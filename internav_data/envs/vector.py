@@ -94,7 +94,7 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         else:
             self._buffer = ObservationBuffer(camera, dict(buffers))
         self._autoreset, self._copy = autoreset, copy
-        self._over = np.zeros(num_envs, np.bool_)
+        self._done = np.zeros(num_envs, np.bool_)
 
     def reset(
         self,
@@ -132,7 +132,7 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         terminated, truncated = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
         said: list[tuple[int, dict[str, Any]]] = []
         for k, action in enumerate(asked):
-            if self._over[k]:
+            if self._done[k]:
                 said.append((k, self._again(k)))
                 continue
             run = self.slots[k].run
@@ -140,7 +140,7 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
             rewards[k], terminated[k], truncated[k] = step
             self._buffer.write(k, run)
             said.append((k, step_info(run, step)))
-        self._over = terminated | truncated
+        self._done = terminated | truncated
         infos = self._joined(said)
         return self._observations(), rewards, terminated, truncated, infos
 
@@ -155,7 +155,7 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         infos: dict[str, Any] = {}
         for k, (slot, state) in enumerate(zip(self.slots, states, strict=True)):
             run = slot.restore(state)
-            self._over[k] = run.over
+            self._done[k] = run.done
             self._buffer.write(k, run)
             infos = self._add_info(infos, {"episode_id": state.episode_id}, k)
         return self._observations(), infos
@@ -175,7 +175,7 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         start: Sequence[int] | None = None,
     ) -> dict[str, Any]:
         run = self.slots[k].begin(episode_id, actions, start)
-        self._over[k] = run.over
+        self._done[k] = run.done
         self._buffer.write(k, run)
         return {"episode_id": run.episode.episode_id}
 

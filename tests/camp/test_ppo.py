@@ -9,7 +9,6 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from internav_data.camp.agents import Auxiliary, make_agent  # noqa: E402
-from internav_data.camp.agents.options import NAVIGATE, PICK, PUSH  # noqa: E402
 from internav_data.camp.collect import Collector, orders_of, uniforms_of  # noqa: E402
 from internav_data.camp.ppo import explained_variance, set_rate, update  # noqa: E402
 from internav_data.camp.rollout import Rollout  # noqa: E402
@@ -48,7 +47,7 @@ def test_the_first_ratio_is_one_and_an_update_changes_what_is_optimised(collecte
 
 def test_auxiliary_tasks_learn_with_critics_of_their_own(collected, config):
     hierarchy = make_agent("camp", config())
-    agent = Auxiliary(hierarchy, [NAVIGATE, PUSH, PICK, PUSH])
+    agent = Auxiliary(hierarchy, ["navigate", "push", "pick", "push"])
     _, _, (rollout,) = collected("", rollouts=1, agent=agent)
     before = parameters(hierarchy)
     assert learnt(agent, rollout, config().ppo)["ratio_error"] < 1e-5

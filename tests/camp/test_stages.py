@@ -36,7 +36,13 @@ def test_the_papers_stages_are_one_policy_after_the_other():
     ]  # fmt: skip
     assert steps_of(stages, config)["single"] == pytest.approx(1e6, rel=1e-3)
     assert steps_of(stages, config)["all"] == pytest.approx(8e6, rel=1e-3)
-    assert [set(stage.tasks) for stage in stages] == [{0}, {1}, {2}, set(), set()]
+    assert [set(stage.tasks) for stage in stages] == [
+        {"navigate"},
+        {"push"},
+        {"pick"},
+        set(),
+        set(),
+    ]
     assert [stage.rate for stage in stages] == [3e-4, 3e-4, 3e-4, 1e-4, 1e-4]
     assert [stage.single_room for stage in stages] == [True, True, True, True, False]
     # One decay over all of it, each stage going on where the last one ended.
@@ -49,7 +55,7 @@ def test_the_papers_stages_are_one_policy_after_the_other():
 def test_small_trains_the_tasks_side_by_side_and_decays_in_each_stage():
     stages = plan(preset("small"), PARTS, hierarchical=True)
     assert [stage.name for stage in stages] == ["auxiliary", "single", "all"]
-    assert stages[0].tasks == (0,) * 6 + (1,) * 5 + (2,) * 5
+    assert stages[0].tasks == ("navigate",) * 6 + ("push",) * 5 + ("pick",) * 5
     assert {(stage.decay_from, stage.decay_to) for stage in stages} == {(0.0, 1.0)}
     assert [stage.critic for stage in stages] == ["auxiliary", "main", "main"]
     flat = plan(preset("small"), PARTS, hierarchical=False)

@@ -5,7 +5,6 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from internav_data.camp.agents import Auxiliary, make_agent  # noqa: E402
-from internav_data.camp.agents.options import NAVIGATE, PICK, PUSH  # noqa: E402
 from internav_data.camp.networks import EpisodeSegments  # noqa: E402
 
 LEARNERS = [
@@ -53,7 +52,7 @@ def test_log_probabilities_and_values_are_those_of_the_rollout(
 def test_auxiliary_tasks_are_replayed_too(collected, config, shared):
     hierarchy = make_agent("camp", config(network={"shared_encoder": shared}))
     agent, _, lived = collected(
-        "", rollouts=3, agent=Auxiliary(hierarchy, [NAVIGATE, PUSH, PICK, PUSH]), steps=16
+        "", rollouts=3, agent=Auxiliary(hierarchy, ["navigate", "push", "pick", "push"]), steps=16
     )
     for rollout in lived:
         now = agent.evaluate(rollout.batch)

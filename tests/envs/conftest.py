@@ -129,3 +129,11 @@ def small(tmp_path_factory):
     config = load_config(overrides=["episodes_per_scene=3", "house.rooms=1-2"])
     generate(out, config, 4, workers=1)
     return out
+
+
+@pytest.fixture(scope="session")
+def scenes(tmp_path_factory):
+    """Six houses of a single room, four of them to train on."""
+    out = tmp_path_factory.mktemp("train") / "d"
+    generate(out, load_config(overrides=["episodes_per_scene=4", "house.rooms=1"]), 6, workers=1)
+    return out

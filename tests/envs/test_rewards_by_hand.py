@@ -32,7 +32,7 @@ def test_a_crate_is_carried_out_of_a_door(hand_run):
     for _ in range(11):
         assert run.step(AHEAD) == (pytest.approx(0.24), False, False)
     assert run.step(DONE) == (pytest.approx(9.99), True, False)
-    said = run.metrics()
+    said = run.task.metrics()
     assert said["return"] == pytest.approx(12 * 0.24 + 0.99 + 9.99)
     assert said["success"]
     assert said["spl"] == pytest.approx(1.0)
@@ -48,16 +48,16 @@ def test_opening_and_closing_a_way_earns_nothing(hand_run):
     run = hand_run(divided=True)
     rewards = [run.step(action).reward for action in (PICK, DROP, PICK, DROP)]
     assert rewards == pytest.approx([0.99, -1.01, 0.99, -1.01])
-    assert (run.statistics.openings, run.statistics.closings) == (2, 2)
-    assert run.metrics()["picks_done"] == run.metrics()["drops_done"] == 2
+    assert (run.task.statistics.openings, run.task.statistics.closings) == (2, 2)
+    assert run.task.metrics()["picks_done"] == run.task.metrics()["drops_done"] == 2
 
 
 def test_a_shorter_way_earns_its_metres(hand_run):
     run = hand_run(divided=False)
     assert run.world.steps() == 20, "16 straight on, two up and two down round the crate"
     assert run.step(PICK).reward == pytest.approx(1.0 - 0.01)
-    assert run.metrics()["interaction_reward_m"] == pytest.approx(1.0)
-    assert run.metrics()["openings"] == 0
+    assert run.task.metrics()["interaction_reward_m"] == pytest.approx(1.0)
+    assert run.task.metrics()["openings"] == 0
 
 
 def test_failures_cost_a_step_and_are_counted(hand_run):
@@ -68,7 +68,7 @@ def test_failures_cost_a_step_and_are_counted(hand_run):
     for _ in range(2):
         run.step(LEFT)
     assert run.step(PICK).reward == -0.01, "behind the agent's back"
-    said = run.metrics()
+    said = run.task.metrics()
     assert [said[f"{kind}_tried"] for kind in ("pushes", "picks", "drops")] == [1, 1, 1]
     assert [said[f"{kind}_done"] for kind in ("pushes", "picks", "drops")] == [0, 0, 0]
     assert said["steps"] == 6
@@ -78,7 +78,7 @@ def test_failures_cost_a_step_and_are_counted(hand_run):
 def test_a_failed_done_ends_the_episode(hand_run, option):
     run = hand_run(divided=True, failed_done_reward=option)
     assert run.step(DONE) == (pytest.approx(option - 0.01), True, False)
-    said = run.metrics()
+    said = run.task.metrics()
     assert (said["success"], said["spl"], said["sts"]) == (False, 0.0, 0.0)
     assert said["distance_to_goal_m"] == pytest.approx(3.0)
 
@@ -88,7 +88,7 @@ def test_moves_on_a_loop_add_up_to_nothing(hand_run):
     steps = [AHEAD, LEFT, AHEAD, LEFT, AHEAD, LEFT, AHEAD, LEFT]
     total = sum(run.step(action).reward for action in steps)
     assert total == pytest.approx(-0.01 * len(steps))
-    assert run.metrics()["path_m"] == pytest.approx(1.0)
+    assert run.task.metrics()["path_m"] == pytest.approx(1.0)
 
 
 def test_a_crate_is_pushed_through_a_door_and_onto_the_goal(hand_run):
@@ -100,7 +100,7 @@ def test_a_crate_is_pushed_through_a_door_and_onto_the_goal(hand_run):
         run.step(AHEAD)
     # Twice it stays close behind the door, then it is out of the way, then it lies on the goal.
     assert pushes == pytest.approx([-0.01, -0.01, 0.99, -1.01])
-    assert (run.statistics.openings, run.statistics.closings) == (1, 1)
+    assert (run.task.statistics.openings, run.task.statistics.closings) == (1, 1)
     pose = run.world.items[0].pose
     assert run.props.poses[0, 9:].tolist() == [pose.x, pose.y, pose.z]
 

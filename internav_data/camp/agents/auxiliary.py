@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor
 
-from internav_data.camp.agents.options import ACTIONS_OF, NAVIGATE, option_inputs, option_step
+from internav_data.camp.agents.options import (
+    ACTIONS_OF,
+    NAVIGATE,
+    OPTION_NAMES,
+    option_inputs,
+    option_step,
+)
 from internav_data.camp.agents.protocol import (
     Agent,
     AgentStep,
@@ -40,18 +46,19 @@ class Auxiliary(Agent):
     hierarchy
         Whose policies are trained.
     tasks
-        The option of each environment: NAVIGATE, PUSH or PICK.
+        Task of each environment, named after the policy that it trains: "navigate", "push", "pick".
     trained
-        Options that are trained, here or on other ranks; those of the environments if not given.
+        Tasks that are trained, here or on other ranks; those of the environments if not given.
     """
 
     def __init__(
-        self, hierarchy: Hierarchy, tasks: Sequence[int], trained: Sequence[int] | None = None
+        self, hierarchy: Hierarchy, tasks: Sequence[str], trained: Sequence[str] | None = None
     ) -> None:
         super().__init__()
         self.hierarchy = hierarchy
-        self._tasks = torch.tensor(tasks, dtype=torch.int64)
-        self._trained = sorted(set(tasks if trained is None else trained))
+        number = {str(name): k for k, name in enumerate(OPTION_NAMES)}
+        self._tasks = torch.tensor([number[task] for task in tasks], dtype=torch.int64)
+        self._trained = sorted({number[task] for task in (trained or tasks)})
 
     def initial_state(self, count: int) -> State:
         """See `Agent`."""

@@ -1,55 +1,64 @@
 """The auxiliary tasks: where they begin, what they pay, and that they can be built again."""
 
+import json
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 
-torch = pytest.importorskip("torch")
-
-from internav_data.camp.agents.options import NAVIGATE, PICK, PUSH  # noqa: E402
-from internav_data.camp.auxiliary_tasks import AuxiliaryTasks  # noqa: E402
-from internav_data.dataset import load_dataset  # noqa: E402
-from internav_data.envs.tasks import STEP, SUCCESS, interaction_reward  # noqa: E402
-from internav_data.records.errors import CorruptDataError, UsageError  # noqa: E402
+from internav_data.dataset import load_dataset
+from internav_data.envs import InterNavProcesses, InterNavVectorEnv
+from internav_data.envs.slot import EpisodeSnapshot
+from internav_data.envs.tasks import STEP, SUCCESS, TASKS, interaction_reward
+from internav_data.records.errors import CorruptDataError, UsageError
 
 AHEAD, PUSH_AHEAD, PICKUP, DONE = 0, 5, 9, 11
-TASKS = (NAVIGATE, NAVIGATE, PUSH, PUSH, PICK, PICK)
+NAMES = ("navigate", "navigate", "push", "push", "pick", "pick")
 
 
 @pytest.fixture
 def tasks(scenes):
     made = []
 
-    def make(options=TASKS, seed=0, **arguments):
+    def make(names=NAMES, seed=0, **arguments):
         data = load_dataset(scenes, "train")
-        made.append(AuxiliaryTasks(data, options, image_size=16, max_steps=40, **arguments))
-        made[-1].begin(seed)
-        return made[-1]
+        env = InterNavVectorEnv(
+            len(names), data, 16, autoreset=False, copy=False, max_steps=40, task=names, **arguments
+        )
+        env.reset(seed=seed)
+        made.append(env)
+        return env
 
     yield make
     for each in made:
         each.close()
 
 
-def plays(task):
-    return [slot.run for _, _, env in task._parts for slot in env.slots]
+def plain(state):
+    """Write a snapshot as JSON and read it: what a checkpoint does."""
+    return json.loads(json.dumps(asdict(state)))
+
+
+def runs(env):
+    return [slot.run for slot in env.slots]
 
 
 def test_each_begins_where_its_task_is(tasks):
     """Navigate without obstacles; Push and Pick before the very thing they are to move."""
     for seed in range(3):
-        for option, play in zip(TASKS, plays(tasks(seed=seed)), strict=True):
-            if option == NAVIGATE:
+        for name, play in zip(NAMES, runs(tasks(seed=seed)), strict=True):
+            if name == "navigate":
                 assert not play.world.obstacles
                 assert play.start is None
             else:
-                target = play.world.target(pick=option == PICK)
+                target = play.world.target(pick=name == "pick")
                 assert target in play.world.obstacles
                 assert play.start is not None
 
 
 def test_a_success_pays_once_for_each_object_and_a_failure_costs(tasks):
-    task = tasks((PICK,))
-    (play,) = plays(task)
+    task = tasks(("pick",))
+    (play,) = runs(task)
     before = play.world.lattice.distance((play.world.i, play.world.j), play.world.goal)
     _, reward, *_ = task.step(np.array([PICKUP]))
     after = play.world.lattice.distance((play.world.i, play.world.j), play.world.goal)
@@ -62,7 +71,7 @@ def test_a_success_pays_once_for_each_object_and_a_failure_costs(tasks):
     before = play.world.lattice.distance(here, goal)
     again = task.step(np.array([PICKUP]))
     assert again[4]["action_success"][0]
-    assert task._notes[0]["paid"] == [int(again[4]["target"][0])], "the same thing"
+    assert again[4]["target"][0] == drop[4]["target"][0], "the same thing"
     after = play.world.lattice.distance(here, goal)
     assert again[1][0] == pytest.approx(STEP + interaction_reward(before, after))
 
@@ -71,8 +80,8 @@ def test_done_pays_where_the_obstacle_is_out_of_the_way_and_only_there(tasks):
     paid = set()
     for seed in range(6):
         for acts in ([], [PICKUP]):
-            task = tasks((PICK,), seed)
-            (play,) = plays(task)
+            task = tasks(("pick",), seed)
+            (play,) = runs(task)
             here = play.start[:2]
             before = play.world.lattice.distance(here, play.world.goal)
             for action in acts:
@@ -106,9 +115,10 @@ def test_what_they_are_can_be_told_and_built_again(tasks):
         return seen, sums
 
     live(task, 60, rng)
+    seen = {name: array.copy() for name, array in task.step(np.full(6, -1))[0].items()}
     states, other = task.state(), tasks(seed=99)
-    look = other.restore(states)
-    for name, array in task._seen.items():
+    look, _ = other.restore([EpisodeSnapshot.from_json(plain(state)) for state in states])
+    for name, array in seen.items():
         np.testing.assert_array_equal(look[name], array)
     assert other.state() == states
     one, two = (live(some, 60, np.random.default_rng(1)) for some in (task, other))
@@ -116,23 +126,61 @@ def test_what_they_are_can_be_told_and_built_again(tasks):
         for name, array in mine.items():
             np.testing.assert_array_equal(theirs[name], array)
     np.testing.assert_array_equal(one[1], two[1])
-    with pytest.raises(CorruptDataError, match="expected 6"):
+    with pytest.raises(UsageError, match="expected 6"):
         other.restore(states[:3])
+
+
+@pytest.mark.parametrize(
+    "damage", [{"actions": None}, {"start": [1]}, {"seed": "x"}, {"position": None}]
+)
+def test_a_damaged_snapshot_is_refused(tasks, damage):
+    (state,) = tasks(("push",)).state()
+    with pytest.raises(CorruptDataError, match="no state of an environment"):
+        EpisodeSnapshot.from_json({**plain(state), **damage})
+    with pytest.raises(CorruptDataError, match="no state of an environment"):
+        EpisodeSnapshot.from_json({})
+
+
+def test_processes_have_the_same_tasks(scenes, tasks):
+    whole = tasks(seed=2)
+    two = InterNavProcesses(
+        6, load_dataset(scenes, "train"), 2, 16, autoreset=False, max_steps=40, task=NAMES
+    )
+    try:
+        seen, _ = two.reset(seed=2)
+        assert two.state() == whole.state()
+        for acts in ([0, 1, 5, 6, 9, 9], [11] * 6):
+            ours, theirs = whole.step(np.array(acts)), two.step(np.array(acts))
+            np.testing.assert_array_equal(ours[1], theirs[1])
+            assert ours[4].get("metrics", {}).keys() == theirs[4].get("metrics", {}).keys()
+        seen, *_ = theirs
+        np.testing.assert_array_equal(seen["rgb"], ours[0]["rgb"])
+    finally:
+        two.close()
+
+
+def test_every_task_has_its_name_and_an_unknown_one_is_refused(scenes):
+    for name, task in TASKS.items():
+        assert task.name == name
+    with pytest.raises(UsageError, match="task: expected one of"):
+        InterNavVectorEnv(2, scenes, 16, task="wander")
+    with pytest.raises(UsageError, match="or 2 of them"):
+        InterNavVectorEnv(2, scenes, 16, task=["push"])
 
 
 def test_a_share_of_the_environments_is_that_part_of_all(tasks):
     """Another rank's environments are those that one process would have had."""
-    whole, part = tasks(seed=5), tasks(TASKS[3:], seed=5 + 3)
-    for mine, theirs in zip(plays(whole)[3:], plays(part), strict=True):
+    whole, part = tasks(seed=5), tasks(NAMES[3:], seed=5 + 3)
+    for mine, theirs in zip(runs(whole)[3:], runs(part), strict=True):
         assert mine.episode.episode_id == theirs.episode.episode_id
         assert mine.start == theirs.start
-    for name, array in whole._seen.items():
-        np.testing.assert_array_equal(array[3:], part._seen[name])
-    kept = [{**state} for state in whole.state()[3:]]
-    assert [state["order"] for state in kept] == [state["order"] for state in part.state()]
+    assert whole.state()[3:] == part.state()
+    ours, theirs = whole.step(np.full(6, -1))[0], part.step(np.full(3, -1))[0]
+    for name, array in ours.items():
+        np.testing.assert_array_equal(array[3:], theirs[name])
 
 
 def test_who_has_nothing_to_learn_from_is_told(scenes):
     data = load_dataset(scenes, "train", [("obstacle_count", "<", 0)])
     with pytest.raises(UsageError):
-        AuxiliaryTasks(data, (PUSH,), image_size=16).begin(0)
+        InterNavVectorEnv(1, data, 16, task="push").reset(seed=0)
