@@ -83,6 +83,13 @@ def actions() -> str:
     return "\n".join(["| | action | effect |", "|---|---|---|", *rows])
 
 
+def room_types() -> str:
+    """Return the room types in one line."""
+    from internav_data.houses.room_types import ROOM_TYPES  # noqa: PLC0415
+
+    return f"- Types: {', '.join(sorted(ROOM_TYPES))}. Up to 40 rooms."
+
+
 def commands() -> str:
     """Return the commands as a table."""
     rows = [f"| `internav-gen {name}` | {text} |" for name, text in COMMANDS.items()]
@@ -101,11 +108,12 @@ def updated() -> dict[Path, str]:
     """Return texts as they should be."""
     readme, configuration = ROOT / "README.md", ROOT / "docs" / "configuration.md"
     training, environment = ROOT / "docs" / "training.md", ROOT / "docs" / "environment.md"
-    written = training.read_text(encoding="utf-8")
+    plans, written = ROOT / "docs" / "floor-plans.md", training.read_text(encoding="utf-8")
     return {
         readme: replaced(readme.read_text(encoding="utf-8"), "commands", commands()),
         configuration: replaced(configuration.read_text(encoding="utf-8"), "settings", settings()),
         environment: replaced(environment.read_text(encoding="utf-8"), "actions", actions()),
+        plans: replaced(plans.read_text(encoding="utf-8"), "room types", room_types()),
         training: replaced(written, "training settings", training_settings()),
     }
 

@@ -5,17 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from internav_data.houses.standards import (
-    DOOR_CLEAR_CM,
-    HALF_WALL_CM,
-    PRIVATE,
-    PUBLIC,
-    type_pair,
-)
+from internav_data.houses.room_types import ROOM_PAIRS, ROOM_TYPES, type_pair
+from internav_data.houses.standards import DOOR_CLEAR_CM, HALF_WALL_CM
 from internav_data.records import OUTSIDE
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from numpy.random import Generator
 
@@ -26,35 +21,8 @@ JAMB_CM = 10
 DEPTH_CM = HALF_WALL_CM + DOOR_CLEAR_CM + HALF_WALL_CM
 """Centre-line depth that a room needs behind a door."""
 
-_COST: Mapping[tuple[str, str], float] = {
-    ("bathroom", "bedroom"): 6.0,
-    ("bathroom", "dining"): 5.0,
-    ("bathroom", "hall"): 1.8,
-    ("bathroom", "kitchen"): 4.0,
-    ("bathroom", "laundry"): 8.0,
-    ("bathroom", "living"): 3.5,
-    ("bathroom", "studio"): 2.0,
-    ("bedroom", "dining"): 4.5,
-    ("bedroom", "hall"): 2.0,
-    ("bedroom", "kitchen"): 4.5,
-    ("bedroom", "living"): 3.0,
-    ("bedroom", "studio"): 3.0,
-    ("dining", "hall"): 2.8,
-    ("dining", "kitchen"): 0.5,
-    ("dining", "living"): 0.6,
-    ("hall", "kitchen"): 2.6,
-    ("hall", "living"): 0.5,
-    ("hall", "office"): 2.0,
-    ("hall", "storage"): 2.0,
-    ("hall", "laundry"): 2.2,
-    ("kitchen", "laundry"): 2.0,
-    ("kitchen", "living"): 0.8,
-    ("kitchen", "storage"): 2.4,
-    ("living", "office"): 2.6,
-    ("living", "storage"): 3.2,
-}
-"""How unusual a door between two types (sorted) is."""
-_UNKNOWN_PUBLIC, _UNKNOWN_MIXED, _UNKNOWN_PRIVATE = 1.2, 4.0, 14.0
+_UNKNOWN_COST = (1.2, 4.0, 14.0)
+"""Door costs of pairs without an entry, by the number of private rooms among the two."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,10 +43,9 @@ class WallSpan:
 def door_cost(first: str, second: str) -> float:
     """Return how unusual a door between two types of room is."""
     key = type_pair(first, second)
-    if key in _COST:
-        return _COST[key]
-    private = (first in PRIVATE) + (second in PRIVATE)
-    return (_UNKNOWN_PUBLIC, _UNKNOWN_MIXED, _UNKNOWN_PRIVATE)[private]
+    if key in ROOM_PAIRS:
+        return ROOM_PAIRS[key].door_cost
+    return _UNKNOWN_COST[ROOM_TYPES[first].private + ROOM_TYPES[second].private]
 
 
 def _deep_enough(grid: FloorGrid, segment: WallSegment, m: int, side: int) -> bool:
@@ -191,15 +158,9 @@ def loop_doors(
     out: list[tuple[int, int]] = []
     for a, b in sorted(set(edges) - set(tree)):
         draw = float(rng.random())
-        names = {types[a], types[b]}
-        if names <= PUBLIC:
-            wish = 1.0
-        elif names in ({"bathroom", "bedroom"}, {"kitchen", "laundry"}, {"hall", "laundry"}):
-            wish = 0.5
-        elif names in ({"living", "office"}, {"hall", "office"}, {"bedroom", "living"}):
-            wish = 0.35
-        else:
-            continue
+        pair = ROOM_PAIRS.get(type_pair(types[a], types[b]))
+        public = not (ROOM_TYPES[types[a]].private or ROOM_TYPES[types[b]].private)
+        wish = 1.0 if public else pair.loop_share if pair is not None else 0.0
         if draw < share * wish:
             out.append((a, b))
     return out

@@ -8,16 +8,8 @@ from typing import TYPE_CHECKING
 from internav_data.houses.access import door_tree, possible_doors
 from internav_data.houses.layouts import draw_layout, row_layout
 from internav_data.houses.plan import FloorGrid, FloorPlan, clear_size_m
-from internav_data.houses.standards import (
-    HABITABLE,
-    HALF_WALL_CM,
-    MIN_DOOR_CM,
-    PRIVATE,
-    PUBLIC,
-    WALL_CM,
-    WANTED,
-    type_pair,
-)
+from internav_data.houses.room_types import ROOM_PAIRS, ROOM_TYPES, type_pair
+from internav_data.houses.standards import HALF_WALL_CM, MIN_DOOR_CM, WALL_CM
 from internav_data.records import OUTSIDE, FloorPlanStream, Purpose, generator
 from internav_data.records.errors import QuarantineError
 
@@ -68,7 +60,7 @@ def _room_score(grid: FloorGrid, room: int, spec: RoomSpec, *, lenient: bool) ->
     score += 1.5 * max(0.0, clear / standard.high_m2 - 1.0)
     # Nooks that are neither room nor corridor look wrong.
     score += 1.5 * max(0.0, 0.62 - (main[2] - main[0]) * (main[3] - main[1]) / 1e4 / area)
-    if spec.type in HABITABLE:
+    if ROOM_TYPES[spec.type].habitable:
         outside = [s.length for s in grid.segments if _between(s.before, s.after, room, OUTSIDE)]
         score += 0.0 if outside and max(outside) >= DAYLIGHT_CM else 3.0
     return score
@@ -83,11 +75,13 @@ def _through_private(types: Sequence[str], tree: Sequence[tuple[int, int]]) -> f
     score = 0.0
     for a, b in tree:
         names = (types[a], types[b])
-        if names[0] in PRIVATE and names[1] in PRIVATE:
+        if all(ROOM_TYPES[name].private for name in names):
             score += 0.3 if set(names) == {"bathroom", "bedroom"} else 3.0
     for room, name in enumerate(types):
-        if name in PRIVATE:
-            doors = sum(1 for a, b in tree if room in {a, b} and types[a + b - room] in PUBLIC)
+        if ROOM_TYPES[name].private:
+            doors = sum(
+                1 for a, b in tree if room in {a, b} and not ROOM_TYPES[types[a + b - room]].private
+            )
             score += 4.0 * max(0, doors - 1)
         if name == "bathroom":
             # A bathroom may hang off a bedroom; nobody should have to walk through one.
@@ -173,8 +167,8 @@ def score_floor_plan(
     score += 2.0 * max(0.0, max(width, depth) / min(width, depth) - 1.8)
     present = {type_pair(types[a], types[b]) for a, b in edges}
     score += sum(
-        weight
-        for names, weight in WANTED.items()
+        pair.shared_wall
+        for names, pair in ROOM_PAIRS.items()
         if names[0] in types and names[1] in types and names not in present
     )
     halls = [k for k, name in enumerate(types) if name == "hall"]

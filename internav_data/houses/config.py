@@ -7,7 +7,8 @@ from dataclasses import dataclass, fields
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
-from internav_data.houses.standards import MAX_ROOMS, ROOM_TYPES
+from internav_data.houses.room_types import ROOM_TYPES
+from internav_data.houses.standards import MAX_ROOMS
 from internav_data.records import HousePreset  # noqa: TC001 - fields' types are read at run time
 from internav_data.records.errors import UsageError
 
@@ -159,8 +160,10 @@ def _programme(text: str) -> tuple[str, ...]:
     for entry in text.split(","):
         name, colon, number = (piece.strip() for piece in entry.partition(":"))
         if name not in ROOM_TYPES:
-            near = get_close_matches(name, ROOM_TYPES, 1)
-            hint = f"did you mean '{near[0]}'?" if near else f"types: {', '.join(ROOM_TYPES)}"
+            near = get_close_matches(name, sorted(ROOM_TYPES), 1)
+            hint = (
+                f"did you mean '{near[0]}'?" if near else f"types: {', '.join(sorted(ROOM_TYPES))}"
+            )
             raise UsageError(f"rooms '{text}': no room type '{name}'; {hint} Give {COUNT_HELP}")
         count = 1
         if colon:

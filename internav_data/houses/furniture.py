@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 from internav_data.geometry import round_m
 from internav_data.houses.furnishing import RoomState, quarter_quaternion, room_state
+from internav_data.houses.group_makers import GROUP_MAKERS
 from internav_data.houses.groups import RoomContext
 from internav_data.houses.pieces import Picker, consistent
-from internav_data.houses.rules import RULES
+from internav_data.houses.room_types import ROOM_TYPES
 from internav_data.records import Purpose, SceneObject, generator
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
     from internav_data.catalog import Catalogue
     from internav_data.houses.plan import FloorGrid, Opening
-    from internav_data.houses.rules import FurnitureRule
+    from internav_data.houses.room_types import FurnitureRule
 
 CERTAIN = 1.0
 """Rules of this share are what a room cannot do without."""
@@ -67,7 +68,7 @@ def _times(rule: FurnitureRule, picker: Picker, area_m2: float, density: float) 
 def _furnish_room(state: RoomState, types: frozenset[str], picker: Picker, density: float) -> None:
     width, depth = float(state.inner[2] - state.inner[0]), float(state.inner[3] - state.inner[1])
     room = RoomContext(state.area_m2, state.short_m, max(width, depth), types)
-    for rule in RULES[state.type]:
+    for rule in ROOM_TYPES[state.type].furniture:
         times = _times(rule, picker, state.area_m2, density)
         present = {item.asset.type for group, *_ in state.placed for item in group.items}
         if rule.without in types or rule.lacking in present:
@@ -78,13 +79,13 @@ def _furnish_room(state: RoomState, types: frozenset[str], picker: Picker, densi
 
 
 def _try_rule(state: RoomState, rule: FurnitureRule, room: RoomContext, picker: Picker) -> bool:
-    for group in rule.make(picker, room):
+    for group in GROUP_MAKERS[rule.group](picker, room):
         if not consistent(picker, group):
             continue
         poses = (
             state.in_the_open(group, picker.rng)
-            if rule.prefer == "open"
-            else state.along_walls(group, picker.rng, rule.prefer)
+            if rule.placement == "open"
+            else state.along_walls(group, picker.rng, rule.placement)
         )
         if state.place(group, poses):
             return True

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from internav_data.houses.room_types import ROOM_TYPES
 from internav_data.houses.slicing import (
     GRID_CM,
     Layout,
@@ -24,23 +25,9 @@ if TYPE_CHECKING:
     from internav_data.houses.plan import Rect
     from internav_data.houses.programme import RoomSpec
 
-_ORDER = (
-    "laundry",
-    "kitchen",
-    "dining",
-    "living",
-    "studio",
-    "hall",
-    "office",
-    "storage",
-    "bathroom",
-    "bedroom",
-)
-"""Rooms near each other here want to be near each other in the house."""
-_SMALL = frozenset({"bathroom", "laundry", "storage"})
-_LIVING = ("living", "dining", "kitchen")
-_WING = frozenset({"bedroom", "office", "bathroom", "laundry"})
-"""What may be reached through the living room of a larger house."""
+
+def _position(spec: RoomSpec) -> int:
+    return ROOM_TYPES[spec.type].position
 
 
 def _uniform(rng: Generator, low: float, high: float) -> float:
@@ -59,7 +46,7 @@ def _min_depth(specs: Sequence[RoomSpec], rooms: Sequence[int]) -> int:
 
 def sliced_layout(specs: Sequence[RoomSpec], rng: Generator) -> Layout:
     """One block cut by a slicing tree."""
-    order = sorted(range(len(specs)), key=lambda k: (_ORDER.index(specs[k].type), k))
+    order = sorted(range(len(specs)), key=lambda k: (_position(specs[k]), k))
     if float(rng.random()) < 0.35:  # noqa: PLR2004 - other orders now and then
         order = _shuffled(rng, order)
     area = sum(spec.area_m2 for spec in specs) * 1e4
@@ -88,15 +75,15 @@ def _split_bands(
 
 def _cells(specs: Sequence[RoomSpec], band: list[int], rng: Generator) -> list[tuple[int, ...]]:
     """Group a band's rooms: a small room shares the cell of a large one that wraps around it."""
-    small = [k for k in band if specs[k].type in _SMALL]
-    large = [k for k in band if specs[k].type not in _SMALL]
+    small = [k for k in band if ROOM_TYPES[specs[k].type].small]
+    large = [k for k in band if not ROOM_TYPES[specs[k].type].small]
     cells: list[tuple[int, ...]] = [(k,) for k in large]
     for k in small:
         hosts = [
             m
             for m, cell in enumerate(cells)
             if len(cell) == 1
-            and specs[cell[0]].type in {"bedroom", "living", "office"}
+            and ROOM_TYPES[specs[cell[0]].type].host
             and specs[cell[0]].area_m2 > 1.5 * specs[k].area_m2
         ]
         if hosts and float(rng.random()) < 0.7:  # noqa: PLR2004 - mostly wrapped
@@ -172,10 +159,14 @@ def _end_zone(
     draw, reach = float(rng.random()), 1 + int(float(rng.random()) * 3)
     if len(rest) <= 3 or draw > 0.85:  # noqa: PLR2004 - four rooms have an end to spare
         return []
-    end = [k for name in _LIVING for k in rest if specs[k].type == name][:reach]
-    others = [k for k in _shuffled(rng, rest) if specs[k].type in _WING]
+    # Living rooms in the order of the table, whatever the programme's.
+    ranks = {k: ROOM_TYPES[specs[k].type].hall_end for k in rest}
+    fitting = [(rank, k) for k, rank in ranks.items() if rank is not None]
+    living = [k for _, k in sorted(fitting, key=lambda pair: pair[0])]
+    end = living[:reach]
+    others = [k for k in _shuffled(rng, rest) if ROOM_TYPES[specs[k].type].wing]
     if end and float(rng.random()) < wings:
-        end = [k for name in _LIVING for k in rest if specs[k].type == name]
+        end = living
         further = 1 + int(float(rng.random()) * max(1, len(rest) - len(end) - 2))
         end = end[:1] + others[:further] + end[1:]
     return end if len(rest) - len(end) >= 2 else []  # noqa: PLR2004 - a hall serves two at least
@@ -225,9 +216,7 @@ def row_layout(specs: Sequence[RoomSpec]) -> Layout:
     halls = [k for k, spec in enumerate(specs) if spec.type == "hall"]
     along = halls[0] if halls and len(specs) > 2 else None  # noqa: PLR2004 - two need no hall
     # Public rooms in the middle, so that fewer private ones are passed through.
-    rest = sorted(
-        (k for k in range(len(specs)) if k != along), key=lambda k: _ORDER.index(specs[k].type)
-    )
+    rest = sorted((k for k in range(len(specs)) if k != along), key=lambda k: _position(specs[k]))
     deepest = max(300, _min_depth(specs, rest))
     largest = max(specs[k].area_m2 for k in rest) * 1e4
     # Not deeper than wide for the largest: the smallest would become slivers.
@@ -250,7 +239,7 @@ def notch(layout: Layout, specs: Sequence[RoomSpec], rng: Generator) -> None:
     y0 = min(r[1] for rects in layout.values() for r in rects)
     y1 = max(r[3] for rects in layout.values() for r in rects)
     for room, rects in layout.items():
-        if len(rects) != 1 or specs[room].type in _SMALL or specs[room].type == "hall":
+        if len(rects) != 1 or ROOM_TYPES[specs[room].type].small or specs[room].type == "hall":
             continue
         rx0, ry0, rx1, ry1 = rects[0]
         if not ((rx0 == x0 or rx1 == x1) and (ry0 == y0 or ry1 == y1)):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from internav_data.houses.room_types import ROOM_TYPES
 from internav_data.records import Material, Purpose, generator
 
 if TYPE_CHECKING:
@@ -43,9 +44,6 @@ _WALLS: Mapping[str, tuple[RGB, str]] = {
     "aqua wall tiles": ((176, 212, 214), "tiles"),
     "red bricks": ((168, 96, 76), "bricks"),
 }
-_WET = frozenset({"bathroom", "laundry"})
-_TILED = frozenset({"kitchen", "storage", *_WET})
-_QUIET = frozenset({"bedroom", "office"})
 
 
 def _names(table: Mapping[str, tuple[RGB, str]], patterns: set[str]) -> list[str]:
@@ -69,19 +67,20 @@ def draw_materials(
     usual = one(["white paint", "cream paint", "grey paint"])
     chosen: list[tuple[str, str]] = []
     for name in types:
+        record = ROOM_TYPES[name]
         floor_draw, wall_draw = float(rng.random()), float(rng.random())
         floor, wall = dry, usual
         own, wall_own = one(_names(_FLOORS, {"carpet"})), one(_names(_WALLS, {"plain", "stripes"}))
         tiles, brick = one(_names(_WALLS, {"tiles"})), "red bricks"
-        if name in _TILED:
+        if record.floor == "tiles":
             floor = wet
-        elif name in _QUIET and floor_draw < 0.35:  # noqa: PLR2004 - a third of the bedrooms
+        elif record.floor == "carpet" and floor_draw < 0.35:  # noqa: PLR2004 - a third of the bedrooms
             floor = own
-        if name in _WET:
+        if record.wall == "tiles":
             wall = tiles
         elif wall_draw < 0.35:  # noqa: PLR2004 - a third of the rooms have a colour of their own
             wall = wall_own
-        elif name in {"living", "studio"} and wall_draw > 0.93:  # noqa: PLR2004 - bricks are rare
+        elif record.wall == "bricks" and wall_draw > 0.93:  # noqa: PLR2004 - bricks are rare
             wall = brick
         chosen.append((floor, wall))
     used = sorted({name for names in chosen for name in names})

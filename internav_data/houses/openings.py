@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 from internav_data.houses.access import JAMB_CM, WallSpan, loop_doors, possible_doors, spans
 from internav_data.houses.plan import Opening
-from internav_data.houses.standards import HABITABLE, MIN_DOOR_CM, PUBLIC
+from internav_data.houses.room_types import ROOM_PAIRS, ROOM_TYPES, type_pair
+from internav_data.houses.standards import MIN_DOOR_CM
 from internav_data.records import OUTSIDE, Purpose, generator
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from numpy.random import Generator
 
@@ -18,25 +19,21 @@ if TYPE_CHECKING:
     from internav_data.houses.plan import FloorGrid, FloorPlan
     from internav_data.records import DoorKind
 
-OPEN_PLAN = (
-    frozenset({"kitchen", "living"}),
-    frozenset({"dining", "kitchen"}),
-    frozenset({"dining", "living"}),
-)
-"""Pairs of types that may share one wide opening."""
 
-
-def _kind(names: frozenset[str], config: HouseConfig, rng: Generator) -> tuple[DoorKind, int]:
-    """Choose a door's kind and width, centimetres."""
+def _kind(types: tuple[str, str], config: HouseConfig, rng: Generator) -> tuple[DoorKind, int]:
+    """Choose a door's kind and width, centimetres, from the types of its two rooms."""
     draw, size = float(rng.random()), float(rng.random())
-    open_kind: DoorKind = "doorway" if names <= PUBLIC and draw > 0.7 else "single"  # noqa: PLR2004
+    first, second = (ROOM_TYPES[name] for name in types)
+    public = not (first.private or second.private)
+    open_kind: DoorKind = "doorway" if public and draw > 0.7 else "single"  # noqa: PLR2004
     if config.preset == "realistic":
-        if names & {"bathroom", "laundry", "storage"}:
+        if first.small or second.small:
             return "single", 78 + 2 * int(size * 3)
         return open_kind, 80 + 2 * int(size * 9)
-    if not names <= PUBLIC or draw >= config.wide_openings:
+    if not public or draw >= config.wide_openings:
         return open_kind, 100
-    if names in OPEN_PLAN and size < 0.5:  # noqa: PLR2004 - half of them are open plan
+    pair = ROOM_PAIRS.get(type_pair(*types))
+    if pair is not None and pair.open_plan and size < 0.5:  # noqa: PLR2004 - half of them are open
         return "opening", 240
     return ("wide", 150) if size < 0.8 else ("double", 200)  # noqa: PLR2004
 
@@ -63,7 +60,7 @@ def draw_doors(
     loops = loop_doors(types, sorted(possible), floor_plan.tree, config.loops, rng)
     out: list[Opening] = []
     for a, b in sorted([*floor_plan.tree, *loops]):
-        kind, width = _kind(frozenset({types[a], types[b]}), config, rng)
+        kind, width = _kind((types[a], types[b]), config, rng)
         span = possible[a, b][0]
         if span.length < width:
             kind, width = _fitting(span.length, config)
@@ -86,13 +83,12 @@ def _entrance(
 ) -> Opening | None:
     """One closed door to the outside: at a hall's end if there is one."""
     width = 100 if config.preset == "paper" else 92
-    likely = ("hall", "living", "studio", "kitchen", "dining")
     best: tuple[float, WallSpan, int] | None = None
     for segment in grid.segments:
         if OUTSIDE not in {segment.before, segment.after}:
             continue
         room = max(segment.before, segment.after)
-        rank = likely.index(types[room]) if types[room] in likely else len(likely)
+        rank = ROOM_TYPES[types[room]].entrance
         for span in spans(grid, segment):
             if span.length < width:
                 continue
@@ -105,20 +101,6 @@ def _entrance(
     _, span, room = best
     low = _placed(span, width, rng)
     return Opening(span.along_x, span.at, low, low + width, (OUTSIDE, room), "entrance")
-
-
-_WINDOWS: Mapping[str, tuple[int, int, int]] = {
-    "bathroom": (60, 140, 60),
-    "laundry": (60, 140, 60),
-    "storage": (60, 150, 50),
-    "hall": (90, 100, 110),
-    "kitchen": (120, 112, 100),
-    "living": (180, 60, 150),
-    "studio": (140, 112, 100),
-    "dining": (150, 80, 130),
-}
-"""Width, sill and height by type, centimetres."""
-_USUAL_WINDOW = (130, 90, 122)
 
 
 def draw_windows(
@@ -138,17 +120,18 @@ def draw_windows(
         room = max(segment.before, segment.after)
         name = floor_plan.types[room]
         cooking = name == "living" and "kitchen" not in floor_plan.types
-        width, sill, height = _WINDOWS.get("studio" if cooking else name, _USUAL_WINDOW)
+        width, sill, height = ROOM_TYPES["studio" if cooking else name].window
         top = min(sill + height, ceiling_cm - 15)
         room_for = (segment.length - 2 * JAMB_CM) // (width + 110)
         if room_for == 0 and segment.length >= width + 6 * JAMB_CM:
             room_for = 1
-        max_count = room_for if name in HABITABLE else min(1, room_for)
+        habitable = ROOM_TYPES[name].habitable
+        max_count = room_for if habitable else min(1, room_for)
         pitch = segment.length / max(1, max_count)
         for k in range(max_count):
             centre = segment.low + round((k + 0.5) * pitch + 10.0 * (float(rng.random()) - 0.5))
             low, high = centre - width // 2, centre + width - width // 2
-            if float(rng.random()) < (0.85 if name in HABITABLE else 0.6) and not any(
+            if float(rng.random()) < (0.85 if habitable else 0.6) and not any(
                 d.along_x == segment.along_x
                 and d.at == segment.at
                 and low < d.high + 20

@@ -6,7 +6,7 @@
 
     [[rooms]]
     name = "kitchen"                      # optional: the type serves where it is unique
-    type = "kitchen"                      # see internav_data.houses.standards.ROOM_TYPES
+    type = "kitchen"                      # see internav_data.houses.room_types.ROOM_TYPES
     polygon = [[0, 0], [4, 0], [4, 3], [0, 3]]
 
     [[doors]]
@@ -37,7 +37,8 @@ from typing import TYPE_CHECKING, Any
 from internav_data.houses.access import JAMB_CM, spans
 from internav_data.houses.plan import FloorPlan, Opening
 from internav_data.houses.plan_shapes import FloorPlanError, lay_out, read_polygon
-from internav_data.houses.standards import CEILING_CM, DOOR_CLEAR_CM, ROOM_TYPES
+from internav_data.houses.room_types import ROOM_TYPES
+from internav_data.houses.standards import CEILING_CM, DOOR_CLEAR_CM
 from internav_data.records import OUTSIDE
 from internav_data.records.errors import UsageError
 
@@ -145,7 +146,7 @@ def _names(rooms: Sequence[Mapping[str, Any]]) -> list[str]:
         name = str(room.get("name", kind if kind is not None else f"number {k + 1}"))
         if kind not in ROOM_TYPES:
             raise FloorPlanError(
-                f"room '{name}': type is {kind!r}; choose one of {', '.join(ROOM_TYPES)}"
+                f"room '{name}': type is {kind!r}; choose one of {', '.join(sorted(ROOM_TYPES))}"
             )
         if name in names or name == "outside":
             raise FloorPlanError(

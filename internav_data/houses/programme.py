@@ -7,12 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from internav_data.houses.quota import SHARES, room_count
-from internav_data.houses.standards import (
-    DOUBLE_BEDROOM,
-    SINGLE_BEDROOM,
-    STANDARDS,
-    RoomStandard,
-)
+from internav_data.houses.room_types import ROOM_TYPES, RoomStandard
 from internav_data.records import ProgrammeStream, Purpose, generator
 
 if TYPE_CHECKING:
@@ -58,15 +53,12 @@ _HOMES: Mapping[int, tuple[tuple[float, str], ...]] = {
 }
 """Small homes: (share, rooms)."""
 _CORE = "living kitchen bedroom bathroom"
-_FURTHER: tuple[tuple[str, float, int], ...] = (
-    ("bedroom", 3.0, 4),
-    ("bathroom", 1.3, 3),
-    ("dining", 1.4, 1),
-    ("office", 1.0, 1),
-    ("laundry", 0.9, 1),
-    ("storage", 0.7, 1),
-)
-"""What larger homes have beside the core: (type, weight, most of them)."""
+"""Rooms of every home of five rooms or more."""
+
+DOUBLE_BEDROOM = RoomStandard(13.0, 11.6, 17.0, 2.76, 1.6)
+"""The realistic bedroom for two."""
+SINGLE_BEDROOM = RoomStandard(9.2, 6.8, 11.0, 2.2, 1.75)
+"""The realistic bedroom for one."""
 
 
 def _choose(rng: Generator, weighted: list[tuple[float, str]]) -> str:
@@ -91,9 +83,10 @@ def _room_types(rng: Generator, count: int, hall_from: int) -> list[str]:
         # A second bathroom before the third bedroom has somewhere to go looks wrong.
         bedrooms = types.count("bedroom")
         open_types = [
-            (weight, name)
-            for name, weight, max_count in _FURTHER
-            if types.count(name) < max_count
+            (record.extra.weight, name)
+            for name, record in ROOM_TYPES.items()
+            if record.extra is not None
+            and types.count(name) < record.extra.max_count
             and (name != "bathroom" or types.count(name) < bedrooms)
         ]
         types.append(_choose(rng, open_types))
@@ -101,7 +94,6 @@ def _room_types(rng: Generator, count: int, hall_from: int) -> list[str]:
 
 
 def _standards(types: list[str], config: HouseConfig, rng: Generator) -> list[RoomStandard]:
-    table = STANDARDS[config.preset]
     out: list[RoomStandard] = []
     bedrooms = 0
     for name in types:
@@ -110,7 +102,7 @@ def _standards(types: list[str], config: HouseConfig, rng: Generator) -> list[Ro
             single = bedrooms > 1 and float(rng.random()) < 0.6  # noqa: PLR2004 - most second ones
             out.append(SINGLE_BEDROOM if single else DOUBLE_BEDROOM)
         else:
-            out.append(table[name])
+            out.append(ROOM_TYPES[name].standard(config.preset))
     return out
 
 

@@ -16,6 +16,21 @@ HALF_WALL_M = 0.06
 DOOR_CLEAR_M = 0.65
 RADIUS_M = 0.2
 SPACING_M = 0.25
+HABITABLE = {"bedroom", "dining", "kitchen", "living", "office", "studio"}
+"""Room types with legal minima: an own copy."""
+ASSETS_OF = {
+    "bathroom": {"Toilet"},
+    "bedroom": {"Bed"},
+    "dining": {"DiningTable"},
+    "hall": {"CoatRack", "ShoeCabinet"},
+    "kitchen": {"Stove"},
+    "laundry": {"WashingMachine"},
+    "living": {"Sofa"},
+    "office": {"Desk"},
+    "storage": {"StorageRack", "ShelvingUnit", "Box", "Bookcase"},
+    "studio": {"Bed"},
+}
+"""Assets of which a room has at least one: what makes it a room of its type."""
 
 
 def room_polygon(room):
@@ -166,12 +181,11 @@ def widest_rectangle(polygon, least_area):
 
 def check_realistic(house):
     """The stated minima of real homes, between wall faces."""
-    habitable = {"bedroom", "dining", "kitchen", "living", "office", "studio"}
     for room in house.rooms:
         clear = clear_polygon(room)
         assert clear.geom_type == "Polygon", room
         assert 2.4 <= room.ceiling_m <= 3.2
-        if room.type in habitable:
+        if room.type in HABITABLE:
             assert clear.area >= 6.5, room
             assert widest_rectangle(clear, 0.0) >= 2.13 - 1e-9, room
         if room.type == "hall":

@@ -10,7 +10,8 @@ import pytest
 from internav_data.houses import HouseConfig, build_house
 from internav_data.houses.choice import choose_floor_plan
 from internav_data.houses.programme import programme
-from internav_data.houses.standards import MIN_DOOR_CM, STANDARDS
+from internav_data.houses.room_types import ROOM_TYPES
+from internav_data.houses.standards import MIN_DOOR_CM
 
 
 def test_realistic_minima_hold_in_every_house(sample, oracle):
@@ -29,7 +30,7 @@ def test_areas_and_proportions_by_type(sample, oracle, preset):
     areas = defaultdict(list)
     for house in sample[preset]:
         for room in house.rooms:
-            standard = STANDARDS[preset][room.type]
+            standard = ROOM_TYPES[room.type].standard(preset)
             clear = oracle.clear_polygon(room)
             assert clear.area >= standard.low_m2 - 1e-6, room
             assert clear.area <= standard.high_m2 * 1.31, room
@@ -39,7 +40,7 @@ def test_areas_and_proportions_by_type(sample, oracle, preset):
                 assert max(x1 - x0, y1 - y0) / min(x1 - x0, y1 - y0) < 3.2, room
     for name, values in areas.items():
         if len(values) >= 10 and name != "hall":
-            typical = STANDARDS[preset][name].area_m2
+            typical = ROOM_TYPES[name].standard(preset).area_m2
             assert 0.7 * typical < median(values) < 1.4 * typical, (name, median(values))
 
 
