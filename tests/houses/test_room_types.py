@@ -20,7 +20,7 @@ from internav_data.houses.room_types import (
 
 def test_the_oracles_own_tables_name_every_type(oracle):
     assert set(oracle.ASSETS_OF) == set(ROOM_TYPES)
-    assert oracle.HABITABLE == {name for name, r in ROOM_TYPES.items() if r.habitable}
+    assert {name for name, r in ROOM_TYPES.items() if r.habitable} == oracle.HABITABLE
 
 
 @pytest.mark.parametrize("preset", ["paper", "realistic"])
@@ -85,7 +85,7 @@ def test_a_pair_stands_in_one_of_its_records():
     hall = ROOM_TYPES["hall"]
     twice = {**ROOM_TYPES, "hall": dataclasses.replace(hall, pairs={"office": RoomPair(2.0)})}
     twice["office"] = dataclasses.replace(ROOM_TYPES["office"], pairs={"hall": RoomPair(2.0)})
-    with pytest.raises(ValueError, match="'hall' and 'office'|'office' and 'hall'"):
+    with pytest.raises(ValueError, match=r"'hall' and 'office'|'office' and 'hall'"):
         room_pairs(twice)
     unknown = dataclasses.replace(hall, pairs={"attic": RoomPair(2.0)})
     with pytest.raises(ValueError, match="'attic'"):
