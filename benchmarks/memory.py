@@ -22,8 +22,8 @@ import psutil
 
 from internav_data.envs import InterNavEnv
 from internav_data.physics.narrow_phase import prisms_of
-from internav_data.physics.push import _push_alone, _push_in
-from internav_data.physics.settle import _settle_alone
+from internav_data.physics.pushing import _push_alone, _push_in
+from internav_data.physics.settling import _settle_alone
 from internav_data.physics.sweep import centred_corners
 from internav_data.planner.problem import _blocked_indices
 from internav_data.world.drop import _standing

@@ -28,7 +28,7 @@ from internav_data.houses import HouseConfig, build_house
 from internav_data.physics import push
 from internav_data.physics.cache import CachedEngine
 from internav_data.physics.engines.bullet import bullet
-from internav_data.physics.push import PUSH_SPECS, _push_alone, _push_in
+from internav_data.physics.pushing import PUSH_SPECS, _push_alone, _push_in
 from internav_data.physics.result_cache import FOLDER_VARIABLE, ResultCache
 from internav_data.physics.scene import UPRIGHT, Body, PhysicsScene
 from internav_data.records import Pose

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from internav_data.core.storage import Store, StoreLike, exists, is_temporary, store_of
@@ -72,8 +72,20 @@ def identity_of(manifest: Manifest) -> Identity:
     )
 
 
-def open_staging(out: StoreLike, identity: Identity) -> Store:
+def open_staging(
+    out: StoreLike, identity: Identity, defaults: Mapping[str, Any] | None = None
+) -> Store:
     """Prepare a folder for staging the scenes of a dataset; return its store.
+
+    Parameters
+    ----------
+    out
+        Folder or store of the dataset.
+    identity
+        Inputs that decide every scene.
+    defaults
+        Configuration whose values stand for the settings that a dataset's own lacks, since it was
+        made before they existed.
 
     Raises
     ------
@@ -90,9 +102,9 @@ def open_staging(out: StoreLike, identity: Identity) -> Store:
             f"{place}: is a file: give a folder that is new, empty or a dataset"
         ) from None
     if has_manifest(store):
-        _same(place, identity_of(read_manifest(store)), identity)
+        _same(place, identity_of(read_manifest(store)), identity, defaults or {})
     if exists(store, _IDENTITY):
-        _same(place, _read_identity(store), identity)
+        _same(place, _read_identity(store), identity, defaults or {})
     elif not has_manifest(store) and any(not name.startswith(STAGING) for name in names):
         raise UsageError(f"{place}: holds something that is no dataset: give a new or empty folder")
     store.put(_IDENTITY, (json.dumps(asdict(identity), indent=1) + "\n").encode())
@@ -108,13 +120,23 @@ def _read_identity(store: Store) -> Identity:
         ) from error
 
 
-def _same(out: str, there: Identity, wanted: Identity) -> None:
+def _same(out: str, there: Identity, wanted: Identity, defaults: Mapping[str, Any]) -> None:
+    there = replace(there, config=_filled(there.config, defaults))
     old, new = (json.loads(json.dumps(asdict(i))) for i in (there, wanted))
     if difference := _first_difference(old, new, ""):
         raise UsageError(
             f"{out}: holds a dataset of another configuration ({difference}): "
             "give another folder, or the same configuration to resume or extend"
         )
+
+
+def _filled(config: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a configuration with the settings that it lacks at their defaults."""
+    filled = {**defaults, **config}
+    for key, value in config.items():
+        if isinstance(value, dict) and isinstance(defaults.get(key), dict):
+            filled[key] = _filled(value, defaults[key])
+    return filled
 
 
 def _first_difference(old: Any, new: Any, path: str) -> str:  # noqa: ANN401 - JSON

@@ -17,7 +17,7 @@ from internav_data.episodes.site import SpawnSite
 from internav_data.episodes.spawn import EpisodeDraft, spawn
 from internav_data.geometry import round_m
 from internav_data.navigation import SPACING_M, node_paths
-from internav_data.physics import DEFAULT_ENGINE, Body, get_engine
+from internav_data.physics import Body, get_engine
 from internav_data.planner.search import solve
 from internav_data.records import (
     Episode,
@@ -62,7 +62,6 @@ def build_episodes(
     *,
     first: int = 0,
     attempt: int = 0,
-    engine: str = DEFAULT_ENGINE,
 ) -> tuple[Episode, ...]:
     """Make the episodes first … first + count - 1 of a house.
 
@@ -80,18 +79,16 @@ def build_episodes(
         Settings; the calibrated defaults where None.
     attempt
         Sub-seed: 0 unless an earlier attempt at the scene failed.
-    engine
-        Name of the physics engine.
 
     Raises
     ------
     UsageError
-        No engine has this name.
+        No physics engine has the config's name.
     QuarantineError
         An episode cannot be made within the stated bounds.
 
     """
-    batch = build_batch(house, count, pool, config, first=first, attempt=attempt, engine=engine)
+    batch = build_batch(house, count, pool, config, first=first, attempt=attempt)
     return batch.episodes
 
 
@@ -103,11 +100,10 @@ def build_batch(
     *,
     first: int = 0,
     attempt: int = 0,
-    engine: str = DEFAULT_ENGINE,
 ) -> EpisodeBatch:
     """Make episodes as `build_episodes` does, and say how often something was drawn again."""
     config = config or EpisodeConfig()
-    site = SpawnSite.of(house, engine)
+    site = SpawnSite.of(house)
     redraws: Counter[Redraw] = Counter()
     episodes = []
     for index in range(first, first + count):
@@ -162,7 +158,7 @@ def _draw(
         (*draft.start, yaw_deg // 90),
         draft.goal,
         config.push_model,
-        site.engine,
+        config.engine,
     )
     # The expert comes first: what it cannot solve needs no outcomes.
     expert = solve(world)
@@ -290,7 +286,7 @@ def _obstacle(spawned: Spawned, outcomes: tuple[Outcome, ...]) -> Obstacle:
 
 
 def _physics(draft: EpisodeDraft) -> Physics:
-    engine = get_engine(draft.site.engine)
+    engine = get_engine(draft.config.engine)
     return Physics(
         engine=engine.name,
         build=engine.build,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from internav_data.physics.engines import DEFAULT_ENGINE, ENGINES
 from internav_data.records.errors import UsageError
 from internav_data.records.physics import PUSH_SPECS, PushModel
 
@@ -36,6 +37,8 @@ class EpisodeConfig:
     """Keep episodes for which the expert finds no plan, their `expert` null; else draw again."""
     push_model: PushModel = "force"
     """Of outcomes, expert and environments: 200 N up to 2 m/s, or 2 m/s at once for every mass."""
+    engine: str = DEFAULT_ENGINE
+    """Physics engine in which obstacles settle and are pushed, in outcomes and environments too."""
     unseen_assets: bool = False
     """Each split draws its obstacles from its own share of the assets (2/3, 1/6, 1/6)."""
 
@@ -63,6 +66,10 @@ class EpisodeConfig:
             (
                 self.push_model not in PUSH_SPECS,
                 f"push_model: expected one of {', '.join(PUSH_SPECS)}, got {self.push_model!r}",
+            ),
+            (
+                self.engine not in ENGINES,
+                f"engine: expected one of {', '.join(ENGINES)}, got {self.engine!r}",
             ),
         ]
         for wrong, message in problems:

@@ -9,7 +9,6 @@ import numpy as np
 
 from internav_data.geometry import Polygons, house_footprints
 from internav_data.navigation import SPACING_M, room_paths, rooms_of
-from internav_data.physics import DEFAULT_ENGINE
 from internav_data.world import HouseModel
 
 if TYPE_CHECKING:
@@ -36,15 +35,13 @@ class SpawnSite:
     """Free nodes of the largest component, shape (n, 2), in order of i, then j."""
     rooms: NDArray[np.int64]
     """Room of each node, shape (n,)."""
-    engine: str = DEFAULT_ENGINE
-    """Name of the physics engine."""
     _paths_between: dict[tuple[Vec2, Vec2], tuple[Vec2, ...]] = field(default_factory=dict)
     _room_paths: dict[tuple[int, int], tuple[tuple[tuple[int, ...], ...], bool]] = field(
         default_factory=dict
     )
 
     @staticmethod
-    def of(house: House, engine: str = DEFAULT_ENGINE) -> SpawnSite:
+    def of(house: House) -> SpawnSite:
         """Work out what the episodes of a house share."""
         model = HouseModel.of(house)
         lattice = model.lattice
@@ -59,7 +56,6 @@ class SpawnSite:
             tangent_graph=model.tangent_graph(),
             nodes=nodes.astype(np.int64),
             rooms=rooms_of(house, SPACING_M * nodes.astype(np.float64)),
-            engine=engine,
         )
 
     def path_between(self, first: Vec2, second: Vec2) -> tuple[Vec2, ...]:

@@ -122,7 +122,7 @@ def _try_spot(draft: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> Non
     shifted = Polygons(standing.vertices + np.array([pose.x, pose.y]), standing.offsets)
     if _distance(draft, shifted, gap) < gap:
         return
-    settled = settle(Body.of(asset, pose), gap, lambda: _near(draft, shifted), draft.site.engine)
+    settled = settle(Body.of(asset, pose), gap, lambda: _near(draft, shifted), draft.config.engine)
     if settled.refusal:
         return
     exact = footprint(asset, settled.pose)

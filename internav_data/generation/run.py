@@ -27,6 +27,7 @@ from internav_data.dataset import (
     stage_quarantine,
     staged_scenes,
 )
+from internav_data.generation.config import GenerationConfig
 from internav_data.generation.messages import Done
 from internav_data.generation.progress import GenerationProgress
 from internav_data.generation.report import Report, report_of
@@ -49,7 +50,6 @@ if TYPE_CHECKING:
     from internav_data.catalog import Catalogue
     from internav_data.core.storage import Store
     from internav_data.dataset import Manifest
-    from internav_data.generation.config import GenerationConfig
     from internav_data.records import Asset
 
 GENERATOR = "internav-gen"
@@ -118,7 +118,7 @@ def generate(
         store = FolderStore(out)
         with store.lock(BUSY):
             _forget_idle_staging(store)
-            open_staging(store, identity)
+            open_staging(store, identity, GenerationConfig().identity(assets.digest))
             done = _done_before(store, scenes)
             plan = _Plan(config, scenes, tuple(k for k in range(scenes) if k not in done))
             recipe = Recipe(setup, ScenePayload(config, assets, store))

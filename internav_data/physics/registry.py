@@ -4,33 +4,17 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from internav_data.physics.cache import CachedEngine, origin
+from internav_data.physics.engines import DEFAULT_ENGINE, ENGINES
 from internav_data.physics.result_cache import ResultCache, result_cache
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     from internav_data.physics.scene import Engine
-
-DEFAULT_ENGINE: Final = "bullet"
-"""Name of the engine that is taken where none is named."""
-
-
-def _bullet() -> Engine:
-    from internav_data.physics.engines.bullet import bullet  # noqa: PLC0415 - pybullet is imported when used
-
-    return bullet()
-
-
-ENGINES: Final[dict[str, Callable[[], Engine]]] = {"bullet": _bullet}
-"""Function by engine name that returns this process's engine; it must return the same object
-every time, for results are cached by engine. Another engine is added here.
-
-The result cache believes no entry once a source file of this package has changed, or a library
-that the engine names. An engine from elsewhere must change its `build` with its results."""
 
 _cache_off = False
 

@@ -1,5 +1,10 @@
 """A house being acted in: its movable objects, the twelve actions, what the agent can see."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from internav_data.core.lazy import lazy_imports
 from internav_data.world.actions import (
     ACTION_COUNT,
     ACTIONS,
@@ -8,8 +13,10 @@ from internav_data.world.actions import (
     Reason,
     StepResult,
 )
-from internav_data.world.house_model import HouseModel, MovableObject
-from internav_data.world.world import World
+
+if TYPE_CHECKING:
+    from internav_data.world.house_model import HouseModel, MovableObject
+    from internav_data.world.world import World
 
 __all__ = [
     "ACTIONS",
@@ -22,3 +29,8 @@ __all__ = [
     "StepResult",
     "World",
 ]
+
+# The table of actions needs neither numba nor Bullet.
+__getattr__, __dir__ = lazy_imports(
+    __name__, {"house_model": ["HouseModel", "MovableObject"], "world": ["World"]}
+)

@@ -2,7 +2,7 @@
 
 Everything that depends on actions is read off `Action`: action spaces, the policies' options,
 captions, names in files and the documentation. To add one, add a row and, for a new kind, its
-behaviour in `internav_data.world.world`.
+behaviour: a row of `BEHAVIOURS` in `internav_data.world.world`.
 """
 
 from __future__ import annotations

@@ -19,10 +19,10 @@ from internav_data.geometry import (
 from internav_data.geometry.headings import TURNS, turned
 from internav_data.geometry.planar import segment_polygon_distance
 from internav_data.navigation import CLEARANCE_M
+from internav_data.physics.engines import DEFAULT_ENGINE
 from internav_data.physics.kdop import dop8_of_square
-from internav_data.physics.registry import DEFAULT_ENGINE
 from internav_data.physics.scene import Body
-from internav_data.physics.settle import settle
+from internav_data.physics.settling import settle
 from internav_data.records import Pose
 from internav_data.records.agent import AGENT
 from internav_data.world.visibility import axis_distance
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from internav_data.core.typing import Floats, Ints
     from internav_data.physics.kdop import Dop8
-    from internav_data.physics.settle import SettleResult
+    from internav_data.physics.settling import SettleResult
     from internav_data.records import Asset, Vec2
     from internav_data.world.house_model import MovableObject
 

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Final
 from internav_data.geometry import Polygons, clearance, footprint, round_m
 from internav_data.geometry.headings import HEADINGS
 from internav_data.navigation import CLEARANCE_M, SPACING_M
+from internav_data.physics.engines import DEFAULT_ENGINE
 from internav_data.physics.kdop import dop8_of_square, grown, touching
-from internav_data.physics.push import AGENT_M, count_movers, push
-from internav_data.physics.registry import DEFAULT_ENGINE
+from internav_data.physics.pushing import AGENT_M, count_movers, push
 from internav_data.physics.scene import Body
 from internav_data.records import PUSH_SPECS
 from internav_data.records.errors import UsageError
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
     from internav_data.navigation import Lattice, TangentGraph
     from internav_data.physics.kdop import Dop8
-    from internav_data.physics.push import PushResult
+    from internav_data.physics.pushing import PushResult
     from internav_data.records import Asset, Episode, Pose, PushModel, PushSpec, Vec2
     from internav_data.world.actions import Interaction
 
@@ -191,7 +191,7 @@ def _failed(action: Action, reason: Reason) -> StepResult:
     return StepResult(action, success=False, reason=reason)
 
 
-_BEHAVIOURS: Final[dict[ActionKind, Callable[[World, Action], StepResult]]] = {
+BEHAVIOURS: Final[dict[ActionKind, Callable[[World, Action], StepResult]]] = {
     "move": _move,
     "turn": _rotate,
     "look": _look,
@@ -344,10 +344,10 @@ class World:
             The action's kind has no behaviour here.
         """
         known = _known(action)
-        behaviour = _BEHAVIOURS.get(known.kind)
+        behaviour = BEHAVIOURS.get(known.kind)
         if behaviour is None:
             raise NotImplementedError(
-                f"World.step: {known.name} has no behaviour: add {known.kind!r} to _BEHAVIOURS"
+                f"World.step: {known.name} has no behaviour: add {known.kind!r} to BEHAVIOURS"
             )
         return behaviour(self, known)
 

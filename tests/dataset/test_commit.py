@@ -238,6 +238,17 @@ def test_another_configuration_is_refused(tmp_path, change, named):
     assert tree(tmp_path) == before
 
 
+def test_a_setting_that_is_younger_than_the_dataset_has_its_default(tmp_path):
+    values = {f: getattr(IDENTITY, f) for f in IDENTITY.__slots__}
+    config = {**IDENTITY.config, "house": {**IDENTITY.config["house"], "roof": "flat"}}
+    today = Identity(**{**values, "config": config})
+    build(tmp_path, range(2))
+    assemble(tmp_path, IDENTITY, ASSETS, 2)
+    open_staging(tmp_path, today, config)
+    with pytest.raises(UsageError, match=r"config\.house\.roof"):
+        open_staging(tmp_path, today, {"house": {"roof": "steep"}})
+
+
 def test_tuples_in_a_configuration_are_lists_on_disk(tmp_path):
     values = {f: getattr(IDENTITY, f) for f in IDENTITY.__slots__}
     same = Identity(**{**values, "config": {"house": {"scale": 1.5}, "list": (1, 2)}})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import MappingProxyType
 
 import pytest
@@ -112,11 +113,13 @@ def hand_run():
     """Make a run: a crate in a door (divided) or in the middle of a room."""
     houses = {d: LoadedHouse.of(hand_house(divided=d)) for d in (False, True)}
 
-    def make(*, divided, pickable=True, **config):
+    def make(*, divided, pickable=True, mass_kg=5.0, **config):
         if divided:
             episode = hand_episode(3.0, 8, 20, pickable=pickable, shortest_path_m=3.0)
         else:
             episode = hand_episode(2.0, 4, 20, pickable=pickable, shortest_path_m=4.0)
+        obstacles = tuple(replace(o, mass_kg=mass_kg) for o in episode.obstacles)
+        episode = replace(episode, obstacles=obstacles)
         return EpisodeRun(episode, houses[divided], ASSETS, TaskConfig(**config))
 
     return make

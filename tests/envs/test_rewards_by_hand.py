@@ -44,6 +44,16 @@ def test_a_crate_is_carried_out_of_a_door(hand_run):
         run.step(AHEAD)
 
 
+def test_a_crate_that_is_heavier_than_its_asset_stays(hand_run):
+    light, heavy = (hand_run(divided=True, pickable=False, mass_kg=kg) for kg in (5.0, 900.0))
+    for run in (light, heavy):
+        run.step(AHEAD)
+        run.step(PUSH_AHEAD)
+    assert light.last.success
+    assert heavy.last.reason == "too heavy"
+    assert heavy.metrics()["pushes_done"] == 0
+
+
 def test_opening_and_closing_a_way_earns_nothing(hand_run):
     run = hand_run(divided=True)
     rewards = [run.step(action).reward for action in (PICK, DROP, PICK, DROP)]

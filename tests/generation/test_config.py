@@ -102,7 +102,7 @@ def test_identity_leaves_paths_out(tmp_path):
     assert identity_digest(base.identity("c")) == identity_digest(spelled_out.identity("c"))
 
 
-WORDS = {"paper": "realistic", "": "4", "force": "kick"}
+WORDS = {"paper": "realistic", "": "4", "force": "kick", "bullet": "another"}
 """Another value for each setting that is a word."""
 
 

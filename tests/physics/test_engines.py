@@ -5,7 +5,11 @@ import math
 import pytest
 from builders import UPRIGHT, crate
 
+from internav_data.catalog import catalogue
+from internav_data.episodes import EpisodeConfig, build_episodes
+from internav_data.episodes.outcomes import outcomes_of
 from internav_data.geometry import centre_of_mass
+from internav_data.houses import HouseConfig, build_house
 from internav_data.physics import (
     ENGINES,
     Body,
@@ -99,6 +103,20 @@ def test_a_world_drops_by_the_engine_that_is_named(shift, hand_house):
     assert world.step(Action.DROP).seconds == 0.25
 
 
+def test_episodes_ask_the_engine_of_their_config(shift):
+    """Spawning, outcomes and expert; a world of the episode takes the same engine by itself."""
+    house = build_house(0, 0, HouseConfig(), catalogue())
+    config = EpisodeConfig(engine="shift", keep_unsolvable=True)
+    (episode,) = build_episodes(house, 1, catalogue().spawnable, config)
+    assert (episode.physics.engine, episode.physics.build) == ("shift", "shift 1, rules 1")
+    assert {o.settle_s for o in episode.obstacles} == {0.25}
+    pushes = [o for one in episode.obstacles for o in one.outcomes[:4] if one.pushable]
+    assert {o.seconds for o in pushes} == {0.5}
+    world = World.of_episode(HouseModel.of(house), episode, catalogue().assets)
+    assert world.engine == "shift"
+    assert outcomes_of(world) == tuple(o.outcomes for o in episode.obstacles)
+
+
 def test_engines_do_not_share_cached_results(shift, tmp_path, monkeypatch):
     held = ResultCache(tmp_path)
     monkeypatch.setattr("internav_data.physics.registry.result_cache", lambda: held)
@@ -130,3 +148,5 @@ def test_an_unknown_engine_is_refused_by_name(hand_house):
         push(body, 0, alone, engine="no engine")
     with pytest.raises(UsageError, match="'no engine'"):
         settle(body, 0.01, tuple, "no engine")
+    with pytest.raises(UsageError, match=r"episodes.engine: expected one of bullet, got 'no eng"):
+        EpisodeConfig(engine="no engine").check()

@@ -11,7 +11,7 @@ from internav_data.geometry import asset_corners, footprint, transform, yaw_quat
 from internav_data.physics import Body, push, wall_body
 from internav_data.physics.engines.bullet import pybullet
 from internav_data.physics.kdop import overlap
-from internav_data.physics.push import AGENT_MIN_M
+from internav_data.physics.pushing import AGENT_MIN_M
 from internav_data.physics.sweep import extent_of
 from internav_data.records import PUSH_SPECS, Pose, Wall
 from internav_data.world.visibility import axis_distance

@@ -11,7 +11,7 @@ from internav_data.houses import HouseConfig, build_house
 from internav_data.physics import Body, push, wall_body
 from internav_data.physics.engines.bullet import Bullet
 from internav_data.physics.kdop import overlap
-from internav_data.physics.push import count_movers
+from internav_data.physics.pushing import count_movers
 from internav_data.physics.sweep import extent_of
 from internav_data.records import Pose, Wall
 from internav_data.world import Action, HouseModel, World

@@ -9,7 +9,7 @@ from builders import UPRIGHT, asset, box, chair, crate
 
 from internav_data.geometry import asset_corners, transform, yaw_quaternion
 from internav_data.physics import Body, PhysicsScene, get_engine, settle, wall_body
-from internav_data.physics.settle import MAX_PENETRATION_M
+from internav_data.physics.settling import MAX_PENETRATION_M
 from internav_data.records import Pose, Wall
 
 

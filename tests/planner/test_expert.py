@@ -5,6 +5,7 @@ import itertools
 import math
 import subprocess
 import sys
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -224,6 +225,14 @@ def test_the_long_way_is_gone_where_nothing_can_be_moved():
 @pytest.mark.parametrize("asset", [SAFE, PILLAR], ids=["too heavy", "fixed"])
 def test_what_cannot_be_moved_has_no_expert(asset):
     assert expert_of(CORRIDOR, [at(asset, 2.5, 0.75)], (4, 3, 0), (14, 3)) is None
+
+
+def test_a_crate_that_is_heavier_than_its_asset_has_no_expert():
+    light = at(CRATE, 2.5, 0.75)
+    heavy = Body(CRATE, light.pose, replace(CRATE.dynamics, mass_kg=900.0))
+    assert expert_of(CORRIDOR, [light], (4, 3, 0), (14, 3)) is not None
+    assert expert_of(CORRIDOR, [heavy], (4, 3, 0), (14, 3)) is None
+    assert expert_of(GAPS, [heavy], (4, 3, 0), (16, 3)).pushes == 0
 
 
 def test_a_limit_is_kept():

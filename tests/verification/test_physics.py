@@ -21,8 +21,9 @@ from internav_data.verification import validate
 from internav_data.verification.checked_config import CheckedConfig
 from internav_data.verification.checked_layout import CheckedLayout
 from internav_data.verification.checked_path import CheckedPath
+from internav_data.verification.findings import FindingCollector
 from internav_data.verification.interactions import check_interactions
-from internav_data.verification.replay import CheckedScene
+from internav_data.verification.replay import CheckedScene, replay_episode
 from internav_data.verification.replay.outcomes import OutcomeCheck
 from internav_data.verification.scenes import check_scene
 from internav_data.verification.shapes import Shapes
@@ -129,6 +130,24 @@ def test_scenes_hold_what_the_tests_need(scenes):
     world = World.of_episode(stage, scenes[2][1][0], ASSETS)
     assert [k for k, _ in world.simulate_push(2, 1, agent=False).moved] == [0]
     assert stage.object_ids[0] == 1
+
+
+def test_an_obstacle_is_replayed_with_its_stored_mass(scenes):
+    """Geometry compares the mass with the asset's; physics plays the stored one."""
+    house, (first, *_) = scenes[0]
+    bar = replace(first.obstacles[0], mass_kg=900.0)
+    heavier = replace(first, obstacles=(bar, *first.obstacles[1:]))
+    played = physical.played(house, heavier)
+    assert {o.reason for o in played.obstacles[0].outcomes[:4]} == {"too heavy"}
+    assert played.expert is None
+
+    def replayed(episode):
+        report = FindingCollector("episodes", house.scene_id)
+        replay_episode(CheckedScene(CheckedLayout(house, Shapes(ASSETS)), FORCE), episode, report)
+        return set(report.by_predicate)
+
+    assert replayed(first) == replayed(played) == set()
+    assert replayed(heavier) >= {"physics.outcome-success", "physics.expert-action"}
 
 
 def test_what_is_true_is_valid(tmp_path, scenes):

@@ -19,8 +19,9 @@ from internav_data.navigation import CLEARANCE_M, Lattice
 from internav_data.physics import Body
 from internav_data.records import Pose
 from internav_data.records.errors import UsageError
-from internav_data.world import ACTIONS, Action, HouseModel, World
+from internav_data.world import ACTIONS, Action, HouseModel, Interaction, StepResult, World
 from internav_data.world.actions import actions_of_option
+from internav_data.world.world import BEHAVIOURS
 
 SCENES = (0, 1, 6)
 
@@ -90,6 +91,36 @@ def test_every_action_has_every_column_and_a_behaviour(small):
         assert bool(action.options) == (action in ACTIONS), action.name
         assert small.copy().step(action).action == action, action.name
     assert [*ACTIONS] == [*range(len(ACTIONS))], "numbered from 0 without a gap"
+
+
+def test_an_interaction_of_several_steps_is_part_of_the_state(small, monkeypatch):
+    """The door for interactions that go on: a push that is carried out in its third step."""
+    push = BEHAVIOURS["push"]
+
+    def slow_push(world, action):
+        steps = 1 if world.interaction is None else world.interaction.steps + 1
+        target = world.target(pick=False)
+        if steps < 3:
+            world.interaction = Interaction(action, target, steps)
+            return StepResult(action, success=True, target=target, ongoing=True)
+        world.interaction = None
+        return push(world, action)
+
+    monkeypatch.setitem(BEHAVIOURS, "push", slow_push)
+    worlds = [small.copy()]
+    results = []
+    for _ in range(3):
+        worlds.append(worlds[-1].copy())
+        results.append(worlds[-1].step(Action.PUSH_AHEAD))
+    assert [result.ongoing for result in results] == [True, True, False]
+    assert [bool(result.moved) for result in results] == [False, False, True]
+    assert len({world.digest() for world in worlds}) == 4, "equal poses, another interaction"
+    assert worlds[1].interaction == Interaction(Action.PUSH_AHEAD, results[0].target, 1)
+    assert worlds[1].copy() == worlds[1] != worlds[0]
+    assert worlds[3].interaction is None
+    monkeypatch.undo()
+    small.step(Action.PUSH_AHEAD)
+    assert worlds[3] == small
 
 
 def test_an_action_whose_kind_does_nothing_is_named(small, monkeypatch):

@@ -1,1 +1,31 @@
-"""Physics engines, each behind the protocol of `internav_data.physics.scene.Engine`."""
+"""Table of the physics engines, each in a module of its own behind the protocol `Engine`.
+
+To add one, write its module and add a row to `ENGINES`; `internav_data.physics.scene.Engine` lists
+its methods and the figures that it states.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from internav_data.physics.scene import Engine
+
+DEFAULT_ENGINE: Final = "bullet"
+"""Name of the engine that is taken where none is named."""
+
+
+def _bullet() -> Engine:
+    from internav_data.physics.engines.bullet import bullet  # noqa: PLC0415 - pybullet is imported when used
+
+    return bullet()
+
+
+ENGINES: Final[dict[str, Callable[[], Engine]]] = {"bullet": _bullet}
+"""Function by engine name that returns this process's engine. It returns the same object every
+time, for results are cached by engine.
+
+The result cache believes no entry once a source file of physics has changed, or a library that the
+engine names. An engine from elsewhere must change its `build` with its results."""

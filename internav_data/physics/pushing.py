@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Final, Literal
 
 from internav_data.geometry import round_m
 from internav_data.physics.displacement import is_still, shift_m, tilt_deg
+from internav_data.physics.engines import DEFAULT_ENGINE
 from internav_data.physics.frames import Frame
 from internav_data.physics.kdop import grown
 from internav_data.physics.narrow_phase import met_on_path, prisms_of, prisms_of_collider
-from internav_data.physics.registry import DEFAULT_ENGINE, get_engine
+from internav_data.physics.registry import get_engine
 from internav_data.physics.scene import (
     AGENT_HEIGHT_M,
     AGENT_LOW_M,

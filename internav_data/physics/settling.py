@@ -8,7 +8,8 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from internav_data.geometry import multiply, rotation_matrix, round_m, round_quaternion
-from internav_data.physics.registry import DEFAULT_ENGINE, get_engine
+from internav_data.physics.engines import DEFAULT_ENGINE
+from internav_data.physics.registry import get_engine
 from internav_data.physics.scene import UPRIGHT, Body, PhysicsScene
 from internav_data.records import Pose
 
