@@ -51,7 +51,7 @@ def test_a_crate_that_is_heavier_than_its_asset_stays(hand_run):
         run.step(PUSH_AHEAD)
     assert light.last.success
     assert heavy.last.reason == "too heavy"
-    assert heavy.metrics()["pushes_done"] == 0
+    assert heavy.task.metrics()["pushes_done"] == 0
 
 
 def test_opening_and_closing_a_way_earns_nothing(hand_run):
