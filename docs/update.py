@@ -37,9 +37,9 @@ def settings() -> str:
 def training_settings() -> str:
     """Return all settings of `camp-train`, those of both presets side by side."""
     from internav_data.camp.config import CampConfig, preset  # noqa: PLC0415 - --pictures needs more
-    from internav_data.core.field_docs import descriptions  # noqa: PLC0415
+    from internav_data.core.config import settings_notes  # noqa: PLC0415
 
-    small, paper, notes = preset("small"), preset("paper"), descriptions(CampConfig)
+    small, paper, notes = preset("small"), preset("paper"), settings_notes(CampConfig)
     single, parts = [], []
     for field in dataclasses.fields(CampConfig):
         one, two = getattr(small, field.name), getattr(paper, field.name)
@@ -55,9 +55,9 @@ _HEAD = ("| | `small` | `paper` | |", "|---|---|---|---|")
 
 
 def _rows(prefix: str, one: Any, two: Any) -> Iterator[str]:  # noqa: ANN401 - parts of a config
-    from internav_data.core.field_docs import descriptions  # noqa: PLC0415
+    from internav_data.core.config import settings_notes  # noqa: PLC0415
 
-    notes = descriptions(type(one))
+    notes = settings_notes(type(one))
     for field in dataclasses.fields(one):
         values = getattr(one, field.name), getattr(two, field.name)
         yield _setting(f"{prefix}.{field.name}", *values, notes[field.name])

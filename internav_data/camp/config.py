@@ -1,60 +1,17 @@
-"""Every hyperparameter of training, with what it means; the presets `paper` and `small`.
-
-What values a setting may have.
-"""
+"""Every hyperparameter of training, with what it means; the presets `paper` and `small`."""
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal
 
 from internav_data.core import config as values
+from internav_data.core.config import MAX_SEED, Bounds, check_bounds
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
-
-_MOST: Final = 10**12
-_LIMITS: Final[dict[str, tuple[float, float]]] = {
-    "seed": (0, 2**63 - 1),
-    "image_size": (16, 1024),
-    "hidden": (1, 8192),
-    "goal_embedding": (1, 8192),
-    "depth_limit_m": (0.1, 1000.0),
-    "goal_scale_m": (0.1, 1000.0),
-    "initial_done_probability": (1e-6, 0.5),
-    "initial_interaction_probability": (1e-6, 0.49),
-    "nie_objects": (1, 64),
-    "num_envs": (1, 65536),
-    "target_kl": (0.0, _MOST),
-    "gamma": (0.0, 1.0),
-    "gae_lambda": (0.0, 1.0),
-    "auxiliary_share": (0.0, 1.0),
-    "single_room_share": (0.0, 1.0),
-    "critic_warmup_rollouts": (0, _MOST),
-    "max_steps": (1, 10_000),
-    "workers": (0, 1024),
-    "threads": (1, 1024),
-    "validation_episodes": (0, _MOST),
-    "window": (1, 10_000),
-}
-"""What values a field may have, by its name; whole numbers else from 1, others from 0."""
-
-
-def bounds_of(config: Any, prefix: str = "") -> dict[str, tuple[float, float, float]]:  # noqa: ANN401
-    """Return value, least and most of every number of a config, by dotted key."""
-    found: dict[str, tuple[float, float, float]] = {}
-    for f in dataclasses.fields(config):
-        value = getattr(config, f.name)
-        if dataclasses.is_dataclass(value):
-            found |= bounds_of(value, f"{prefix}{f.name}.")
-        elif isinstance(value, int | float) and not isinstance(value, bool):
-            default = (1, _MOST) if isinstance(value, int) else (0.0, _MOST)
-            found[prefix + f.name] = (value, *_LIMITS.get(f.name, default))
-    return found
-
 
 Intent = Literal["integrated", "policy", "recursive", "none"]
 TrainPreset = Literal["paper", "small"]
@@ -66,23 +23,23 @@ INTERACTION_ACTIONS: Final = 11
 class NetworkConfig:
     """Sizes of the networks."""
 
-    image_size: int = 64
+    image_size: Annotated[int, Bounds(16, 1024)] = 64
     """Pixels a side of what the agent sees."""
     encoder: TrainPreset = "small"
     """"paper": one network for colour and one for depth, fused; "small": one network
     over all four channels."""
-    hidden: int = 128
+    hidden: Annotated[int, Bounds(1, 8192)] = 128
     """Features of an encoder and units of each GRU."""
-    goal_embedding: int = 32
+    goal_embedding: Annotated[int, Bounds(1, 8192)] = 32
     """Into which (distance, cos bearing, sin bearing) is embedded."""
     shared_encoder: bool = True
     """One encoder for all policies; False: one for Navigate, intent and global, one for Push, one
     for Pick."""
     bf16: bool = True
     """On a GPU encoders work in bfloat16; GRUs, heads and losses always in float32."""
-    depth_limit_m: float = 10.0
+    depth_limit_m: Annotated[float, Bounds(0.1, 1000.0)] = 10.0
     """Depth is cut here and divided by it."""
-    goal_scale_m: float = 1.0
+    goal_scale_m: Annotated[float, Bounds(0.1, 1000.0)] = 1.0
     """The goal's distance is divided by this. At 10 the last 0.25 m before the goal hardly show,
     and clones say Done at a certain time rather than at the goal."""
 
@@ -94,19 +51,19 @@ class AgentConfig:
     intent: Intent = "integrated"
     """What global is fed (Table 4): the integrated intent of equation (7); the intent policy's
     choice of option; equation (7) run twice; or nothing but the plane vector."""
-    sync_every: int = 3
+    sync_every: Annotated[int, Bounds(1)] = 3
     """Rollouts between copies of global into the intent policy (K)."""
     forbidden: tuple[Literal["push", "pick"], ...] = ()
     """Options that are never opened."""
-    initial_done_probability: float = 0.01
+    initial_done_probability: Annotated[float, Bounds(1e-6, 0.5)] = 0.01
     """Chance at the start that a decision ends the episode, the same for every learner. Uniform
     heads would end episodes after about ten steps."""
-    initial_interaction_probability: float = 0.045
+    initial_interaction_probability: Annotated[float, Bounds(1e-6, 0.49)] = 0.045
     """Share at the start of Push, and of Pick, among what does not end the episode; Navigate has
     the rest."""
-    nie_objects: int = 6
+    nie_objects: Annotated[int, Bounds(1, 64)] = 6
     """Objects that `nie` looks at: the nearest in sight."""
-    nie_weight: float = 3.0
+    nie_weight: Annotated[float, Bounds(0.0)] = 3.0
     """Of the L1 loss on `nie`'s predicted keypoints (released code)."""
     RENAMED: ClassVar[dict[str, str]] = {
         "end_chance": "initial_done_probability",
@@ -119,34 +76,34 @@ class AgentConfig:
 class PPOConfig:
     """Rollouts and updates."""
 
-    num_envs: int = 16
+    num_envs: Annotated[int, Bounds(1, 65536)] = 16
     """Stepped side by side."""
-    num_steps: int = 64
+    num_steps: Annotated[int, Bounds(1)] = 64
     """Of each environment in a rollout."""
-    update_epochs: int = 3
+    update_epochs: Annotated[int, Bounds(1)] = 3
     """Passes over a rollout (the paper's k)."""
-    num_minibatches: int = 4
+    num_minibatches: Annotated[int, Bounds(1)] = 4
     """Of whole environments, a pass."""
-    clip_coef: float = 0.2
+    clip_coef: Annotated[float, Bounds(0.0)] = 0.2
     """How far the ratio of probabilities may leave 1 before it earns nothing."""
     clip_vloss: bool = False
     """Clip values by `clip_coef` too. 0.1 against returns near 10 throttles the critic."""
-    vf_coef: float = 0.5
+    vf_coef: Annotated[float, Bounds(0.0)] = 0.5
     """Of half the squared error of values."""
-    ent_coef: float = 0.01
+    ent_coef: Annotated[float, Bounds(0.0)] = 0.01
     """Of the entropy that is rewarded."""
-    gamma: float = 0.99
+    gamma: Annotated[float, Bounds(0.0, 1.0)] = 0.99
     """Discount a step."""
-    gae_lambda: float = 0.95
+    gae_lambda: Annotated[float, Bounds(0.0, 1.0)] = 0.95
     """Decay of generalised advantages (lambda)."""
-    max_grad_norm: float = 0.5
+    max_grad_norm: Annotated[float, Bounds(0.0)] = 0.5
     """Longer gradients are cut to this length."""
-    target_kl: float | None = 0.03
+    target_kl: Annotated[float | None, Bounds(0.0)] = 0.03
     """Updates on a rollout stop before the step whose minibatch is farther from the rollout's
     policy than this; none: never."""
     normalise_advantages: bool = True
     """To mean 0 and deviation 1, over a rollout."""
-    critic_warmup_rollouts: int = 10
+    critic_warmup_rollouts: Annotated[int, Bounds(0)] = 10
     """First rollouts after a start whose critic is new: they train the critic alone."""
     RENAMED: ClassVar[dict[str, str]] = {
         "environments": "num_envs",
@@ -169,17 +126,17 @@ class PPOConfig:
 class CloningConfig:
     """Cloning the dataset's expert (`--pretrain bc`)."""
 
-    frames: int = 150_000
+    frames: Annotated[int, Bounds(1)] = 150_000
     """Of the expert, an epoch."""
-    epochs: int = 4
+    epochs: Annotated[int, Bounds(1)] = 4
     """Passes over them."""
-    num_envs: int = 16
+    num_envs: Annotated[int, Bounds(1, 65536)] = 16
     """Experts replayed side by side."""
-    num_steps: int = 16
+    num_steps: Annotated[int, Bounds(1)] = 16
     """Frames of each in an update, its GRUs carried from one update to the next."""
-    learning_rate: float = 1e-3
+    learning_rate: Annotated[float, Bounds(0.0)] = 1e-3
     """Of Adam; falls to 0 in a straight line."""
-    sync_every: int = 100
+    sync_every: Annotated[int, Bounds(1)] = 100
     """Updates between copies of global into the intent policy."""
     RENAMED: ClassVar[dict[str, str]] = {
         "environments": "num_envs",
@@ -192,17 +149,17 @@ class CloningConfig:
 class StagesConfig:
     """Environment steps, and how the stages share them; auxiliary ones count."""
 
-    total_timesteps: int = 300_000
+    total_timesteps: Annotated[int, Bounds(1)] = 300_000
     """In all stages together, the same for every method."""
-    auxiliary_share: float = 0.1
+    auxiliary_share: Annotated[float, Bounds(0.0, 1.0)] = 0.1
     """On the three auxiliary tasks; flat methods: the main task in single rooms."""
-    single_room_share: float = 0.1
+    single_room_share: Annotated[float, Bounds(0.0, 1.0)] = 0.1
     """Of joint training in scenes of a single room."""
     side_by_side: bool = True
     """Auxiliary tasks at once, environments split in three; False: one after the other."""
-    learning_rate: float = 3e-4
+    learning_rate: Annotated[float, Bounds(0.0)] = 3e-4
     """Of auxiliary stages and of flat methods."""
-    joint_learning_rate: float = 1e-4
+    joint_learning_rate: Annotated[float, Bounds(0.0)] = 1e-4
     """Of joint training of a hierarchy."""
     decay_over: Literal["stage", "all"] = "stage"
     """What the learning rate falls to 0 over: each stage, with a fresh Adam, or all steps."""
@@ -218,9 +175,9 @@ class DataConfig:
 
     filter: tuple[str, ...] = ()
     """Conditions on columns that all must hold, as "shortest_path_m<=6": training, validation."""
-    failed_done_reward: float = 0.0
+    failed_done_reward: Annotated[float, Bounds(-1000.0, 1000.0)] = 0.0
     """Of Done away from the goal (-1 in the released configuration)."""
-    house_cache_size: int = 512
+    house_cache_size: Annotated[int, Bounds(1)] = 512
     """Houses that a process keeps ready; those of 1 to 3 rooms take 10 ms and 0.1 MB each, and the
     distances to each of their goals besides."""
     RENAMED: ClassVar[dict[str, str]] = {
@@ -234,21 +191,21 @@ class DataConfig:
 class RunConfig:
     """How a run goes about it."""
 
-    max_steps: int = 500
+    max_steps: Annotated[int, Bounds(1, 10_000)] = 500
     """Of an episode; then it is cut off. In validation too."""
-    threads: int = 1
+    threads: Annotated[int, Bounds(1, 1024)] = 1
     """Of torch on a processor; with one, equal runs are equal to the last bit."""
-    workers: int = 0
+    workers: Annotated[int, Bounds(0, 1024)] = 0
     """Processes that step the main task's environments; 0: none but this one, which is nearly as
     fast on two cores (106 s against 98 s with two, 48,000 steps of CaMP) and leaves one for another
     run."""
-    checkpoint_every: int = 10
+    checkpoint_every: Annotated[int, Bounds(1)] = 10
     """Updates between checkpoints."""
-    validate_every: int = 50
+    validate_every: Annotated[int, Bounds(1)] = 50
     """Updates of a stage between validations; each stage of the main task ends with one."""
-    validation_episodes: int = 64
+    validation_episodes: Annotated[int, Bounds(0)] = 64
     """Of the dataset's validation split, the same ones every time; 0: no validation."""
-    window: int = 100
+    window: Annotated[int, Bounds(1, 10_000)] = 100
     """Episodes that a logged mean is over: the last ones that ended."""
     tensorboard: bool = True
     """Write TensorBoard's files too, where `tensorboard` is installed."""
@@ -258,8 +215,8 @@ class RunConfig:
 class CampConfig:
     """All of it: equal configs, seeds and datasets give equal runs on one thread."""
 
-    seed: int = 0
-    """Every random number derives from it; 0 or more."""
+    seed: Annotated[int, Bounds(0, MAX_SEED)] = 0
+    """Every random number derives from it."""
     network: NetworkConfig = field(default_factory=NetworkConfig)
     """Sizes of the networks."""
     agent: AgentConfig = field(default_factory=AgentConfig)
@@ -276,10 +233,15 @@ class CampConfig:
     """How a run goes about it."""
 
     def check(self) -> None:
-        """Raise UsageError for values that cannot be meant."""
-        for key, (value, low, high) in bounds_of(self).items():
-            if not low <= value <= high:
-                raise UsageError(f"{key} is {value}: expected {low} … {high}")
+        """Check all values.
+
+        Raises
+        ------
+        UsageError
+            A value is out of its bounds, or values contradict each other.
+
+        """
+        check_bounds(self)
         if self.ppo.num_envs % self.ppo.num_minibatches:
             raise UsageError(
                 f"ppo.num_minibatches is {self.ppo.num_minibatches}: minibatches are of whole "

@@ -1,28 +1,30 @@
-"""Nested frozen dataclasses to and from plain values, with errors that name the key and its place.
+"""Settings: nested frozen dataclasses with bounds, read from plain values and written as TOML.
 
-Types are read from the dataclasses' hints: bool, int, float, str, Literal, optional and tuples of
-these, and dataclasses inside dataclasses.
-
-A config as TOML with the words of its fields: to be saved, changed and read again.
+A field states its type, its bounds and its default, as in `size: Annotated[int, Bounds(16, 1024)] =
+64`, and in the docstring below it its meaning. Checks, error messages and documentation derive from
+these. Types are bool, int, float, str, Literal, optional and tuples of these, and dataclasses
+inside dataclasses. Errors name the key and the place that its value comes from.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
 import math
 import textwrap
 import tomllib
 import types
 import typing
+from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from internav_data.core.field_docs import descriptions
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
     from _typeshed import DataclassInstance
@@ -30,17 +32,113 @@ if TYPE_CHECKING:
 C = TypeVar("C", bound="DataclassInstance")
 
 NOTHING = "none"
-"""What stands for no value where a number may be missing; TOML has no word for it."""
+"""Word for an absent number; TOML has none of its own."""
+MANY: Final = 10**12
+"""Upper bound of numbers that have no other: larger than any that makes sense."""
+MAX_SEED: Final = 2**63 - 1
+"""Upper bound of seeds, which are stored as int64."""
 WORDS = {bool: "true or false", int: "a whole number", float: "a number", str: "text in quotes"}
 
 
-def read_toml(path: Path) -> dict[str, Any]:
-    """Return what a file of settings says.
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """Values that a number in a config may have: `Annotated[int, Bounds(16, 1024)]`."""
+
+    min: float
+    """Smallest value."""
+    max: float = MANY
+    """Largest value."""
+    advice: str = ""
+    """End of the error message; empty: "expected" and the range."""
+    exclusive: bool = False
+    """Refuse `min` itself."""
+
+    def __contains__(self, value: float) -> bool:
+        above = self.min < value if self.exclusive else self.min <= value
+        return above and value <= self.max
+
+    def __str__(self) -> str:
+        if self.max != MANY:
+            return f"{self.min} … {'2^63 - 1' if self.max == MAX_SEED else self.max}"
+        return f"more than {self.min}" if self.exclusive else f"{self.min} or more"
+
+    def expected(self, value: float) -> str:
+        """Return the range that a refused value should lie in."""
+        return f"at most {self.max}" if value > self.max == MANY else str(self)
+
+
+MESSAGE: Final = "{key} is {value}: {advice}"
+
+
+def check_bounds(config: DataclassInstance, message: str = MESSAGE, prefix: str = "") -> None:
+    """Check every number of a config, and of those inside it, against its bounds.
+
+    Parameters
+    ----------
+    config
+        A dataclass; numbers whose type names no bounds are not checked.
+    message
+        Format of the error. Fields: key, value, bounds, expected (the range) and advice (that of
+        the bounds, or "expected" and the range).
+    prefix
+        Dotted key of the config itself, ending in a dot; empty at the top.
 
     Raises
     ------
     UsageError
-        It cannot be read, or is not TOML.
+        A number is out of its bounds.
+
+    """
+    for key, value, bounds in _bounded(config, prefix):
+        if value not in bounds:
+            expected = bounds.expected(value)
+            advice = bounds.advice or f"expected {expected}"
+            raise UsageError(
+                message.format(
+                    key=key, value=value, bounds=bounds, expected=expected, advice=advice
+                )
+            )
+
+
+def _bounded(config: DataclassInstance, prefix: str) -> Iterator[tuple[str, float, Bounds]]:
+    """Yield key, value and bounds of every number, items of tuples too."""
+    hints = bounds_of(type(config))
+    for field in dataclasses.fields(config):
+        key, value = prefix + field.name, getattr(config, field.name)
+        if dataclasses.is_dataclass(value) and not isinstance(value, type):
+            yield from _bounded(value, f"{key}.")
+        elif value is not None and (bounds := hints.get(field.name)):
+            if isinstance(value, tuple):
+                yield from ((f"{key}[{k}]", item, bounds) for k, item in enumerate(value))
+            else:
+                yield key, value, bounds
+
+
+@functools.cache
+def bounds_of(cls: type[DataclassInstance]) -> Mapping[str, Bounds]:
+    """Return the bounds of a config's numbers, and of the items of its tuples, by field name."""
+    hints = typing.get_type_hints(cls, include_extras=True)
+    return {
+        field.name: bounds
+        for field in dataclasses.fields(cls)
+        for bounds in _in_hint(hints[field.name])
+    }
+
+
+def _in_hint(hint: Any) -> Iterator[Bounds]:  # noqa: ANN401 - a type hint
+    """Yield the first bounds in a hint: of a number, or of a tuple's items."""
+    if typing.get_origin(hint) is tuple:
+        hint = typing.get_args(hint)[0]
+    yield from (note for note in getattr(hint, "__metadata__", ())[:1] if isinstance(note, Bounds))
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Return the values in a file of settings.
+
+    Raises
+    ------
+    UsageError
+        The file cannot be read, or is not TOML.
 
     """
     try:
@@ -77,7 +175,7 @@ def from_mapping(
     values
         Nested values by field name.
     where
-        Where the values come from, for error messages.
+        Source of the values, for error messages: a file, an option.
     elsewhere
         Names that are options of the command line only.
     prefix
@@ -110,7 +208,14 @@ def from_mapping(
 
 
 def updated(config: C, assignment: str, elsewhere: Sequence[str] = ()) -> C:
-    """Return a config with one `a.b=c` applied; c is read as TOML, or as text for texts."""
+    """Return a config with one `a.b=c` applied; c is read as TOML, or as text for texts.
+
+    Raises
+    ------
+    UsageError
+        `assignment` is not of this form, its key is unknown, or its value has the wrong type.
+
+    """
     where = f"--set {assignment}"
     key, equals, text = (piece.strip() for piece in assignment.partition("="))
     if not equals or not key:
@@ -209,23 +314,45 @@ def _typed_tuple(value: Any, members: tuple[Any, ...], where: str) -> tuple[Any,
 
 
 WIDTH = 96
+_GLUE = "\N{NO-BREAK SPACE}"
 
 
 def config_toml(config: DataclassInstance, program: str = "internav-gen") -> str:
-    """Return all settings of a config with what they mean; its program reads it back."""
+    """Return all settings of a config as TOML, each with its meaning and its bounds.
+
+    The program reads it back: `--config FILE`.
+    """
     head = f"Settings of {program}: --config FILE reads them, --set KEY=VALUE overrides one."
-    return "\n".join([f"# {head}", *_table(config, "")]) + "\n"
+    return "\n".join([f"# {head}", *_table(config, "")]).replace(_GLUE, " ") + "\n"
 
 
-def _table(config: Any, name: str) -> list[str]:  # noqa: ANN401 - a dataclass
-    notes = descriptions(type(config))
+def settings_notes(cls: type[DataclassInstance]) -> dict[str, str]:
+    """Return meaning and bounds of a config's fields, a line each, by name.
+
+    Spaces inside a range are such that no line breaks at them.
+    """
+    notes, bounds = descriptions(cls), bounds_of(cls)
+    return {
+        field.name: " ".join(
+            [
+                *notes.get(field.name, "").split(),
+                *(f"Range: {b}.".replace(" ", _GLUE) for b in [bounds.get(field.name)] if b),
+            ]
+        )
+        for field in dataclasses.fields(cls)
+    }
+
+
+def _table(config: DataclassInstance, name: str) -> list[str]:
+    notes = settings_notes(type(config))
     lines: list[str] = []
     tables: list[str] = []
     for field in dataclasses.fields(config):
         value = getattr(config, field.name)
-        note = " ".join(notes.get(field.name, "").split())
-        comment = textwrap.wrap(note, WIDTH, initial_indent="# ", subsequent_indent="# ")
-        if dataclasses.is_dataclass(value):
+        comment = textwrap.wrap(
+            notes[field.name], WIDTH, initial_indent="# ", subsequent_indent="# "
+        )
+        if dataclasses.is_dataclass(value) and not isinstance(value, type):
             tables += ["", *comment, f"[{name}{field.name}]", *_table(value, f"{field.name}.")]
         elif value is None and field.default is not None:
             lines += ["", *comment, f"{field.name} = {_value(NOTHING)}"]

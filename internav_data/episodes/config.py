@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
+from internav_data.core.config import Bounds, check_bounds
 from internav_data.physics.engines import DEFAULT_ENGINE, ENGINES
 from internav_data.records.errors import UsageError
 from internav_data.records.physics import PUSH_SPECS, PushModel
+
+ObstacleCount = Annotated[int, Bounds(1)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,17 +24,17 @@ class EpisodeConfig:
     }
     """Present names of keys of earlier versions, for the error that refuses these."""
 
-    max_obstacles: tuple[int, int, int] = (4, 9, 16)
+    max_obstacles: tuple[ObstacleCount, ObstacleCount, ObstacleCount] = (4, 9, 16)
     """Most obstacles in houses of 1-2, 3-5 and 6-10 rooms; then start and goal are drawn anew."""
-    lateral_std_m: float = 0.40
+    lateral_std_m: Annotated[float, Bounds(0.0)] = 0.40
     """Standard deviation of an obstacle's distance from the way, metres."""
-    gap_m: float = 0.01
+    gap_m: Annotated[float, Bounds(0.0)] = 0.01
     """Least distance between an obstacle and everything else when it is spawned, metres."""
-    min_shortest_path_m: float = 2.0
+    min_shortest_path_m: Annotated[float, Bounds(0.0, exclusive=True)] = 2.0
     """Least any-angle distance from start to goal without obstacles, metres."""
-    max_spawn_tries: int = 200
+    max_spawn_tries: Annotated[int, Bounds(1)] = 200
     """Spots tried for the obstacles of one start and goal."""
-    max_redraws: int = 50
+    max_redraws: Annotated[int, Bounds(1)] = 50
     """Starts and goals tried for one episode."""
     keep_unsolvable: bool = False
     """Keep episodes for which the expert finds no plan, their `expert` null; else draw again."""
@@ -43,38 +46,23 @@ class EpisodeConfig:
     """Each split draws its obstacles from its own share of the assets (2/3, 1/6, 1/6)."""
 
     def check(self) -> None:
-        """Raise UsageError for a value that cannot be meant."""
-        problems = [
-            (
-                any(limit < 1 for limit in self.max_obstacles),
-                f"max_obstacles: expected three counts of at least 1, got {self.max_obstacles}",
-            ),
-            (
-                self.lateral_std_m < 0.0,
-                f"lateral_std_m: expected 0 or more, got {self.lateral_std_m}",
-            ),
-            (self.gap_m < 0.0, f"gap_m: expected 0 or more, got {self.gap_m}"),
-            (
-                self.min_shortest_path_m <= 0.0,
-                f"min_shortest_path_m: expected more than 0, got {self.min_shortest_path_m}",
-            ),
-            (
-                self.max_spawn_tries < 1,
-                f"max_spawn_tries: expected at least 1, got {self.max_spawn_tries}",
-            ),
-            (self.max_redraws < 1, f"max_redraws: expected at least 1, got {self.max_redraws}"),
-            (
-                self.push_model not in PUSH_SPECS,
-                f"push_model: expected one of {', '.join(PUSH_SPECS)}, got {self.push_model!r}",
-            ),
-            (
-                self.engine not in ENGINES,
-                f"engine: expected one of {', '.join(ENGINES)}, got {self.engine!r}",
-            ),
-        ]
-        for wrong, message in problems:
-            if wrong:
-                raise UsageError(f"episodes.{message}")
+        """Check all values.
+
+        Raises
+        ------
+        UsageError
+            A value is out of its bounds, or no push model or engine has the name.
+
+        """
+        check_bounds(self, "{key}: expected {expected}, got {value}", "episodes.")
+        for key, value, names in (
+            ("push_model", self.push_model, PUSH_SPECS),
+            ("engine", self.engine, ENGINES),
+        ):
+            if value not in names:
+                raise UsageError(
+                    f"episodes.{key}: expected one of {', '.join(names)}, got {value!r}"
+                )
 
     def max_obstacles_for(self, room_count: int) -> int:
         """Most obstacles for a house of that many rooms."""

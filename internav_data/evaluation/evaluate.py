@@ -8,10 +8,11 @@ between batch sizes; at an even chance in a million a sampled action can then di
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
 import numpy as np
 
+from internav_data.core.config import MAX_SEED, Bounds, check_bounds
 from internav_data.evaluation.metrics import EpisodeResult, result_of
 from internav_data.records import EvaluationStream, Purpose, generator
 from internav_data.records.errors import UsageError
@@ -29,8 +30,8 @@ if TYPE_CHECKING:
     Observations = Mapping[str, NDArray[Any]]
     Tell = Callable[[int, int], None]
 
-"""What an empty seat does: nothing, until the last episodes have ended."""
 STEPS_AT_MOST = 10_000
+"""Upper bound of `EvaluationConfig.max_steps`."""
 
 
 class Policy(Protocol):
@@ -56,30 +57,29 @@ class Policy(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class EvaluationConfig:
-    """How an evaluation is made."""
+    """Settings of an evaluation."""
 
-    seed: int = 0
+    seed: Annotated[int, Bounds(0, MAX_SEED)] = 0
     """Actions are drawn by a generator keyed by this and the episode."""
-    batch: int = 16
+    batch: Annotated[int, Bounds(1)] = 16
     """Episodes side by side."""
-    workers: int = 0
-    """Processes that step them; 0: this one."""
-    max_steps: int = 500
-    limit: int | None = None
-    """So many episodes only: a fixed random choice, of which a smaller limit's is a part."""
+    workers: Annotated[int, Bounds(0)] = 0
+    """Processes that step the episodes; 0: this one."""
+    max_steps: Annotated[int, Bounds(1, STEPS_AT_MOST)] = 500
+    """Steps after which an episode is cut off."""
+    limit: Annotated[int | None, Bounds(1)] = None
+    """Maximum number of episodes: a fixed random choice, of which a smaller limit's is a part."""
 
     def check(self) -> None:
-        """Refuse what cannot be meant."""
-        least = {"batch": self.batch, "max_steps": self.max_steps, "limit": self.limit}
-        for name, value in least.items():
-            if value is not None and value < 1:
-                raise UsageError(f"{name}: expected 1 or more, got {value}")
-        if self.max_steps > STEPS_AT_MOST:
-            raise UsageError(f"max_steps: at most {STEPS_AT_MOST}, got {self.max_steps}")
-        if self.seed < 0 or self.workers < 0:
-            raise UsageError(
-                f"seed and workers: expected 0 or more, got {self.seed} and {self.workers}"
-            )
+        """Check all values.
+
+        Raises
+        ------
+        UsageError
+            A value is out of its bounds.
+
+        """
+        check_bounds(self, "{key}: expected {expected}, got {value}")
 
 
 def episode_generator(seed: int, episode: Episode) -> Generator:

@@ -6,9 +6,18 @@ import hashlib
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from internav_data.core.config import from_mapping, nested, plain, read_toml, updated
+from internav_data.core.config import (
+    MAX_SEED,
+    Bounds,
+    check_bounds,
+    from_mapping,
+    nested,
+    plain,
+    read_toml,
+    updated,
+)
 from internav_data.episodes.config import EpisodeConfig
 from internav_data.houses.config import HouseConfig
 from internav_data.houses.plan_file import load_floor_plan
@@ -23,19 +32,18 @@ TEST_SHARE = 10
 """A test scene has one episode for every ten of other scenes, as in the paper (5 for 50)."""
 COMMAND_LINE_ONLY = ("scenes", "workers", "engine", "out")
 """What belongs to a run and not to a dataset's config."""
-MAX_SEED = 2**63 - 1
-"""Seeds are stored as int64."""
+_TEST_ADVICE = "ask for 1 or more episodes, or 0 for a tenth of episodes_per_scene"
 
 
 @dataclass(frozen=True, slots=True)
 class GenerationConfig:
     """The identity of a dataset: equal configs give equal episodes, scene by scene."""
 
-    seed: int = 0
-    """Every random number derives from this and the scene's index; 0 or more."""
-    episodes_per_scene: int = 50
+    seed: Annotated[int, Bounds(0, MAX_SEED, "choose one from 0 to 2^63 - 1")] = 0
+    """Every random number derives from this and the scene's index."""
+    episodes_per_scene: Annotated[int, Bounds(1, advice="ask for 1 or more episodes")] = 50
     """Episodes of each train and val scene."""
-    test_episodes_per_scene: int = 0
+    test_episodes_per_scene: Annotated[int, Bounds(0, advice=_TEST_ADVICE)] = 0
     """Episodes of each test scene; 0 for a tenth of episodes_per_scene, rounded up."""
     assets: tuple[str, ...] = ()
     """Folders of your own meshes that join the catalogue. What counts is their content."""
@@ -45,25 +53,22 @@ class GenerationConfig:
     """How episodes are made."""
 
     def check(self) -> None:
-        """Raise UsageError for values that cannot be meant."""
-        if not 0 <= self.seed <= MAX_SEED:
-            raise UsageError(f"seed is {self.seed}: choose one from 0 to 2^63 - 1")
-        if self.episodes_per_scene < 1:
-            raise UsageError(
-                f"episodes_per_scene is {self.episodes_per_scene}: ask for 1 or more episodes"
-            )
-        if self.test_episodes_per_scene < 0:
-            raise UsageError(
-                f"test_episodes_per_scene is {self.test_episodes_per_scene}: ask for 1 or more "
-                "episodes, or 0 for a tenth of episodes_per_scene"
-            )
+        """Check all values, and that the files they name are there.
+
+        Raises
+        ------
+        UsageError
+            A value is out of its bounds, a folder of meshes is missing, or a floor plan is wrong.
+
+        """
+        self.house.check()
+        self.episodes.check()
+        check_bounds(self)
         for folder in self.assets:
             if not Path(folder).is_dir():
                 raise UsageError(f"assets: '{folder}' is no folder; name a folder with meshes")
-        self.house.check()
         if self.house.floor_plan is not None:
             load_floor_plan(self.house.floor_plan)
-        self.episodes.check()
 
     def episodes_of(self, split: Split) -> int:
         """Return how many episodes a scene of a split has."""

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import TYPE_CHECKING
+from typing import Annotated
 
+from internav_data.core.config import Bounds, check_bounds
 from internav_data.houses.room_types import ROOM_TYPES
 from internav_data.houses.standards import MAX_ROOMS
 from internav_data.records import HousePreset  # noqa: TC001 - fields' types are read at run time
 from internav_data.records.errors import UsageError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 COUNT_HELP = "a count (4), a range (2-5) or a programme (kitchen,living,bedroom:2)"
 
@@ -38,42 +35,48 @@ class HouseConfig:
     (kitchen,living,bedroom:2)."""
     floor_plan: str | None = None
     """Path of a floor plan of your own (TOML or JSON); its rooms are furnished anew each scene."""
-    scale: float = 1.0
+    scale: Annotated[float, Bounds(0.7, 2.0)] = 1.0
     """Lengths of rooms times this; 1.1 makes houses 21 % larger. `paper` only."""
-    scale_small: float = 0.87
+    scale_small: Annotated[float, Bounds(0.7, 2.0)] = 0.87
     """Further factor for houses of 1-2 rooms."""
-    scale_medium: float = 0.89
+    scale_medium: Annotated[float, Bounds(0.7, 2.0)] = 0.89
     """Further factor for houses of 3-5 rooms."""
-    scale_large: float = 1.0
+    scale_large: Annotated[float, Bounds(0.7, 2.0)] = 1.0
     """Further factor for houses of 6-10 rooms."""
-    furnishing: float = 1.0
+    furnishing: Annotated[float, Bounds(0.0, 2.0)] = 1.0
     """How much stands in a room beside what it cannot do without: 0 bare, 1 lived in, 2 crowded."""
-    loops: float = 0.95
+    loops: Annotated[float, Bounds(0.0, 1.0)] = 0.95
     """Share of the sensible further doors that are built, so that there are ways round."""
-    wide_openings: float = 0.95
+    wide_openings: Annotated[float, Bounds(0.0, 1.0)] = 0.95
     """Share of wide, double and open doorways where they make sense. `paper` only."""
-    wings: float = 1.0
+    wings: Annotated[float, Bounds(0.0, 1.0)] = 1.0
     """Share of drawn plans whose living room leads to rooms of its own: longer room paths."""
-    rooms_on_way_medium: float = 2.7
+    rooms_on_way_medium: Annotated[float, Bounds(2.0, 5.0)] = 2.7
     """Rooms on the way between two random points that plans of 3-5 rooms aim at. `paper` only."""
-    rooms_on_way_large: float = 4.2
+    rooms_on_way_large: Annotated[float, Bounds(2.0, 6.0)] = 4.2
     """The same for 6-10 rooms. Doors of loops shorten it again."""
-    hall_from: int = 0
+    hall_from: Annotated[int, Bounds(0, 11)] = 0
     """Houses of this many rooms and more have a hall; 0 for the preset's own: 7 in `paper`, as
     suits Table 2, 5 in `realistic`."""
-    candidates: int = 24
+    candidates: Annotated[int, Bounds(1, 200)] = 24
     """Floor plans drawn for each house; the most homelike one is taken."""
     windows: bool = True
     """Windows in outer walls."""
 
     def check(self) -> RoomsRequest:
-        """Return what `rooms` asks for; raise UsageError for what cannot be meant."""
+        """Check all values and return the request that `rooms` makes.
+
+        Raises
+        ------
+        UsageError
+            A value is out of its bounds, `rooms` cannot be read, or settings exclude each other.
+
+        """
         if self.preset not in {"paper", "realistic"}:
             raise UsageError(f"preset is '{self.preset}': use 'paper' or 'realistic'")
-        for name, (low, high) in _BANDS.items():
-            value = getattr(self, name)
-            if not math.isfinite(value) or not low <= value <= high:
-                raise UsageError(f"{name} is {value}: choose a number from {low:g} to {high:g}")
+        check_bounds(
+            self, "{key} is {value}: choose a number from {bounds.min:g} to {bounds.max:g}"
+        )
         if self.floor_plan is not None and self.rooms:
             raise UsageError("rooms and floor_plan exclude each other: leave one of them out")
         return parse_rooms(self.rooms)
@@ -100,22 +103,6 @@ class HouseConfig:
         if self.preset != "paper" or rooms < medium:
             return None
         return self.rooms_on_way_large if rooms >= large else self.rooms_on_way_medium
-
-
-_BANDS: Mapping[str, tuple[float, float]] = {
-    "scale": (0.7, 2.0),
-    "scale_small": (0.7, 2.0),
-    "scale_medium": (0.7, 2.0),
-    "scale_large": (0.7, 2.0),
-    "furnishing": (0.0, 2.0),
-    "loops": (0.0, 1.0),
-    "wide_openings": (0.0, 1.0),
-    "wings": (0.0, 1.0),
-    "rooms_on_way_medium": (2.0, 5.0),
-    "rooms_on_way_large": (2.0, 6.0),
-    "hall_from": (0, 11),
-    "candidates": (1, 200),
-}
 
 
 def parse_rooms(text: str) -> RoomsRequest:
@@ -178,8 +165,3 @@ def _programme(text: str) -> tuple[str, ...]:
             )
         rooms += [name] * count
     return tuple(rooms)
-
-
-def field_names() -> tuple[str, ...]:
-    """Return the names of all levers."""
-    return tuple(field.name for field in fields(HouseConfig))

@@ -85,3 +85,8 @@ def test_every_field_is_documented():
         notes = descriptions(type(part))
         for field in dataclasses.fields(part):
             assert notes.get(field.name), f"{type(part).__name__}.{field.name}"
+
+
+def test_the_released_penalty_of_a_wrong_done_can_be_set():
+    config = from_mapping(preset("small"), {"data": {"failed_done_reward": -1.0}}, "file")
+    assert config.data.failed_done_reward == -1.0
