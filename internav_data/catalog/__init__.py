@@ -1,18 +1,18 @@
 """What things are: the obstacles, the furniture, and a user's own meshes."""
 
+from internav_data.catalog.asset_types import ASSET_TYPES, FURNITURE, OBSTACLES, AssetType
 from internav_data.catalog.collection import VERSION, Catalogue, catalogue
 from internav_data.catalog.meshes import asset_mesh, part_triangles
-from internav_data.catalog.sheet import FURNITURE, OBSTACLES, SHEETS, TypeSheet
 from internav_data.catalog.splits import split_of_asset
 from internav_data.catalog.user_assets import load_user_assets
 
 __all__ = [
+    "ASSET_TYPES",
     "FURNITURE",
     "OBSTACLES",
-    "SHEETS",
     "VERSION",
+    "AssetType",
     "Catalogue",
-    "TypeSheet",
     "asset_mesh",
     "catalogue",
     "load_user_assets",

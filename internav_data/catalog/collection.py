@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+from internav_data.catalog.asset_types import FURNITURE, OBSTACLES
 from internav_data.catalog.digest import digest_of
 from internav_data.catalog.drawing import draw_type
-from internav_data.catalog.sheet import OBSTACLES, SHEETS
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
@@ -41,12 +41,11 @@ class Catalogue:
 
 
 @lru_cache(maxsize=1)
-def _own() -> tuple[Asset, ...]:
-    return tuple(
-        asset
-        for number, sheet in enumerate(SHEETS.values())
-        for asset in draw_type(sheet, number, spawnable=number < len(OBSTACLES))
-    )
+def own_assets() -> tuple[Asset, ...]:
+    """Draw the assets of all types in the table, the obstacles first."""
+    obstacles = (asset for kind in OBSTACLES for asset in draw_type(kind, spawnable=True))
+    furniture = (asset for kind in FURNITURE for asset in draw_type(kind, spawnable=False))
+    return (*obstacles, *furniture)
 
 
 @lru_cache(maxsize=4)
@@ -58,7 +57,7 @@ def catalogue(asset_dirs: tuple[Path, ...] = ()) -> Catalogue:
     UsageError
         When a folder cannot be read as assets, or two hold the same asset_id.
     """
-    assets = {asset.asset_id: asset for asset in _own()}
+    assets = {asset.asset_id: asset for asset in own_assets()}
     for directory in asset_dirs:
         from internav_data.catalog.user_assets import load_user_assets  # noqa: PLC0415 - trimesh
 

@@ -1,7 +1,7 @@
-"""From a type's sheet to its assets: sizes, roles, masses, frictions, parts.
+"""Assets of one type: sizes, roles, masses, frictions, parts.
 
 Within a type, numbers are drawn by rank: the smallest, the middle and the largest asset have the
-sheet's minimum, median and maximum, and only who gets which is random.
+table's minimum, median and maximum, and only who gets which is random.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from internav_data.catalog.designs import DESIGNS
 from internav_data.catalog.sampling import UniformSampler
 from internav_data.catalog.shapes import Sketch
 from internav_data.records import Asset, Purpose, generator
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.random import Generator
     from numpy.typing import NDArray
 
-    from internav_data.catalog.sheet import Range, TypeSheet
+    from internav_data.catalog.asset_types import AssetType, Range
     from internav_data.records import Vec3
 
 SEED = 0
@@ -50,13 +49,13 @@ def from_share(span: Range, share: float) -> float:
     return median + reach * ((high if share > 0.5 else low) - median)  # noqa: PLR2004 - the median
 
 
-def _sizes(sheet: TypeSheet, rng: Generator) -> list[Vec3]:
-    count = sheet.assets
+def _sizes(asset_type: AssetType, rng: Generator) -> list[Vec3]:
+    count = asset_type.asset_count
     common = rng.random(count)
     axes = []
-    for span in (sheet.width, sheet.depth, sheet.height):
+    for span in (asset_type.width, asset_type.depth, asset_type.height):
         own = rng.random(count)
-        latent = sheet.likeness * common + (1.0 - sheet.likeness) * own
+        latent = asset_type.likeness * common + (1.0 - asset_type.likeness) * own
         ranks = np.argsort(np.argsort(latent, kind="stable"), kind="stable")
         axes.append([_on_grid(from_share(span, share)) for share in shares(ranks)])
     return list(zip(*axes, strict=True))
@@ -67,47 +66,46 @@ def _on_grid(length: float) -> float:
     return round(round(length / grid) * grid, 4)
 
 
-def _mass(sheet: TypeSheet, size: Vec3) -> float:
-    median = sheet.width[1] * sheet.depth[1] * sheet.height[1]
+def _mass(asset_type: AssetType, size: Vec3) -> float:
+    median = asset_type.width[1] * asset_type.depth[1] * asset_type.height[1]
     ratio = (size[0] * size[1] * size[2] / median) ** _MASS_POWER
-    mass = sheet.mass_kg * min(_MASS_LIMITS[1], max(_MASS_LIMITS[0], ratio))
+    mass = asset_type.mass_kg * min(_MASS_LIMITS[1], max(_MASS_LIMITS[0], ratio))
     return float(f"{mass:.3g}")
 
 
-def draw_type(sheet: TypeSheet, number: int, *, spawnable: bool) -> tuple[Asset, ...]:
+def draw_type(asset_type: AssetType, *, spawnable: bool) -> tuple[Asset, ...]:
     """Draw all assets of one type.
 
     Parameters
     ----------
-    sheet
-        Counts, sizes and mass of the type.
-    number
-        Number of the type: its key of random numbers.
+    asset_type
+        Number, design, counts, sizes and mass of the type.
     spawnable
         Whether it is one of the obstacle types.
     """
-    rng = generator(SEED, Purpose.CATALOG, scene=number)
-    sizes = _sizes(sheet, rng)
-    count = sheet.assets
+    rng = generator(SEED, Purpose.CATALOG, scene=asset_type.number)
+    sizes = _sizes(asset_type, rng)
+    count = asset_type.asset_count
     frictions = [from_share(_FRICTION, share) for share in shares(rng.permutation(count))]
     roles = rng.permutation(count).tolist()
-    design = DESIGNS[sheet.type]
     assets = []
     for k, size in enumerate(sizes):
         sketch = Sketch()
-        sampler = UniformSampler(generator(SEED, Purpose.CATALOG, scene=number, episode=k + 1))
-        design(sketch, *size, sampler)
+        rng = generator(SEED, Purpose.CATALOG, scene=asset_type.number, episode=k + 1)
+        asset_type.design(sketch, *size, UniformSampler(rng))
         assets.append(
             Asset(
-                asset_id=f"{sheet.type}_{k + 1:02d}",
-                type=sheet.type,
+                asset_id=f"{asset_type.type}_{k + 1:02d}",
+                type=asset_type.type,
                 size=size,
-                mass_kg=_mass(sheet, size),
+                mass_kg=_mass(asset_type, size),
                 friction=round(frictions[k], 2),
-                pushable=roles[k] < sheet.pushable,
-                pickable=sheet.pushable <= roles[k] < sheet.pushable + sheet.pickable,
+                pushable=roles[k] < asset_type.pushable,
+                pickable=asset_type.pushable
+                <= roles[k]
+                < asset_type.pushable + asset_type.pickable,
                 spawnable=spawnable,
-                blocks=sheet.blocks,
+                blocks=asset_type.blocks,
                 parts=sketch.fitted(size),
             )
         )

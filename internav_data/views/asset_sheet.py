@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from internav_data.catalog import SHEETS
+from internav_data.catalog import ASSET_TYPES
 from internav_data.geometry import part_corners, transform
 from internav_data.records import House, Material, Pose, Room
 from internav_data.records.errors import UsageError
@@ -192,8 +192,8 @@ def draw_asset_sheet(
     UsageError
         A type has no assets.
     """
-    known = [*(t for t in SHEETS if t in catalogue.types)]
-    known += [t for t in catalogue.types if t not in SHEETS]
+    known = [*(t for t in ASSET_TYPES if t in catalogue.types)]
+    known += [t for t in catalogue.types if t not in ASSET_TYPES]
     chosen = list(types) if types is not None else known
     width, height = cell_px
     cells = []

@@ -7,14 +7,75 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from internav_data.catalog import FURNITURE, OBSTACLES, SHEETS, catalogue, split_of_asset
-from internav_data.catalog.collection import VERSION, _own
+from internav_data.catalog import ASSET_TYPES, FURNITURE, OBSTACLES, catalogue, split_of_asset
+from internav_data.catalog.asset_types import by_name
+from internav_data.catalog.collection import VERSION, own_assets
 from internav_data.catalog.digest import digest_of
 from internav_data.catalog.drawing import draw_type, from_share
 from internav_data.geometry import asset_bounds, asset_corners, centre_of_mass
 
 # Content of the released catalogue. A change of any design needs a new VERSION and a new digest.
 GOLDEN = "d2638562630dc7501d1653e77b29538676f64aa077e53315d9bea479744f7ddf"
+
+# Key of each released type's random numbers.
+NUMBERS = {
+    "ArmChair": 0,
+    "DogBed": 1,
+    "Box": 2,
+    "Chair": 3,
+    "Desk": 4,
+    "DiningTable": 5,
+    "SideTable": 6,
+    "Sofa": 7,
+    "Stool": 8,
+    "Television": 9,
+    "Pillow": 10,
+    "Bread": 11,
+    "Apple": 12,
+    "AlarmClock": 13,
+    "Lettuce": 14,
+    "GarbageCan": 15,
+    "Laptop": 16,
+    "Microwave": 17,
+    "Pot": 18,
+    "Tomato": 19,
+    "Bed": 20,
+    "CoffeeTable": 21,
+    "Dresser": 22,
+    "TVStand": 23,
+    "ShelvingUnit": 24,
+    "Bookcase": 25,
+    "Wardrobe": 26,
+    "Nightstand": 27,
+    "Fridge": 28,
+    "CounterTop": 29,
+    "Stove": 30,
+    "Dishwasher": 31,
+    "KitchenIsland": 32,
+    "Sink": 33,
+    "Toilet": 34,
+    "Bathtub": 35,
+    "Shower": 36,
+    "FloorLamp": 37,
+    "HousePlant": 38,
+    "LaundryHamper": 39,
+    "WashingMachine": 40,
+    "ClothesDryer": 41,
+    "Ottoman": 42,
+    "Safe": 43,
+    "OfficeChair": 44,
+    "FilingCabinet": 45,
+    "CoatRack": 46,
+    "ShoeCabinet": 47,
+    "Rug": 48,
+    "Painting": 49,
+    "Mirror": 50,
+    "Piano": 51,
+    "Bench": 52,
+    "StorageRack": 53,
+    "Crate": 54,
+    "VanityTable": 55,
+}
 
 # Type: assets, pushable, pickable, fixed, as counted in the simulator.
 COUNTS = {
@@ -53,6 +114,10 @@ def test_counts_are_those_of_the_simulator(type_):
     assert all(a.spawnable for a in assets)
 
 
+def test_the_simulators_counts_name_every_obstacle_type():
+    assert set(COUNTS) == {kind.type for kind in OBSTACLES}
+
+
 def test_sums_agree():
     spawnable = catalogue().spawnable
     assert len(spawnable) == 655
@@ -63,41 +128,41 @@ def test_sums_agree():
 
 
 def test_furniture_is_not_movable_and_of_many_types():
-    for sheet in FURNITURE:
-        for asset in catalogue().of_type(sheet.type):
+    for kind in FURNITURE:
+        for asset in catalogue().of_type(kind.type):
             assert not (asset.pushable)
             assert not (asset.pickable)
             assert not (asset.spawnable)
-            assert asset.blocks == (sheet.type != "Rug")
+            assert asset.blocks == (kind.type != "Rug")
     assert len(FURNITURE) >= 30
     assert all(4 <= len(catalogue().of_type(s.type)) <= 12 for s in FURNITURE if s.type != "Piano")
 
 
-@pytest.mark.parametrize("sheet", SHEETS.values(), ids=lambda s: s.type)
-def test_sizes_lie_in_the_sheet_with_its_median(sheet):
-    assets = catalogue().of_type(sheet.type)
-    for axis, (low, median, high) in enumerate((sheet.width, sheet.depth, sheet.height)):
+@pytest.mark.parametrize("kind", ASSET_TYPES.values(), ids=lambda s: s.type)
+def test_sizes_lie_in_the_sheet_with_its_median(kind):
+    assets = catalogue().of_type(kind.type)
+    for axis, (low, median, high) in enumerate((kind.width, kind.depth, kind.height)):
         sizes = [a.size[axis] for a in assets]
         assert min(sizes) >= low - 0.0011
         assert max(sizes) <= high + 0.0011
-        if sheet in OBSTACLES:
+        if kind in OBSTACLES:
             assert statistics.median(sizes) == pytest.approx(median, rel=0.04, abs=0.0021)
             assert (min(sizes), max(sizes)) == pytest.approx((low, high), abs=0.0011)
 
 
-@pytest.mark.parametrize("sheet", OBSTACLES, ids=lambda s: s.type)
-def test_mass_grows_with_volume_around_the_sheets(sheet):
-    assets = sorted(catalogue().of_type(sheet.type), key=lambda a: math.prod(a.size))
+@pytest.mark.parametrize("kind", OBSTACLES, ids=lambda s: s.type)
+def test_mass_grows_with_volume_around_the_sheets(kind):
+    assets = sorted(catalogue().of_type(kind.type), key=lambda a: math.prod(a.size))
     masses = [a.mass_kg for a in assets]
     assert masses == sorted(masses)
-    assert 0.49 * sheet.mass_kg <= masses[0] <= sheet.mass_kg <= masses[-1] <= 2.01 * sheet.mass_kg
+    assert 0.49 * kind.mass_kg <= masses[0] <= kind.mass_kg <= masses[-1] <= 2.01 * kind.mass_kg
     frictions = [a.friction for a in assets]
     assert min(frictions) >= 0.4
     assert max(frictions) <= 0.8
     assert statistics.median(frictions) == pytest.approx(0.6, abs=0.02)
 
 
-@pytest.mark.parametrize("type_", SHEETS)
+@pytest.mark.parametrize("type_", ASSET_TYPES)
 def test_bounds_are_the_size_exactly(type_):
     for asset in catalogue().of_type(type_):
         low, high = asset_bounds(asset)
@@ -106,7 +171,7 @@ def test_bounds_are_the_size_exactly(type_):
         np.testing.assert_allclose(high, (w / 2, d / 2, h), atol=1e-6, err_msg=asset.asset_id)
 
 
-@pytest.mark.parametrize("type_", [t for t in SHEETS if t not in {"Painting", "Mirror"}])
+@pytest.mark.parametrize("type_", [t for t in ASSET_TYPES if t not in {"Painting", "Mirror"}])
 def test_stands_stably(type_):
     """The centre of mass lies above the hull of what touches the floor, 4 mm or 5 % within."""
     for asset in catalogue().of_type(type_):
@@ -130,7 +195,7 @@ def test_stored_numbers_are_rounded():
 
 
 def test_ids_are_unique_and_sorted():
-    own = _own()
+    own = own_assets()
     assert len({a.asset_id for a in own}) == len(own) == len(ASSETS)
     assert list(catalogue().assets) == sorted(catalogue().assets)
     assert all(key == asset.asset_id for key, asset in catalogue().assets.items())
@@ -155,9 +220,36 @@ def test_digest_sees_every_change():
 
 
 def test_drawing_a_type_needs_no_other():
-    sheet = SHEETS["Pot"]
-    place = list(SHEETS).index("Pot")
-    assert draw_type(sheet, place, spawnable=True) == tuple(a for a in _own() if a.type == "Pot")
+    pots = tuple(asset for asset in own_assets() if asset.type == "Pot")
+    assert draw_type(ASSET_TYPES["Pot"], spawnable=True) == pots
+
+
+def test_a_new_type_redraws_no_other():
+    """An obstacle type in the middle of the table leaves the bytes of all other assets alone."""
+    new = ASSET_TYPES["Box"]._replace(type="Parcel", number=max(NUMBERS.values()) + 1)
+    grown = by_name((*OBSTACLES[:7], new, *OBSTACLES[7:], *FURNITURE))
+    drawn = [
+        asset
+        for kind in grown.values()
+        for asset in draw_type(kind, spawnable=kind in (new, *OBSTACLES))
+    ]
+    others = [asset for asset in drawn if asset.type != "Parcel"]
+    assert len(drawn) == len(others) + new.asset_count
+    assert digest_of(VERSION, sorted(others, key=lambda a: a.asset_id)) == GOLDEN
+
+
+def test_numbers_are_the_released_ones():
+    """A changed number would redraw its type; a new type's number is written down here."""
+    assert {kind.type: kind.number for kind in ASSET_TYPES.values()} == NUMBERS
+
+
+def test_numbers_and_names_stand_once():
+    taken = ASSET_TYPES["Pot"]._replace(type="Pan")
+    with pytest.raises(ValueError, match="'Pot' and 'Pan' have the same number 18"):
+        by_name((*ASSET_TYPES.values(), taken))
+    twice = ASSET_TYPES["Pot"]._replace(number=1000)
+    with pytest.raises(ValueError, match="'Pot' stands twice"):
+        by_name((*ASSET_TYPES.values(), twice))
 
 
 def test_shares_reach_the_three_figures():
@@ -167,9 +259,9 @@ def test_shares_reach_the_three_figures():
 
 
 def test_splits_take_their_shares():
-    for sheet in OBSTACLES:
-        splits = [split_of_asset(a) for a in catalogue().of_type(sheet.type)]
-        if sheet.type == "DogBed":
+    for kind in OBSTACLES:
+        splits = [split_of_asset(a) for a in catalogue().of_type(kind.type)]
+        if kind.type == "DogBed":
             assert set(splits) == {"train"}
             continue
         count = len(splits)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from internav_data.catalog import SHEETS, asset_mesh, catalogue, part_triangles
+from internav_data.catalog import ASSET_TYPES, asset_mesh, catalogue, part_triangles
 from internav_data.catalog.shapes import Paint, Sketch
 from internav_data.geometry import asset_bounds, part_corners
 
@@ -18,7 +18,7 @@ def volume(vertices, faces):
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
 
 
-@pytest.mark.parametrize("type_", SHEETS)
+@pytest.mark.parametrize("type_", ASSET_TYPES)
 def test_parts_are_solid_convex_and_wound_outwards(type_):
     for asset in catalogue().of_type(type_)[:8]:
         low, high = asset_bounds(asset)
