@@ -1,8 +1,8 @@
-"""The physics engine of a process, with a memory that all processes of a user share.
+"""Per-process physics engine backed by an on-disk result cache shared by the user's processes.
 
-What it is asked about is plain data, and the answer depends on that alone: it is kept on disk
-(`result_cache`). On free ground a thing settles and slides the same way in every house; and
-training asks again what generating has asked before.
+A problem is plain data and its solution depends on nothing else, so solutions are kept on disk
+(`result_cache`). They recur: on free ground an object settles and slides the same way in every
+house, and training meets the scenes that generation has solved.
 """
 
 from __future__ import annotations
@@ -32,26 +32,27 @@ if TYPE_CHECKING:
 
 _PACKAGE: Final = "internav_data"
 _SOLVERS: Final = ("internav_data.geometry", "internav_data.physics")
-"""Packages that solutions come from: none is believed once a file that they import has changed."""
+"""Packages that solutions come from. No cached solution is used once one of their files, or a file
+that they import, has changed."""
 _LIBRARIES: Final = ("numpy", "numba", "llvmlite")
-"""Libraries behind every engine's results, besides its own; the RECORD of an installed library
-holds the digests of all its files."""
+"""Libraries behind the results of every engine, besides those that it names. The RECORD of an
+installed library lists the digests of all its files."""
 _SETTLE: Final = struct.Struct("<7d3d?")
 """Pose; seconds, penetration, reach; at rest."""
 _PUSH: Final = struct.Struct("<d?H")
-"""Seconds, at rest, how many bodies move."""
+"""Seconds, at rest, number of moving bodies."""
 _MOVER: Final = struct.Struct("<7d8dI")
-"""Pose, sweep, bytes of the path; the paths themselves follow."""
+"""Pose, sweep, length of the path in bytes; the paths follow after all of these."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CachedEngine:
-    """An engine that is asked only what neither this process nor another one has had solved."""
+    """An engine that solves only problems whose solution is not in the result cache."""
 
     engine: Engine
     result_cache: ResultCache
     origin: str
-    """What the answers depend on besides the question: engine, rules, machine."""
+    """Inputs of a solution besides the problem: engine, code, libraries, machine (`origin`)."""
 
     @property
     def name(self) -> str:
@@ -65,7 +66,7 @@ class CachedEngine:
 
     @property
     def rules(self) -> int:
-        """Number of the engine's rules."""
+        """Number of the engine's rules (`Engine.rules`)."""
         return self.engine.rules
 
     @property
@@ -79,7 +80,7 @@ class CachedEngine:
         return self.engine.contact_margin_m
 
     def settle(self, scene: PhysicsScene) -> SettleSolution:
-        """Let the first body of the setting fall until it rests."""
+        """Let the first body of the scene fall until it rests."""
         if not self.result_cache.is_open:
             return self.engine.settle(scene)
         key = self._key("settle", scene)
@@ -90,7 +91,7 @@ class CachedEngine:
         return known
 
     def push(self, scene: PhysicsScene, spec: PushSpec) -> PushSolution:
-        """Push the first body of the setting along +x."""
+        """Push the first body of the scene along +x."""
         if not self.result_cache.is_open:
             return self.engine.push(scene, spec)
         key = self._key(repr(spec), scene)
@@ -101,6 +102,8 @@ class CachedEngine:
         return known
 
     def _key(self, what: str, scene: PhysicsScene) -> bytes:
+        # By geometry, not by asset: equal parts under another id, or with other dynamics of the
+        # asset's own, are the same problem.
         bodies = (
             (_digest(b.asset), b.dynamics.mass_kg, b.dynamics.friction, b.pose, b.moves)
             for b in scene.bodies
@@ -111,7 +114,7 @@ class CachedEngine:
 
 @lru_cache(maxsize=8192)
 def _digest(asset: Asset) -> str:
-    """Digest of the geometry: its parts are all that an engine sees of an asset."""
+    """Digest of the geometry: an engine sees nothing of an asset but its parts."""
     return hashlib.sha256(repr(asset.parts).encode()).hexdigest()
 
 
@@ -144,7 +147,7 @@ def _write_push(solution: PushSolution) -> bytes:
 
 
 def _read_push(value: bytes | None, movers: int) -> PushSolution | None:
-    """Read a motion of so many bodies; None where it is none."""
+    """Read a solution of `movers` moving bodies; None for bytes that are none."""
     at = _PUSH.size + movers * _MOVER.size
     if value is None or len(value) < at:
         return None
@@ -164,15 +167,16 @@ def _read_push(value: bytes | None, movers: int) -> PushSolution | None:
 
 
 def solver_modules(root: Path, start: tuple[str, ...] = _SOLVERS) -> dict[str, Path]:
-    """Return the modules that solutions come from, found by walking imports.
+    """Return the modules that solutions depend on, found by walking imports.
 
     Parameters
     ----------
     root : Path
         Directory that holds the package `internav_data`.
     start : tuple of str
-        Packages to begin at: all of their modules count, and every module of ours that one of
-        these imports, at its top or inside a function. Imports for type checkers do not count.
+        Packages to begin at. Result: all of their modules, and every module of `internav_data`
+        that one of these imports, at its top or inside a function. Imports for type checkers do
+        not count.
 
     Returns
     -------
@@ -199,7 +203,7 @@ def solver_modules(root: Path, start: tuple[str, ...] = _SOLVERS) -> dict[str, P
 
 
 def _source_of(root: Path, name: str) -> Path | None:
-    """Return the file of one of our modules; None where a name is no module."""
+    """Return the source file of a module of this package; None for any other name."""
     if name.split(".", maxsplit=1)[0] != _PACKAGE:
         return None
     stem = root.joinpath(*name.split("."))
@@ -208,7 +212,7 @@ def _source_of(root: Path, name: str) -> Path | None:
 
 
 def _imported(file: Path) -> list[str]:
-    """Return what a file imports when it runs: modules, and names that may be modules."""
+    """Return the names that a file imports when it runs: modules, and names in modules."""
 
     def walk(node: ast.AST) -> Iterator[str]:
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
@@ -234,14 +238,14 @@ def code_digest(root: Path, start: tuple[str, ...] = _SOLVERS) -> str:
 
 
 _CODE: Final = code_digest(Path(__file__).parents[2])
-"""Of the files as they were imported: they may change while a process lives."""
+"""Digest of the files as they were imported: they may change while a process runs."""
 
 
 @lru_cache(maxsize=8)
 def origin(engine: Engine) -> str | None:
-    """Return what answers depend on besides the question; None where that cannot be told.
+    """Return the inputs of a solution besides the problem, as text; None if they are unknown.
 
-    Another build of a library, and a processor with other instructions, may round otherwise.
+    Another build of a library and a processor with other instructions may round differently.
     """
     from llvmlite.binding import get_host_cpu_features, get_host_cpu_name  # noqa: PLC0415 - heavy
 

@@ -1,4 +1,4 @@
-"""How far a thing moved and turned from one pose to another."""
+"""Displacement, tilt and rest: comparisons of an object's poses before and after."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ if TYPE_CHECKING:
 
 STILL_M: Final = 0.0005
 STILL_RAD: Final = 0.001
-"""A neighbour that moved less has not moved: the engine's own trembling."""
+"""A neighbour that moved and turned less has not moved: an engine's bodies tremble at rest."""
 
 
 def _rotated(quaternion: Quaternion, vector: Vec3) -> Vec3:
-    """Turn a vector; plain floats, since arrays of three cost more than they save."""
+    """Rotate a vector. Plain floats: numpy arrays of three cost more than they save."""
     x, y, z, w = quaternion
     u, v, t = vector
     s = 2.0 / (x * x + y * y + z * z + w * w)
@@ -30,7 +30,7 @@ def _rotated(quaternion: Quaternion, vector: Vec3) -> Vec3:
 
 
 def shift_m(asset: Asset, before: Pose, after: Pose) -> float:
-    """How far a thing's centre of mass moved in the plane, metres."""
+    """Return the distance in the plane that an object's centre of mass moved, metres."""
     middle = centre_of_mass(asset)
     ax, ay, _ = _rotated(before.quaternion, middle)
     bx, by, _ = _rotated(after.quaternion, middle)
@@ -38,13 +38,14 @@ def shift_m(asset: Asset, before: Pose, after: Pose) -> float:
 
 
 def tilt_deg(before: Quaternion, after: Quaternion) -> float:
-    """Angle between a thing's own upward axis before and after, degrees."""
+    """Return the angle between an object's upward axis before and after, degrees."""
     a, b = _rotated(before, (0.0, 0.0, 1.0)), _rotated(after, (0.0, 0.0, 1.0))
     return math.degrees(math.acos(max(-1.0, min(1.0, a[0] * b[0] + a[1] * b[1] + a[2] * b[2]))))
 
 
 def is_still(here: Pose, there: Pose) -> bool:
-    """Whether a thing moved less than the engine trembles."""
+    """Return whether two poses differ by less than an engine's bodies tremble at rest."""
     near = math.dist((here.x, here.y, here.z), (there.x, there.y, there.z)) < STILL_M
+    # q and -q are one orientation; the angle between two is twice the arc cosine of |p . q|.
     turn = abs(sum(p * q for p, q in zip(here.quaternion, there.quaternion, strict=True)))
     return near and 2.0 * math.acos(min(1.0, turn)) < STILL_RAD

@@ -1,8 +1,10 @@
-"""Octagons: what a thing, or all that a moving one sweeps, reaches in the plane.
+"""Planar k-DOPs with k = 8: bounds of an object, or of the area that a moving one sweeps.
 
-Eight numbers say how far a shape reaches along x, x + y, y, y - x, -x, -x - y, -y and x - y (its
-support along these, the slanted ones not divided by the root of two). Two convex shapes that one
-of these directions parts do not touch. Only sums are needed, and quarter turns only shift them.
+A k-DOP (discrete oriented polytope, Klosowski et al. 1998) holds a shape's supports along k fixed
+directions: x, x + y, y, y - x, -x, -x - y, -y and x - y. The slanted directions are not normalised:
+their length is the root of two, and a margin counts times as much along them. Two shapes do not
+touch if one of the directions separates their 8-DOPs. Only sums are needed, and a quarter turn
+shifts the eight numbers by two places.
 """
 
 from __future__ import annotations
@@ -17,10 +19,10 @@ if TYPE_CHECKING:
     from internav_data.core.typing import Floats, Ints
 
 Dop8 = tuple[float, float, float, float, float, float, float, float]
-"""Supports along x, x + y, y, y - x and their opposites, metres."""
+"""Supports along x, x + y, y, y - x and their opposites, metres (the slanted ones times √2)."""
 
 EMPTY: Final[Dop8] = (-math.inf,) * 8
-"""What is held: it touches nothing."""
+"""8-DOP of a held object: it touches nothing."""
 SLANT: Final = math.sqrt(2.0)
 """Length of the slanted directions: a margin of 1 m adds this much along them."""
 
@@ -29,7 +31,21 @@ SLANT: Final = math.sqrt(2.0)
 def widen(
     reach: Floats, corners: Floats, px: float, py: float, qx: float, qy: float, qz: float, qw: float
 ) -> None:
-    """Widen supports (8,), in place, to hold corners (n, 3) turned by a quaternion and moved."""
+    """Widen an 8-DOP in place so that it holds an object's corners at a pose.
+
+    Parameters
+    ----------
+    reach : (8,) float64
+        Supports to widen, metres.
+    corners : (n, 3) float64
+        Corners in the frame of the pose, metres.
+    px, py
+        Position of the pose in the plane, metres.
+    qx, qy, qz, qw
+        Orientation of the pose; need not have unit length.
+
+    """
+    # The first two rows of the rotation matrix; heights do not matter here.
     s = 2.0 / (qx * qx + qy * qy + qz * qz + qw * qw)
     a, b, c = 1.0 - s * (qy * qy + qz * qz), s * (qx * qy - qz * qw), s * (qx * qz + qy * qw)
     d, e, f = s * (qx * qy + qz * qw), 1.0 - s * (qx * qx + qz * qz), s * (qy * qz - qx * qw)
@@ -44,11 +60,13 @@ def widen(
 
 @njit(cache=True)
 def _touching(rows: Floats, reach: Floats) -> Ints:
+    """Return the indices of the rows (n, 8) that overlap an 8-DOP (8,)."""
     found = np.empty(len(rows), dtype=np.int64)
     count = 0
     for k in range(len(rows)):
         apart = False
         for d in range(8):
+            # Direction d + 4 is opposite to d: their supports bound the gap between the shapes.
             apart = apart or rows[k, d] + reach[(d + 4) % 8] <= 0.0
         if not apart:
             found[count] = k
@@ -57,25 +75,25 @@ def _touching(rows: Floats, reach: Floats) -> Ints:
 
 
 def touching(rows: Floats, dop8: Dop8) -> list[int]:
-    """Which of some octagons (n, 8) overlap another one, ascending."""
+    """Return the indices of the 8-DOPs, rows (n, 8) float64, that overlap one, ascending."""
     indices: list[int] = _touching(rows, np.array(dop8)).tolist()
     return indices
 
 
 def overlap(first: Dop8, second: Dop8) -> bool:
-    """Whether two octagons overlap."""
+    """Return whether two 8-DOPs overlap."""
     return all(first[d] + second[(d + 4) % 8] > 0.0 for d in range(8))
 
 
 def grown(dop8: Dop8, margin: float) -> Dop8:
-    """Octagon of all within a margin, metres."""
+    """Return an 8-DOP that holds every point within a margin of another one, metres."""
     a, b, c, d, e, f, g, h = dop8
     m, slant = margin, SLANT * margin
     return a + m, b + slant, c + m, d + slant, e + m, f + slant, g + m, h + slant
 
 
 def dop8_of_rectangle(low_x: float, low_y: float, high_x: float, high_y: float) -> Dop8:
-    """Octagon of a rectangle along the axes."""
+    """Return the 8-DOP of an axis-aligned rectangle, metres."""
     return (
         *(high_x, high_x + high_y, high_y, high_y - low_x),
         *(-low_x, -low_x - low_y, -low_y, high_x - low_y),
@@ -83,10 +101,10 @@ def dop8_of_rectangle(low_x: float, low_y: float, high_x: float, high_y: float) 
 
 
 def dop8_of_disc(x: float, y: float, radius: float) -> Dop8:
-    """Octagon round a disc."""
+    """Return the 8-DOP of a disc, metres."""
     return grown((x, x + y, y, y - x, -x, -x - y, -y, x - y), radius)
 
 
 def dop8_of_square(x: float, y: float, half: float) -> Dop8:
-    """Octagon of a square along the axes."""
+    """Return the 8-DOP of an axis-aligned square with sides of 2 · `half` metres."""
     return dop8_of_rectangle(x - half, y - half, x + half, y + half)

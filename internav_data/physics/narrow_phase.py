@@ -1,8 +1,11 @@
-"""Touch: what a moving body really comes near, part by part along its path (numba kernels).
+"""Narrow phase: the objects that a moving body comes near, part by part along its path.
 
-Octagons say at once that most of a house is out of reach. Among furniture they say little: a chair
-that is pulled out from under a table overlaps it in the plane. Here parts are compared, by their
-plans and heights, at every pose of the path.
+The broad phase by 8-DOPs (`kdop`) rules out most of a house at once. It says little among
+furniture: a chair that is pulled out from under a table overlaps it in the plane. Here convex parts
+are compared as prisms, plan by height interval, at every recorded pose of the path. The test is
+conservative: parts whose prisms stay apart do not touch, parts whose prisms meet may still miss
+each other. Plans are compared by the separating-axis test (Gottschalk et al. 1996) over the normals
+of their sides. The kernels are compiled by numba.
 """
 
 from __future__ import annotations
@@ -29,24 +32,23 @@ if TYPE_CHECKING:
     from internav_data.records import Asset, Pose
 
 SIDES: Final = 32
-"""Sides of the prism round the agent's column: it stands out by 0.5 % of the radius at most."""
+"""Sides of the prism around the agent's collider, which exceeds its radius by 0.5 % at most."""
 
 
 class ConvexPrisms(NamedTuple):
-    """The convex parts of a thing where it lies, as plans and heights, metres.
-
-    Shapes: vertices (n, 2), counter-clockwise plan after plan; starts (parts + 1,) int64 into
-    them; boxes (parts, 6): how far each part reaches along +x, +y, -x, -y, +z and -z.
-    """
+    """Convex parts of an object at its pose: a plan and a height interval each, metres."""
 
     vertices: Floats
+    """Vertices of all plans, plan after plan, counter-clockwise, (n, 2) float64."""
     starts: Ints
+    """Index of each plan's first vertex, and n, (parts + 1,) int64."""
     boxes: Floats
+    """Supports of each part along +x, +y, -x, -y, +z and -z, (parts, 6) float64."""
 
 
 @lru_cache(maxsize=8192)
 def prisms_of(asset: Asset, pose: Pose) -> ConvexPrisms:
-    """Outline of a thing where it lies; cached, read-only."""
+    """Return the prisms of an object at a pose; cached, read-only."""
     corners, starts = asset_corners(asset)
     placed = transform(corners, pose)
     boxes = np.empty((len(starts), 6))
@@ -56,7 +58,8 @@ def prisms_of(asset: Asset, pose: Pose) -> ConvexPrisms:
 
 
 def prisms_of_collider(x: float, y: float, radius: float, low: float, high: float) -> ConvexPrisms:
-    """Outline of the prism round an upright cylinder, metres."""
+    """Return the prism around an upright cylinder, axis at (x, y), metres."""
+    # The polygon's sides touch the circle from outside.
     out = radius / math.cos(math.pi / SIDES)
     angles = [2.0 * math.pi * k / SIDES for k in range(SIDES)]
     vertices = [(x + out * math.cos(a), y + out * math.sin(a)) for a in angles]
@@ -66,7 +69,7 @@ def prisms_of_collider(x: float, y: float, radius: float, low: float, high: floa
 
 @njit(cache=True)
 def _plans(corners: Floats, starts: Ints) -> tuple[Floats, Ints]:
-    """Plans of parts (n, 3) as one array of vertices and where each begins."""
+    """Plans of parts, corners (n, 3), as one array of vertices and each plan's first index."""
     vertices = np.empty((len(corners), 2))
     firsts = np.zeros_like(starts)
     count = 0
@@ -86,7 +89,7 @@ def _place(
     shift: tuple[float, float],
     out: Floats,
 ) -> None:
-    """Corners (n, 3) of a body at a pose of its own frame, in the house."""
+    """Write the corners (n, 3) of a body, at a pose (7,) of the own frame, in the house."""
     qx, qy, qz, qw = pose[3], pose[4], pose[5], pose[6]
     s = 2.0 / (qx * qx + qy * qy + qz * qz + qw * qw)
     a, b, c = 1.0 - s * (qy * qy + qz * qz), s * (qx * qy - qz * qw), s * (qx * qz + qy * qw)
@@ -102,7 +105,7 @@ def _place(
 
 @njit(cache=True)
 def _boxes(corners: Floats, starts: Ints, out: Floats) -> None:
-    """Boxes (parts + 1, 6) of parts, and of all."""
+    """Write the boxes of parts, then that of all together, (parts + 1, 6)."""
     parts = len(starts) - 1
     out[:] = -math.inf
     for part in range(parts):
@@ -117,7 +120,7 @@ def _boxes(corners: Floats, starts: Ints, out: Floats) -> None:
 
 @njit(cache=True)
 def _apart(box: Floats, other: Floats, margin: float) -> bool:
-    """Whether two boxes keep more than a margin."""
+    """Return whether two boxes keep more than a margin."""
     for d in range(4):
         if box[d] + other[(d + 2) % 4] < -margin:
             return True
@@ -126,11 +129,15 @@ def _apart(box: Floats, other: Floats, margin: float) -> bool:
 
 @njit(cache=True)
 def _sided(hull: Floats, other: Floats, margin: float) -> bool:
-    """Whether a side of a convex polygon keeps more than a margin from all of another one."""
+    """Return whether a side of a convex polygon keeps more than a margin from another polygon.
+
+    One half of the separating-axis test in the plane; the other half swaps the polygons.
+    """
     count = len(hull)
     for k in range(count):
         following = k + 1 if k + 1 < count else 0
-        # Outwards, to the right of a counter-clockwise side.
+        # The normal points outwards, to the right of a counter-clockwise side. It is not
+        # normalised: the margin is scaled instead.
         nx, ny = hull[following, 1] - hull[k, 1], hull[k, 0] - hull[following, 0]
         bound = nx * hull[k, 0] + ny * hull[k, 1] + margin * math.hypot(nx, ny)
         beyond = True
@@ -147,7 +154,7 @@ def _sided(hull: Floats, other: Floats, margin: float) -> bool:
 def _meets(
     corners: Floats, starts: Ints, boxes: Floats, plan: Floats, box: Floats, margin: float
 ) -> bool:
-    """Whether a placed body comes within a margin of one part of another."""
+    """Return whether a placed body comes within a margin of one part of another."""
     parts = len(starts) - 1
     if _apart(boxes[parts], box, margin):
         return False
@@ -173,6 +180,7 @@ def _met(
     owners: Ints,
     margin: float,
 ) -> Bools:
+    """For each object, whether a body on a path (poses, 7) comes within a margin of it."""
     met = np.zeros(owners[-1] + 1, dtype=np.bool_)
     placed, boxes = np.empty_like(corners), np.empty((len(starts), 6))
     for k in range(len(path)):
@@ -188,20 +196,21 @@ def _met(
 def met_on_path(
     asset: Asset, path: bytes, frame: Frame, others: Sequence[ConvexPrisms], margin: float
 ) -> list[bool]:
-    """Which of some outlines a body comes within a margin of on its path.
+    """Return, for each of some objects, whether a moving body comes within a margin of it.
 
     Parameters
     ----------
     asset
-        What moves.
+        Geometry of the moving body.
     path
-        Its poses in a frame (`PushSolution.paths`).
+        Poses of the body's centre of mass (`PushSolution.paths`).
     frame
-        That frame.
+        Frame of the path.
     others
-        Outlines in the house.
+        Prisms of the objects, in the house's frame.
     margin
-        Metres.
+        Distance, metres.
+
     """
     if not others:
         return []

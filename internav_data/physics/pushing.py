@@ -1,4 +1,10 @@
-"""Push: the poses at which an object, and all that it runs into, come to rest after a push."""
+"""Push: the poses at which an object, and the objects that it strikes, come to rest.
+
+Only objects that are touched take part, for an engine's time grows with every body near enough to
+wake. A push is solved first as if alone, which is cached by asset, dynamics and orientation; then
+with the objects that its path touches, and again with those that their paths touch, until no new
+one is found. 8-DOPs rule out far objects, the narrow phase decides about near ones.
+"""
 
 from __future__ import annotations
 
@@ -33,13 +39,13 @@ if TYPE_CHECKING:
     from internav_data.records import Asset, PushSpec, Quaternion, Vec2
 
     Near = Callable[[Dop8], Sequence[tuple[int, Body]]]
-    """Function from an 8-DOP of the house to the bodies that reach into it, with their keys in
-    ascending order; the pushed object is not among them."""
+    """Function from an 8-DOP of the house to the bodies that reach into it, with their keys,
+    ascending. The pushed object is not among them."""
     Movers = tuple[tuple[int, Body], ...]
     """Bodies that move besides the pushed one, with their keys."""
 
 SUCCESS_M: Final = 0.05
-"""Least displacement of a successful push."""
+"""Minimum displacement of a successful push."""
 TOPPLED_DEG: Final = 45.0
 SWEEP_GAP_M: Final = 0.011
 """Margin round the recorded poses of a moving body. Poses lie up to 1 cm apart, so a body between
@@ -47,7 +53,7 @@ two of them is missed by half of this at most; the engine's contact margin comes
 AGENT_M: Final = AGENT.collider_radius_m
 """Radius of the agent's collider: no object ends inside the agent's disc of 0.2 m."""
 AGENT_MIN_M: Final = 0.2005
-"""Least radius of the collider. It shrinks to the nearest movable object, so that the agent does
+"""Minimum radius of the collider. It shrinks to the nearest movable object, so that the agent does
 not press away an object that already stands closer than `AGENT_M`."""
 MAX_ROUNDS: Final = 8
 """Objects hit but not simulated are added and the push is solved again, at most 8 times; the last
@@ -56,7 +62,8 @@ FAR_M: Final = 4.0
 CROWD_MARGIN_M: Final = 0.2
 """Margin within which a struck object may strike another; used to estimate how many will move."""
 _HEIGHT_DIGITS: Final = 3
-"""Settled objects lie 0.9 or 1.0 mm above the floor: one solution serves both."""
+"""Decimal places of the height of a free push, metres. Settled objects lie 0.9 or 1.0 mm above the
+floor: one solution serves both."""
 _START_DIGITS: Final = 4
 """Orientations of a free push are rounded to 0.1 mrad, which moves a corner by less than the 0.1 mm
 of stored positions: nearly equal ones share their solution."""
@@ -77,7 +84,7 @@ class PushResult:
     displacement_m: float
     """Distance that the pushed object's centre of mass moved in the plane."""
     seconds: float
-    """Simulated time until everything was at rest."""
+    """Simulated time until all bodies were at rest."""
     toppled: bool
     moved: tuple[tuple[int, Pose], ...]
     """Neighbours that moved: their keys, ascending, and new poses."""
@@ -140,7 +147,7 @@ def push(
     agent
         Position of the agent, metres; None for a push without it.
     agent_gap_m
-        Least distance from the agent's axis to anything that can move.
+        Distance from the agent's axis to the nearest object that can move, metres.
     engine
         Name of the physics engine.
 
@@ -223,6 +230,7 @@ def _push_among(
     """
     frame = problem.frame
     for left in reversed(range(MAX_ROUNDS)):
+        # In the order of their keys: the engine's result depends on the order of its bodies.
         around = [(key, known[key]) for key in sorted(known)]
         movers = tuple(pair for pair in around if pair[1].moves)
         others = [pair for pair in around if not pair[1].moves]
@@ -249,7 +257,7 @@ def _met(
     solution: PushSolution,
     known: Container[int] = (),
 ) -> dict[int, Body]:
-    """Gather the bodies, unless known already, that moving assets may touch."""
+    """Gather the bodies that moving assets may touch and that are not known yet."""
     found: dict[int, Body] = {}
     frame, margin = problem.frame, problem.margin_m
     for asset, sweep, path in zip(moving, solution.sweeps, solution.paths, strict=True):
@@ -287,6 +295,7 @@ def _judged(
 
 
 def _coarse(quaternion: Quaternion) -> Quaternion:
+    # Adding zero turns -0.0 into 0.0: equal orientations are equal keys of caches.
     x, y, z, w = (round(q, _START_DIGITS) + 0.0 for q in quaternion)
     return x, y, z, w
 
@@ -301,7 +310,7 @@ def _collider(frame: Frame, agent: Vec2 | None, gap: float) -> AgentCollider | N
 def _meets(
     problem: _Problem, collider: AgentCollider, moving: Sequence[Asset], solution: PushSolution
 ) -> bool:
-    """Whether anything that moves comes near the agent's collider."""
+    """Return whether a moving object comes near the agent's collider."""
     x, y, radius_m = collider.x, collider.y, collider.radius_m
     agent = prisms_of_collider(x, y, radius_m, AGENT_LOW_M, AGENT_HEIGHT_M)
     return any(

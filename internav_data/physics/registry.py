@@ -1,4 +1,4 @@
-"""Physics engines by name, connected at first use, one of each a process."""
+"""Access to the physics engines by name: connected at first use, one of each per process."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _cache_off = False
 
 @contextmanager
 def cache_disabled() -> Iterator[None]:
-    """Solve every problem anew: entries of the result cache are not believed inside."""
+    """Solve every problem anew: inside, the result cache is neither read nor filled."""
     global _cache_off  # noqa: PLW0603 - belongs to the process, as the engines do
     before, _cache_off = _cache_off, True
     try:

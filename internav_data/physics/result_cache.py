@@ -1,7 +1,7 @@
-"""Solutions kept on disk: what was solved once is known to all processes of a user, and later ones.
+"""Result cache on disk: solutions of physics shared by all processes of a user, present and later.
 
-A SQLite file in the user's cache folder: several processes may read and write it, and none of them
-ever fails for it. What cannot be read is solved anew, what cannot be written is forgotten.
+It is a SQLite file in the user's cache folder, which several processes may read and write at once.
+Cache errors are never raised: unreadable entries are recomputed, unwritable ones dropped.
 """
 
 from __future__ import annotations
@@ -18,26 +18,26 @@ from typing import Any, Final
 from platformdirs import user_cache_path
 
 FOLDER_VARIABLE: Final = "INTERNAV_CACHE_DIR"
-"""A folder to keep solutions in rather than the user's cache folder; empty: keep none."""
+"""Environment variable with a folder for the cache instead of the user's; empty for no cache."""
 FILE_NAME: Final = "solutions.sqlite"
 MAX_BYTES: Final = 1 << 30
-"""About 150,000 pushes. Once it is full, the file is emptied."""
+"""Maximum size, about 150,000 pushes. The file is emptied once it is full."""
 _PAGE: Final = 4096
 _OPENING_S: Final = 5.0
-"""How long other processes are waited for at first, so that a busy moment does not cost all."""
+"""Time to wait for a lock while opening, long enough for a busy moment of other processes."""
 _WAIT_S: Final = 0.2
-"""How long later on: a solution takes some milliseconds."""
+"""Time to wait for a lock later: solving anew takes some milliseconds."""
 _BATCH: Final = 32
-"""Values written down together: one by one each would cost a tenth of what it saves."""
+"""Values written in one transaction: one by one, each would cost a tenth of what it saves."""
 _MAX_VALUE_BYTES: Final = 4 << 20
-"""Longer values are neither kept nor read: a push of twenty things takes a tenth of it."""
+"""Longer values are neither kept nor read: a push of twenty objects takes a tenth of it."""
 _CHECK: Final = 4
-"""Bytes of a value's CRC-32, before the value itself."""
+"""Length of the CRC-32 that stands before each value, bytes."""
 _TABLE: Final = "CREATE TABLE solutions (key BLOB PRIMARY KEY, value BLOB) WITHOUT ROWID"
 
 
 def cache_folder() -> Path | None:
-    """Return the folder for solutions, whether it exists or not; None where none are kept."""
+    """Return the cache's folder, which need not exist; None if nothing is cached."""
     chosen = os.environ.get(FOLDER_VARIABLE)
     if chosen is not None:
         return Path(chosen) if chosen else None
@@ -48,12 +48,13 @@ def cache_folder() -> Path | None:
 
 
 class ResultCache:
-    """Values under keys, both bytes; kept for as long as the file is.
+    """Mapping from keys to values, both bytes, in a file.
 
     Parameters
     ----------
     folder
-        Where the file is, or will be; None: nothing is kept.
+        Folder of the file, made if missing; None for a cache that keeps nothing.
+
     """
 
     def __init__(self, folder: Path | None) -> None:
@@ -68,11 +69,11 @@ class ResultCache:
 
     @property
     def is_open(self) -> bool:
-        """Whether anything can be kept."""
+        """Whether values can be kept: the file is usable and was opened by this process."""
         return self._file is not None and self._process == os.getpid()
 
     def get(self, key: bytes) -> bytes | None:
-        """Return what was kept under a key; None where nothing was, or it is damaged."""
+        """Return the value of a key; None if there is none or it is damaged."""
         kept = self._new.get(key)
         if kept is None:
             rows = self._ask("SELECT value FROM solutions WHERE key = ?", key)
@@ -83,14 +84,14 @@ class ResultCache:
         return value if check == _checked(value) else None
 
     def put(self, key: bytes, value: bytes) -> None:
-        """Keep a value, if that is possible: written down with the next few."""
+        """Keep a value if possible; it is written together with the next few."""
         if self.is_open and len(value) < _MAX_VALUE_BYTES:
             self._new[key] = _checked(value) + value
             if len(self._new) >= _BATCH:
                 self.flush()
 
     def flush(self) -> None:
-        """Write down what was put."""
+        """Write the values that were put since the last flush."""
         rows, self._new = self._new, {}
         if not rows or self._ask("BEGIN IMMEDIATE") is None:
             return
@@ -100,18 +101,18 @@ class ResultCache:
                     return
             self._ask("COMMIT")
         finally:
-            # Whatever came between, an interrupt too: an open transaction would bar all others.
+            # After an interrupt too: an open transaction would lock out all other processes.
             if self._file is not None and self._file.in_transaction:
                 self._ask("ROLLBACK")
 
     def count(self) -> int:
-        """Count what is kept."""
+        """Return the number of values kept."""
         self.flush()
         rows = self._ask("SELECT count(*) FROM solutions")
         return int(rows[0][0]) if rows else 0
 
     def _ask(self, question: str, *values: bytes) -> list[Any] | None:
-        """Return the rows of an answer; None where there is none."""
+        """Return the rows that a statement gives; None if it failed."""
         if self._file is None or self._process != os.getpid():  # SQLite forbids it across forks
             return None
         try:
@@ -120,7 +121,7 @@ class ResultCache:
             if error.sqlite_errorcode == sqlite3.SQLITE_FULL and question.startswith("INSERT"):
                 self._ask("ROLLBACK")
                 self._ask("DELETE FROM solutions")
-        except sqlite3.Error:  # damaged: the next process begins anew
+        except sqlite3.Error:  # damaged: drop the file, the next process starts an empty one
             file, self._file = self._file, None
             with suppress(OSError, sqlite3.Error):
                 file.close()
@@ -134,7 +135,7 @@ def _opened(path: Path) -> sqlite3.Connection:
     except sqlite3.OperationalError:
         raise
     except sqlite3.DatabaseError:
-        # No database, a damaged or another one: nothing in it is worth more than its making.
+        # No database, a damaged or another one: solving its entries again costs little.
         path.unlink()
         return _connected(path)
 
@@ -144,8 +145,8 @@ def _connected(path: Path) -> sqlite3.Connection:
     file = sqlite3.connect(path, timeout=_OPENING_S, isolation_level=None, check_same_thread=False)
     file.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _MAX_VALUE_BYTES + _CHECK)
     file.execute("PRAGMA trusted_schema = OFF")
-    # Nothing is waited for until it lies on the disk: a solution lost is solved again, and a power
-    # cut's damage is told by the check sums.
+    # No waiting for the disk: a lost solution is solved again, and the checksums find the damage
+    # of a power cut.
     file.execute("PRAGMA synchronous = OFF")
     file.execute("PRAGMA journal_mode = TRUNCATE")
     file.execute(f"PRAGMA max_page_count = {MAX_BYTES // _PAGE}")
@@ -153,7 +154,9 @@ def _connected(path: Path) -> sqlite3.Connection:
         file.execute(_TABLE)
     found = file.execute("SELECT type, sql FROM sqlite_schema").fetchall()
     if not found:
-        raise sqlite3.OperationalError(f"{path} is locked or read-only")  # another's, so no unlink
+        raise sqlite3.OperationalError(
+            f"{path} is locked or read-only"
+        )  # in use elsewhere: keep it
     if found != [("table", _TABLE)]:
         file.close()
         raise sqlite3.DatabaseError(f"{path} holds something else: {found}")
@@ -166,11 +169,11 @@ def _checked(value: bytes) -> bytes:
 
 
 def result_cache() -> ResultCache:
-    """Return this process's view of the solutions; a forked process opens its own."""
+    """Return this process's result cache; a forked process opens its own."""
     return _of_process(os.getpid())
 
 
-@cache  # not the last one only: what a forked process inherits must not be closed in it
+@cache  # unbounded: a forked process must not close what it inherits
 def _of_process(_pid: int) -> ResultCache:
     opened = ResultCache(cache_folder())
     atexit.register(opened.flush)

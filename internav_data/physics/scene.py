@@ -1,4 +1,4 @@
-"""Plain data that a physics engine is asked about, and what it answers."""
+"""Problems of physics and their solutions as plain data, and the protocol of an engine."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
 AGENT_LOW_M: Final = 0.022
-"""What is lower than 2 cm is no obstacle (footprints leave it out), so the agent's body begins
-above it: a column down to the floor would wedge under the feet of what it stands beside."""
+"""Bottom of the agent's collider. Footprints leave out parts below 2 cm, so the agent may stand
+over them: a cylinder down to the floor would wedge under the feet of the furniture beside it."""
 AGENT_HEIGHT_M: Final = AGENT.height_m
 
 
@@ -45,7 +45,10 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class AgentCollider:
-    """The agent's body: a fixed upright cylinder from `AGENT_LOW_M` to `AGENT_HEIGHT_M`."""
+    """The agent's body: a fixed upright cylinder from `AGENT_LOW_M` to `AGENT_HEIGHT_M`.
+
+    Its axis stands at (x, y) of the scene, metres.
+    """
 
     x: float
     y: float
@@ -54,22 +57,20 @@ class AgentCollider:
 
 @dataclass(frozen=True, slots=True)
 class PhysicsScene:
-    """A small scene: what can touch each other, everything else left out.
-
-    Bodies enter the engine in this order, on a floor at z = 0.
-    """
+    """A problem for an engine: the few bodies that can touch each other, on a floor at z = 0."""
 
     bodies: tuple[Body, ...]
+    """Bodies in the order in which they enter the engine; the first one falls or is pushed."""
     agent: AgentCollider | None = None
-    """The agent, where it takes part."""
+    """Collider of the agent; None if it takes no part."""
 
 
 def wall_body(wall: Wall) -> Body:
-    """Turn a piece of wall into a fixed body."""
+    """Return a fixed body in the shape of a piece of wall."""
     size = (wall.x_max - wall.x_min, wall.y_max - wall.y_min, wall.z_max - wall.z_min)
     part = Part("box", (0.0, 0.0, size[2] / 2.0), size, UPRIGHT, (), (200, 200, 200), "stone")
     solid = Asset(
-        # Assets are told apart by their ids first: one id for all would make every cache a list.
+        # An asset's hash is that of its id: one id for all walls would make every cache a list.
         asset_id=f"wall {size[0]:.4f} {size[1]:.4f} {size[2]:.4f}",
         type="wall",
         size=size,
@@ -87,39 +88,39 @@ def wall_body(wall: Wall) -> Body:
 
 @dataclass(frozen=True, slots=True)
 class SettleSolution:
-    """How the first body of a setting came to rest."""
+    """An engine's solution of a settle, in the frame of its scene."""
 
     pose: Pose
-    """Not rounded: the caller moves it into place first."""
+    """Final pose of the first body, unrounded."""
     seconds: float
     """Simulated time until at rest, or the time limit."""
     at_rest: bool
     penetration_m: float
-    """Deepest contact at the end."""
+    """Deepest contact at the end, metres."""
     reach_m: float
-    """Farthest that any of its corners ever was from where it began, in the plane."""
+    """Bound of the distance in the plane that any of its corners moved at any time, metres."""
 
 
 @dataclass(frozen=True, slots=True)
 class PushSolution:
-    """Where a push led the moving bodies of a setting, in their order."""
+    """An engine's solution of a push, in the frame of its scene: one entry per moving body."""
 
     poses: tuple[Pose, ...]
-    """Not rounded: the caller moves them into place first."""
+    """Final poses, unrounded."""
     sweeps: tuple[Dop8, ...]
-    """What each body's corners swept in the plane, its start included."""
+    """8-DOP of the area that each body's corners swept, the start included."""
     paths: tuple[bytes, ...]
-    """Each body's poses on its way as float32 numbers, seven each: centre of mass, quaternion."""
+    """Recorded poses of each body, (n, 7) float32 as bytes: centre of mass, quaternion."""
     seconds: float
     """Simulated time from the first touch until at rest, or the time limit."""
     at_rest: bool
 
 
 class Engine(Protocol):
-    """A physics engine: pure functions from settings to plain data.
+    """A physics engine: pure functions from scenes to solutions.
 
-    Nothing lives in the engine between two calls: the same setting gives the same answer to the
-    last bit, in any process and after any history.
+    No state remains between two calls: the same scene gives the same solution to the last bit, in
+    any process and after any history.
     """
 
     @property
@@ -147,10 +148,10 @@ class Engine(Protocol):
         """Distance at which two bodies of this engine may already touch, metres."""
 
     def settle(self, scene: PhysicsScene) -> SettleSolution:
-        """Let the first body of the setting fall until it rests; the others stay."""
+        """Let the first body of the scene fall until it rests; the others stay."""
 
     def push(self, scene: PhysicsScene, spec: PushSpec) -> PushSolution:
         """Push the first body along +x; bodies that move take part, the others stay."""
 
     def __hash__(self) -> int:
-        """Engines are keys of caches of what they answered."""
+        """Return a hash: engines are part of the keys of cached solutions."""

@@ -1,4 +1,4 @@
-"""Settle: where a spawned thing comes to rest, and whether it may stay there."""
+"""Settle: the pose at which a spawned object comes to rest, and whether it may stay there."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from internav_data.physics.scene import Engine, SettleSolution
 
 DROP_M = 0.01
-"""Height above the floor from which a thing is let go."""
+"""Height above the floor from which an object is released, metres."""
 MAX_SHIFT_M = 0.05
 MAX_TILT_DEG = 5.0
 MAX_PENETRATION_M = 0.002
@@ -27,13 +27,15 @@ MAX_PENETRATION_M = 0.002
 
 @dataclass(frozen=True, slots=True)
 class SettleResult:
-    """Where a thing came to rest, rounded as it will be stored, and the certificate."""
+    """An object at rest, with its certificate: values rounded as they are stored."""
 
     pose: Pose
     seconds: float
+    """Simulated time until rest."""
     penetration_m: float
+    """Deepest contact at rest, metres."""
     refusal: str
-    """Why it may not stay: empty when it may."""
+    """Reason for which the object may not stay; empty if it may."""
 
 
 def settle(
@@ -42,23 +44,28 @@ def settle(
     neighbours: Callable[[], Sequence[Body]],
     engine: str = DEFAULT_ENGINE,
 ) -> SettleResult:
-    """Let a thing fall 1 cm onto the floor at an upright pose.
+    """Let an object fall 1 cm onto the floor from an upright pose.
 
-    The problem is solved in the thing's own frame. Where nothing lies within `clearance_m` of
-    its footprint and it never moves that far, it falls as if alone: that is solved once per asset
-    and moved into place.
+    The problem is solved in the object's own frame. While the object moves less than
+    `clearance_m`, it touches nothing and falls as if alone: that solution is computed once per
+    asset and dynamics and moved into place.
 
     Parameters
     ----------
     body
-        Object to let go at an upright pose; z is the floor that it will stand on.
+        Object to release at an upright pose; z is the height of the floor below it.
     clearance_m
         Distance in the plane from its footprint to everything else, metres.
     neighbours
-        Gathers what can be touched, things and walls; called only when the free fall reaches
-        farther than the clearance and the engine's contact margin.
+        Gathers the objects and walls that can be touched; called only if the free fall reaches
+        farther than the clearance less the engine's contact margin.
     engine
         Name of the physics engine.
+
+    Raises
+    ------
+    UsageError
+        No engine has this name.
 
     """
     solver = get_engine(engine)
@@ -83,7 +90,8 @@ def _scene(falling: Body, frame: Pose, neighbours: Sequence[Body]) -> PhysicsSce
 
 
 def _seen_from(frame: Pose, pose: Pose) -> Pose:
-    """Pose of a neighbour in the frame of an upright thing, rounded."""
+    """Return a neighbour's pose in the frame of an upright object, rounded."""
+    # The conjugate of a unit quaternion is its inverse.
     x, y, z, w = frame.quaternion
     back = (-x, -y, -z, w)
     dx, dy, dz = pose.x - frame.x, pose.y - frame.y, pose.z - frame.z
@@ -93,7 +101,7 @@ def _seen_from(frame: Pose, pose: Pose) -> Pose:
 
 
 def _judged(pose: Pose, solution: SettleSolution) -> SettleResult:
-    """Move a rest from the thing's own frame into the house, round it, and judge it."""
+    """Move a solution from the object's own frame into the house, round it, and judge it."""
     shift = solution.pose
     dx, dy, dz = (
         row[0] * shift.x + row[1] * shift.y + row[2] * shift.z
@@ -105,6 +113,7 @@ def _judged(pose: Pose, solution: SettleSolution) -> SettleResult:
         round_m(pose.z + dz),
         round_quaternion(multiply(pose.quaternion, shift.quaternion)),
     )
+    # Element (2, 2) of the rotation is the cosine between the object's upward axis and the world's.
     tilt = math.degrees(
         math.acos(max(-1.0, min(1.0, float(rotation_matrix(shift.quaternion)[2, 2]))))
     )

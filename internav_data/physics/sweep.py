@@ -1,4 +1,4 @@
-"""What a moving body sweeps, step by step."""
+"""Sweeps: the area that a moving body covers and poses of its path, recorded step by step."""
 
 from __future__ import annotations
 
@@ -23,26 +23,29 @@ if TYPE_CHECKING:
     Poses = NDArray[np.float32]
 
 KEPT_M: Final = 0.004
-"""A pose is kept on a body's path once some corner may have come this far since the last one."""
+"""Distance that a corner may move between two recorded poses, metres."""
 _POSE: Final = 7
-"""Numbers of a pose: the centre of mass and a quaternion."""
+"""Length of a recorded pose: the centre of mass (3) and a quaternion (4)."""
 PATH_POSE_BYTES: Final = 4 * _POSE
-"""Of each pose of a `SweepRecorder.path`."""
+"""Length of one pose in `SweepRecorder.path`, bytes."""
 _KEPT, _LATEST, _COUNT, _LENGTH = 8, 15, 22, 23
-"""Where a trail's state holds the last pose kept, the latest pose and the count of those kept;
-the first eight numbers are the octagon's."""
+"""Offsets into a recorder's state, one array that its kernel can write: the 8-DOP comes first, then
+the last recorded pose, the latest pose and the number of recorded poses; `_LENGTH` is its size."""
 
 
 @lru_cache(maxsize=4096)
 def centred_corners(asset: Asset) -> Floats:
-    """Corners (n, 3) from the centre of mass, about which Bullet turns a body; read-only."""
+    """Return an asset's corners relative to its centre of mass, (n, 3), metres; read-only."""
     corners, _ = asset_corners(asset)
     return corners - np.array(centre_of_mass(asset))
 
 
 @lru_cache(maxsize=4096)
 def bounding_radius_m(asset: Asset) -> float:
-    """Farthest corner from the centre of mass: how far a turn can carry it, metres."""
+    """Return the distance of the farthest corner from the centre of mass, metres.
+
+    No corner moves farther than this times the angle, in radians, when the body turns.
+    """
     corners = centred_corners(asset)
     return max(math.hypot(*corner) for corner in corners.tolist())
 
@@ -61,7 +64,10 @@ def _follow(
     qz: float,
     qw: float,
 ) -> float:
-    """Widen a trail to a pose, keep it where the body came far enough; returns the last shift."""
+    """Widen the 8-DOP to a pose and record the pose if the body moved far enough since the last.
+
+    Returns the distance of the centre of mass from the latest pose, metres; inf at first.
+    """
     widen(state[:8], corners, x, y, qx, qy, qz, qw)
     pose = (x, y, z, qx, qy, qz, qw)
     count = int(state[_COUNT])
@@ -69,7 +75,8 @@ def _follow(
     far = math.hypot(math.hypot(x - state[_KEPT], y - state[_KEPT + 1]), z - state[_KEPT + 2])
     dot = qx * state[_KEPT + 3] + qy * state[_KEPT + 4]
     dot += qz * state[_KEPT + 5] + qw * state[_KEPT + 6]
-    # An angle is at most pi times the sine of its half.
+    # A bound of the angle since the last recorded pose without its arc cosine: dot is the cosine
+    # of half the angle, and an angle is at most pi times the sine of its half.
     turn = math.pi * math.sqrt(max(0.0, 1.0 - dot * dot))
     dx, dy, dz = x - state[_LATEST], y - state[_LATEST + 1], z - state[_LATEST + 2]
     if (first or far + radius * turn >= KEPT_M) and count < len(kept):
@@ -84,7 +91,7 @@ def _follow(
 
 @dataclass(slots=True)
 class SweepRecorder:
-    """What a body has swept so far."""
+    """Record of one body's motion: a planar 8-DOP of its sweep, and sampled poses."""
 
     _corners: Floats
     _radius: float
@@ -93,14 +100,18 @@ class SweepRecorder:
     _before: tuple[float, ...] | None = None
 
     def follow(self, middle: Vec3, turn: Quaternion) -> float:
-        """Widen it to where the body is now: its centre of mass and orientation.
+        """Add the body's present centre of mass and orientation to the record.
 
-        Returns how far the centre of mass came since the last call, metres.
+        Returns
+        -------
+        float
+            Distance that the centre of mass moved since the last call, metres; inf at first.
+
         """
         return _follow(self._state, self._kept, self._corners, self._radius, *middle, *turn)
 
     def crept(self, far_m: float, far_rad: float) -> bool:
-        """Whether it has come farther, or turned more, since this was last asked."""
+        """Return whether it moved farther, or turned more, since the last call of this method."""
         now = tuple(self._state[_LATEST : _LATEST + _POSE].tolist())
         before, self._before = self._before, now
         if before is None or math.dist(before[:3], now[:3]) > far_m:
@@ -110,20 +121,20 @@ class SweepRecorder:
 
     @property
     def dop8(self) -> Dop8:
-        """Octagon round all of it."""
+        """Planar 8-DOP of the sweep so far."""
         a, b, c, d, e, f, g, h = self._state[:8].tolist()
         return a, b, c, d, e, f, g, h
 
     @property
     def path(self) -> bytes:
-        """Poses on its way as float32 numbers, seven each, the first and the last included."""
+        """Recorded poses, (n, 7) float32 as bytes, the first and the latest included."""
         poses = self._kept[: int(self._state[_COUNT])]
         last = self._state[_LATEST : _LATEST + _POSE].astype(np.float32)
         return poses.tobytes() + last.tobytes()
 
 
 def sweep_recorder(asset: Asset, steps: int) -> SweepRecorder:
-    """Begin an empty trail of at most so many steps."""
+    """Return an empty recorder for at most `steps` calls of `follow`."""
     state = np.zeros(_LENGTH)
     state[:8] = -math.inf
     kept = np.empty((steps + 1, _POSE), dtype=np.float32)
@@ -132,7 +143,7 @@ def sweep_recorder(asset: Asset, steps: int) -> SweepRecorder:
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """How far a thing reaches where it lies, metres."""
+    """Bounds of an object at its pose, metres: planar 8-DOP, lowest and highest point."""
 
     dop8: Dop8
     low_m: float
@@ -140,7 +151,7 @@ class Extent:
 
 
 def extent_of(asset: Asset, pose: Pose) -> Extent:
-    """Extent of all of a thing, its parts below 2 cm included."""
+    """Return an object's extent; unlike its footprint, it includes the parts below 2 cm."""
     corners, _ = asset_corners(asset)
     reach = np.full(8, -math.inf)
     widen(reach, corners, pose.x, pose.y, *pose.quaternion)

@@ -1,4 +1,4 @@
-"""Bullet as the physics engine: one client a process, a scene of plain data at each call."""
+"""Bullet (Coumans, pybullet) as physics engine: one client per process, one scene per call."""
 
 from __future__ import annotations
 
@@ -31,20 +31,23 @@ if TYPE_CHECKING:
 
 
 REST_SPEED = 0.001
-"""m/s."""
+"""Speed below which a body counts as slow, m/s."""
 REST_SPIN = 0.01
-"""rad/s."""
+"""Angular speed below which a body counts as slow, rad/s."""
 SHIFT_M = 10.0 * REST_SPEED * STEP_S
-"""What came farther than this in one step is not slow: its speed need not be asked."""
+"""Distance in one step above which a body cannot be slow. Asking for a speed costs time."""
 REST_STEPS = 10
-"""A thing is at rest once it was slow for this many steps running."""
+"""Number of successive slow steps after which a body is at rest."""
 SETTLE_LIMIT_S = 1.0
+"""Time limit of a settle, simulated seconds."""
 CREEP_STEPS = 24
+"""Interval at which trembling bodies are looked at, steps (0.1 s)."""
 CREEP_M = REST_SPEED * CREEP_STEPS * STEP_S
-"""At rest is also what came no farther in 0.1 s than the rest speed allows: 0.1 mm, 1 mrad."""
+"""Distance that a resting body may tremble over `CREEP_STEPS`: 0.1 mm."""
 CREEP_RAD = REST_SPIN * CREEP_STEPS * STEP_S
+"""Angle that a resting body may tremble over `CREEP_STEPS`: 1 mrad."""
 PUSH_LIMIT_S = 5.0
-"""From letting go; what still rolls then stays where it is."""
+"""Time limit of a push after the release, simulated seconds; a body still rolling is left there."""
 _ASLEEP = (
     pybullet.ACTIVATION_STATE_ENABLE_SLEEPING
     | pybullet.ACTIVATION_STATE_ENABLE_WAKEUP
@@ -54,7 +57,7 @@ _ASLEEP = (
 
 @dataclass(slots=True, eq=False)
 class Bullet:
-    """The engine of `internav_data.physics.scene.Engine`, on one DIRECT client."""
+    """Engine on one client of pybullet in DIRECT mode (without graphics)."""
 
     _builder: Builder
     name: str = "bullet"
@@ -64,7 +67,7 @@ class Bullet:
     build: str = field(default_factory=lambda: f"pybullet {version('pybullet')}, rules {RULES}")
 
     def settle(self, scene: PhysicsScene) -> SettleSolution:
-        """Let the first body fall until at rest, one second at most."""
+        """Let the first body fall until it is at rest, for one second at most."""
         ids = self._builder.build(scene)
         body = scene.bodies[0]
         radius = bounding_radius_m(body.asset)
@@ -79,6 +82,7 @@ class Bullet:
             calm = calm + 1 if slow else 0
             now, turn = pybullet.getBasePositionAndOrientation(ids[0], self._builder.client)
             shift = math.hypot(now[0] - start[0], now[1] - start[1])
+            # A bound for all corners: the shift of the centre of mass plus the arc of the farthest.
             reach = max(reach, shift + radius * _angle(start_turn, turn))
         return SettleSolution(
             pose=self._pose(ids[0], body.asset),
@@ -89,7 +93,7 @@ class Bullet:
         )
 
     def push(self, scene: PhysicsScene, spec: PushSpec) -> PushSolution:
-        """Push the first body along +x, let it go, and wait until all that moves is at rest."""
+        """Push the first body along +x, release it, and step until all bodies are at rest."""
         ids = self._builder.build(scene)
         client = self._builder.client
         moving = [k for k, body in enumerate(scene.bodies) if body.moves]
@@ -98,10 +102,11 @@ class Bullet:
         recorders = [sweep_recorder(scene.bodies[k].asset, limit) for k in moving]
         movers = [(ids[k], recorder) for k, recorder in zip(moving, recorders, strict=True)]
         for mover, _ in movers[1:]:
-            # What is not touched neither trembles nor costs time; a touch wakes it.
+            # Asleep, a body that is not touched neither trembles nor costs time; a touch wakes it.
             pybullet.changeDynamics(mover, -1, activationState=_ASLEEP, physicsClientId=client)
         for mover, recorder in movers:
             recorder.follow(*pybullet.getBasePositionAndOrientation(mover, client))
+        # Speed gained in one step of pushing; inf for a kick.
         gain = spec.force_n / scene.bodies[0].dynamics.mass_kg * STEP_S
         calm, steps, rests = 0, 0, False
         while steps < limit and not rests:
@@ -116,8 +121,8 @@ class Bullet:
             calm = calm + 1 if slow else 0
             rests = calm >= REST_STEPS
             if steps % CREEP_STEPS == 0:
-                # What only trembles is at rest too; what has not yielded to a constant push
-                # by now never will.
+                # Trembling counts as rest; a body that has not yielded to a constant push by now
+                # never will.
                 crept = [recorder.crept(CREEP_M, CREEP_RAD) for recorder in recorders]
                 rests = rests or not any(crept)
         return PushSolution(
@@ -129,15 +134,15 @@ class Bullet:
         )
 
     def _slow(self, identity: int) -> bool:
-        """Whether a body's speed and spin are those of one at rest."""
+        """Return whether a body's linear and angular speeds are those of a body at rest."""
         speed, spin = pybullet.getBaseVelocity(identity, self._builder.client)
         return math.hypot(*speed) < REST_SPEED and math.hypot(*spin) < REST_SPIN
 
     def _apply_push(self, identity: int, spec: PushSpec, gain: float, pushes_left: int) -> int:
-        """Push for one step; returns how many steps of pushing are left."""
+        """Push for one step; return the number of steps of pushing that are left."""
         speed, spin = pybullet.getBaseVelocity(identity, self._builder.client)
         if speed[0] + gain >= spec.speed_m_s:
-            # The last impulse: just what is missing.
+            # The last impulse is scaled: it gives just the speed that is missing.
             missing = (spec.speed_m_s, speed[1], speed[2])
             pybullet.resetBaseVelocity(identity, missing, spin, self._builder.client)
             return 0
@@ -149,7 +154,7 @@ class Bullet:
         return pushes_left - 1
 
     def _pose(self, identity: int, asset: Asset) -> Pose:
-        """Pose of the asset's frame; Bullet reports that of the centre of mass."""
+        """Return the pose of the asset's frame; Bullet reports that of the centre of mass."""
         position, turn = pybullet.getBasePositionAndOrientation(identity, self._builder.client)
         offset = rotation_matrix(turn) @ centre_of_mass(asset)
         x, y, z = (float(p - o) for p, o in zip(position, offset, strict=True))
@@ -158,23 +163,24 @@ class Bullet:
     def _penetration(self, identity: int) -> float:
         client = self._builder.client
         contacts: Any = pybullet.getContactPoints(bodyA=identity, physicsClientId=client)
+        # Column 8 of a contact point is the distance, negative where bodies overlap.
         depths = [-contact[8] for contact in contacts]
         return max(0.0, *depths) if depths else 0.0
 
 
 def _angle(first: tuple[float, ...], second: tuple[float, ...]) -> float:
-    """Angle between two orientations, radians."""
+    """Return the angle between two orientations, radians."""
     inverse = (-first[0], -first[1], -first[2], first[3])
     x, y, z, w = multiply(inverse, (second[0], second[1], second[2], second[3]))
     return 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), abs(w))
 
 
 def bullet() -> Bullet:
-    """Return this process's Bullet: connected at first use, its files removed at exit."""
+    """Return this process's Bullet, connected at first use; its files are removed at exit."""
     return _of_process(os.getpid())
 
 
-@cache  # a forked process has its own: two of them would write each other's files
+@cache  # by process: forked ones would overwrite each other's files
 def _of_process(pid: int) -> Bullet:
     folder = Path(tempfile.mkdtemp(prefix="internav-"))
     atexit.register(_remove, folder, pid)

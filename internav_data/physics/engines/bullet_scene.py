@@ -1,15 +1,15 @@
-"""Scenes in Bullet: settings of plain data, built anew at each call.
+"""Scenes in Bullet, built from plain data at each call.
 
-What is worked around here was measured: an empty world costs 0.7 ms and more, so it serves many
-scenes; `removeBody` leaks 8 kB, so not too many; `resetSimulation` keeps time step and parameters,
-so all are set each time; saved states are not bit-equal for compounds; automatic visual shapes make
-bodies 27 times slower; shape arrays stop at 16 shapes without a word. So each asset is one OBJ file
-of convex groups (any number of parts), written once per process.
+Each workaround here was measured. An empty world costs 0.7 ms and more, so one world serves many
+scenes; `removeBody` leaks 8 kB, so not too many. `resetSimulation` keeps time step and parameters,
+so all are set each time. Saved states are not bit-equal for compounds. Automatic visual shapes make
+bodies 27 times slower. Arrays of shapes stop at 16 without a word, so each asset is one OBJ file of
+convex groups (any number of parts), written once per process.
 
-An emptied world has to be as good as new. Bullet's usual broadphase is not: its trees and clocks
-remember, and now and then a push came out otherwise in the ninth digit. The simple one
-remembers nothing but the order in which its places became free: bodies go in the reverse order of
-their coming, and the next ones get the same places. `tests/physics/test_bullet.py` holds it.
+An emptied world has to be as good as new. With Bullet's usual broadphase it is not: its trees and
+clocks keep state, and now and then a push differed in the ninth digit. The simple broadphase keeps
+only the order in which its slots became free: bodies are removed in the reverse order of their
+creation, so the next ones get the same slots. `tests/physics/test_bullet.py` holds it.
 """
 
 from __future__ import annotations
@@ -49,37 +49,40 @@ def _import_quietly() -> ModuleType:
 pybullet: Any = _import_quietly()
 
 RULES = 4
-"""Raised with every change of what scenes, settling or pushing give: certificates name it, so a
-dataset made by other rules is told from a wrong one."""
+"""Number of the rules by which scenes are built and solved (`Engine.rules`). Raised with every
+change of results."""
 STEP_S = 1.0 / 240.0
+"""Time step, seconds."""
 GRAVITY = 9.81
+"""Acceleration of gravity, m/s²."""
 SOLVER_ITERATIONS = 20
 SOLVER_RESIDUAL = 1e-6
-"""The solver stops early below this."""
+"""Residual below which the solver stops before its last iteration."""
 HULL_MARGIN_M = 0.001
-"""Thickness that Bullet adds to convex hulls."""
+"""Thickness that Bullet adds to convex hulls, metres."""
 CONTACT_BREAKS_M = 0.002
-"""A contact point that has drifted this far is looked for anew. At Bullet's 2 cm stale points make
-sliding things jump and stay awake: a push among others takes twice as long."""
+"""Distance that a contact point may drift before it is computed anew, metres. At Bullet's default
+of 2 cm stale points make sliding bodies jump and stay awake: a push among others takes twice as
+long."""
 FLOOR_HALF_M = (20.0, 20.0, 1.0)
-"""The floor is a box: on Bullet's plane so short-lived contacts let a pushed box sink 1 mm and
-rub: slides come out 8 % short, on a box 4 % (of v^2 / 2 mu g)."""
+"""Half extents of the floor, metres. It is a box: on Bullet's plane, contacts that live so shortly
+let a pushed box sink 1 mm and rub, and slides are 8 % short of v² / 2μg; on a box 4 %."""
 FLOOR_FRICTION = 1.0
-"""Bullet multiplies frictions, so an asset's own is what acts on floor and walls."""
+"""Friction of floor and agent. Bullet multiplies the frictions of two bodies, so that an object's
+own coefficient acts between it and the floor."""
 ROLLING_FRICTION = 0.01
-
-
 SCENES_PER_WORLD = 512
+"""Number of scenes after which a world is reset, for `removeBody` leaks."""
 
 
 @dataclass(slots=True, eq=False)
 class Builder:
-    """Makes scenes on one client, and keeps the assets' files and shapes."""
+    """Builder of scenes on one client; it keeps the files and shapes of assets."""
 
     client: int
     folder: Path
     scenes_per_world: int = SCENES_PER_WORLD
-    """1: an empty world for every scene, half as slow again and by definition without history."""
+    """1 gives every scene an empty world: 1.5 times as slow, and by definition without history."""
     _files: dict[Asset, str] = field(default_factory=dict)
     _shapes: dict[tuple[Asset, bool], int] = field(default_factory=dict)
     _bodies: list[int] = field(default_factory=list)
@@ -88,8 +91,8 @@ class Builder:
     _scenes_left: int = 0
 
     def build(self, scene: PhysicsScene) -> list[int]:
-        """Take the last scene down, make another one and return the ids of its bodies, in order."""
-        # Zero until the scene stands: what an interrupt left half done is swept away as a whole.
+        """Remove the last scene, build another and return its bodies' ids in order."""
+        # Zero until the scene is complete: after an interrupt the next call resets the world.
         left, self._scenes_left = self._scenes_left, 0
         if left > 0:
             self._empty()
@@ -104,7 +107,7 @@ class Builder:
         return ids
 
     def _empty(self) -> None:
-        # In reverse: see above.
+        # In reverse, so that the next bodies get the same slots (see the module's docstring).
         while len(self._bodies) > 1:
             pybullet.removeBody(self._bodies.pop(), physicsClientId=self.client)
 
@@ -114,8 +117,8 @@ class Builder:
         self._shapes.clear()
         pybullet.resetSimulation(pybullet.RESET_USE_SIMPLE_BROADPHASE, physicsClientId=client)
         pybullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
-        # A dummy visual: without one Bullet makes a visual mesh for every collision shape, and a
-        # sphere's many triangles alone would cost two thirds of a settle.
+        # A dummy: without a visual shape Bullet makes a mesh for every collision shape, and a
+        # sphere's many triangles alone would take two thirds of a settle.
         self._visual = pybullet.createVisualShape(
             pybullet.GEOM_BOX, halfExtents=(0.01, 0.01, 0.01), physicsClientId=client
         )
@@ -128,7 +131,7 @@ class Builder:
         self._surface(self._place(0.0, self._slab), FLOOR_FRICTION)
 
     def _set_parameters(self) -> None:
-        # For every scene: some of them are Bullet's own globals, and a user may have a client too.
+        # For every scene: some are globals of Bullet, and a user's own client may have set them.
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=STEP_S,
             numSolverIterations=SOLVER_ITERATIONS,
@@ -185,7 +188,7 @@ class Builder:
     def _new_shape(self, body: Body) -> int:
         part = body.asset.parts[0]
         if len(body.asset.parts) == 1 and part.shape == "box" and not body.moves:
-            # Walls and their like: as many as there are houses, so they get no file.
+            # Walls and other boxes that stay: every house brings new ones, so they get no file.
             shape = pybullet.createCollisionShape(
                 pybullet.GEOM_BOX,
                 halfExtents=[s / 2.0 for s in part.size],
