@@ -123,7 +123,7 @@ def test_every_module_that_physics_imports_is_in_the_digest(tmp_path):
     module = sys.modules["internav_data.physics.cache"]
     root = Path(module.__file__).parents[2]
     found = module.solver_modules(root)
-    for name in ("physics.pushing", "physics.engines.bullet_scene", "geometry.obj", "records.poses"):
+    for name in ("physics.pushing", "physics.engines.bullet", "geometry.obj", "records.poses"):
         assert f"internav_data.{name}" in found
     for file in found.values():
         copied = tmp_path / file.relative_to(root)
