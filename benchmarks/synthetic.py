@@ -249,7 +249,7 @@ def _obstacle(rng: np.random.Generator, asset: Asset, blocked: bool, full: bool)
         friction=asset.friction,
         pushable=asset.pushable,
         pickable=asset.pickable,
-        segment=int(rng.integers(3)),
+        node_path_segment=int(rng.integers(3)),
         settle_s=round(int(rng.integers(20, 140)) / 240, 6),
         settle_penetration_m=round(float(abs(rng.normal(0, 2e-4))), 6),
         outcomes=outcomes if full else None,

@@ -271,7 +271,7 @@ def obstacle(
         friction=asset.friction,
         pushable=asset.pushable,
         pickable=asset.pickable,
-        segment=0,
+        node_path_segment=0,
         settle_s=0.1,
         settle_penetration_m=penetration_m,
         outcomes=None,

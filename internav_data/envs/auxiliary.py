@@ -164,7 +164,7 @@ def _next_node(episode: Episode, number: int) -> Vec2:
     if not episode.node_paths:
         return goal
     points = episode.node_paths[0].points
-    return points[min(episode.obstacles[number].segment + 1, len(points) - 1)]
+    return points[min(episode.obstacles[number].node_path_segment + 1, len(points) - 1)]
 
 
 def _nodes_near(world: World, index: int, pose: Pose, node: Vec2) -> list[tuple[int, int]]:

@@ -278,7 +278,7 @@ def _obstacle(spawned: Spawned, outcomes: tuple[Outcome, ...]) -> Obstacle:
         friction=dynamics.friction,
         pushable=dynamics.pushable,
         pickable=dynamics.pickable,
-        segment=spawned.segment,
+        node_path_segment=spawned.segment,
         settle_s=spawned.settled.seconds,
         settle_penetration_m=spawned.settled.penetration_m,
         outcomes=outcomes,

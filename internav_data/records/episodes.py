@@ -106,7 +106,7 @@ class Obstacle:
     """Whether the agent's push can act on it."""
     pickable: bool
     """Whether the agent can pick it up."""
-    segment: int
+    node_path_segment: int
     """Segment of its node path on which it was spawned; segment 0 begins at the start."""
     settle_s: float
     """Certificate of the settle check: simulated seconds until at rest."""

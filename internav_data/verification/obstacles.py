@@ -53,10 +53,10 @@ def check_obstacles(
             return None
         _check_asset(layout, obstacle, what, expect)
         expect(
-            0 <= obstacle.segment < segments,
-            "obstacle.segment",
+            0 <= obstacle.node_path_segment < segments,
+            "obstacle.node_path_segment",
             f"{what}: 0 … {segments - 1}",
-            obstacle.segment,
+            obstacle.node_path_segment,
         )
         _check_rest(obstacle, what, expect)
         low = min(slab.low for slab in layout.shapes.slabs(obstacle.asset_id, obstacle.pose))

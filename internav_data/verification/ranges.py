@@ -88,7 +88,7 @@ EPISODE_RULES: Mapping[str, Rule] = {
     "obstacles.element.quaternion.w": Rule(0.0, 1.0, digits=TURNS),
     "obstacles.element.mass_kg": MASS,
     "obstacles.element.friction": FRICTION,
-    "obstacles.element.segment": Rule(0),
+    "obstacles.element.node_path_segment": Rule(0),
     "obstacles.element.settle_s": FROM_ZERO,
     "obstacles.element.settle_penetration_m": FROM_ZERO,
     **{f"obstacles.element.outcomes.element.{n}": rule for n, rule in OUTCOME_RULES.items()},

@@ -274,7 +274,7 @@ OBSTACLE_CHANGES = {
     "pickable": ({"pickable": True}, "obstacle.pickable"),
     "unknown asset": ({"asset_id": "Ghost_1"}, "schema.episodes.asset"),
     "furniture": ({"asset_id": "Cupboard_1"}, "obstacle.spawnable"),
-    "segment": ({"segment": 2}, "obstacle.segment"),
+    "node_path_segment": ({"node_path_segment": 2}, "obstacle.node_path_segment"),
     "settled too long": ({"settle_s": 1.5}, "schema.episodes.obstacles.element.settle_s"),
     "sank in": ({"settle_penetration_m": 0.003}, "obstacle.penetration"),
     "longest settle": ({"settle_s": 0.2}, "physics.settle"),
