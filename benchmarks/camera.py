@@ -120,11 +120,11 @@ def stages_of(camera: Camera, view: CameraView) -> dict[str, float]:
         )  # fmt: skip
 
     def shading() -> None:
-        scratch.made[:] = 0
+        scratch.prepared[:] = 0
         shade(
             structure.mesh, structure.rooms.labels, LIBRARY.mesh, scratch.frames, axes, eye[2],
             middle, middle, scratch.inverse, scratch.shadow, scratch.faces, scratch.drawn,
-            scratch.made, scratch.records, *images,
+            scratch.prepared, scratch.records, *images,
         )  # fmt: skip
 
     whole = best_of(lambda: camera.render([view], out))

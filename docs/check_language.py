@@ -256,7 +256,7 @@ DIALECT_OF_ROOM = {
 }
 """Names that were replaced in one room only: the word is good elsewhere."""
 
-STRICT_SHAPES: frozenset[str] = frozenset()
+STRICT_SHAPES = frozenset({"geometry", "navigation", "physics", "render", "world"})
 """Rooms where a public function of arrays without a shape in its docstring is a finding."""
 
 FIRST_WORD = re.compile(r"[A-Za-z]+")

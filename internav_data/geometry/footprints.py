@@ -1,7 +1,7 @@
-"""Footprints: what of a thing is in the agent's way, as convex polygons on the floor.
+"""Footprints: convex polygons on the floor that block the agent's disc.
 
 Each part's polyhedron is clipped to z in [0.02, 1.8] m and projected; its convex hull is one
-polygon. Polygons that lie inside another of the same thing are dropped: the union is the same.
+polygon. Polygons inside another one of the same asset are dropped: the union is the same.
 """
 
 from __future__ import annotations
@@ -25,34 +25,35 @@ if TYPE_CHECKING:
     from internav_data.records import Asset, House, Pose, Vec2, Wall
 
 LOWEST_M: Final = AGENT.step_over_m
-"""Height below which parts do not block: they are stepped over."""
+"""Height (m) below which parts do not block: the agent steps over them."""
 HIGHEST_M: Final = AGENT.height_m
-"""Height above which parts do not block: they are walked under."""
+"""Height (m) above which parts do not block: the agent walks under them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Polygons:
     """Convex, counter-clockwise polygons in one array.
 
-    Shapes: vertices (n, 2) float64, metres; offsets (polygons + 1,) int64: polygon k has the rows
-    offsets[k]:offsets[k + 1].
+    Polygon k has the rows offsets[k]:offsets[k + 1] of the vertices.
     """
 
     vertices: Floats
+    """Corners of all polygons, (n, 2) float64, metres."""
     offsets: Ints
+    """First row of each polygon, and the number of rows, (polygons + 1,) int64."""
 
     def __len__(self) -> int:
-        """Return how many polygons there are."""
+        """Return the number of polygons."""
         return len(self.offsets) - 1
 
     def __iter__(self) -> Iterator[Floats]:
-        """Yield each polygon's vertices, shape (n, 2)."""
+        """Yield each polygon's vertices, (n, 2) float64, metres."""
         for k in range(len(self)):
             yield self.vertices[self.offsets[k] : self.offsets[k + 1]]
 
     @staticmethod
     def of(polygons: Iterable[Sequence[Vec2] | Floats]) -> Polygons:
-        """Gather convex, counter-clockwise polygons."""
+        """Gather convex, counter-clockwise polygons, (n, 2) each, metres."""
         arrays = [np.asarray(p, dtype=np.float64).reshape(-1, 2) for p in polygons]
         offsets = np.cumsum([0, *(len(a) for a in arrays)]).astype(np.int64)
         vertices = np.vstack(arrays) if arrays else np.empty((0, 2))
@@ -60,16 +61,20 @@ class Polygons:
 
     @staticmethod
     def joined(groups: Iterable[Polygons]) -> Polygons:
-        """Put several groups behind each other, in order."""
+        """Concatenate groups of polygons, in order."""
         return Polygons.of(polygon for group in groups for polygon in group)
 
 
 @njit(cache=True)
 def convex_hull(points: Floats) -> Floats:
-    """Corners of the convex hull, counter-clockwise, collinear points dropped (monotone chain)."""
+    """Return the corners of the convex hull of points (n, 2), (h, 2) float64, counter-clockwise.
+
+    Collinear points are dropped. Monotone chain (Andrew, "Another efficient algorithm for convex
+    hulls in two dimensions", 1979).
+    """
     count = len(points)
     order = np.argsort(points[:, 0])
-    # An insertion pass puts equal x in order of y: nearly nothing is left to move.
+    # argsort orders by x alone: an insertion pass puts points of equal x in order of y.
     for a in range(1, count):
         b = a
         while b > 0:
@@ -81,6 +86,8 @@ def convex_hull(points: Floats) -> Floats:
                 break
     hull = np.empty((2 * count + 1, 2))
     size = 0
+    # First the lower chain from left to right, then the upper chain back. A point that would make
+    # the chain turn right or go straight pops its predecessor; the lower chain's end stays.
     for sweep in range(2):
         floor = size if sweep == 1 else 1
         for step in range(count):
@@ -105,10 +112,11 @@ def convex_hull(points: Floats) -> Floats:
 
 @njit(cache=True)
 def _clipped(corners: Floats, low: float, high: float) -> Floats:
-    """Plan of a convex polyhedron's slice between two heights, as points (n, 2).
+    """Return points (n, 2) whose hull is the plan of a convex polyhedron between two heights.
 
-    Every pair of corners spans a segment inside the polyhedron, and the slice's outline is the
-    hull of where such segments pierce the two planes: no list of edges is needed.
+    `corners` (k, 3), metres. Every pair of corners spans a segment inside the polyhedron, so the
+    plan is the hull of the corners between the planes and of the points where such segments pierce
+    a plane: no list of edges is needed.
     """
     count = len(corners)
     out = np.empty((count + 2 * count * count, 2))
@@ -137,6 +145,7 @@ def _clipped(corners: Floats, low: float, high: float) -> Floats:
 
 @njit(cache=True)
 def _contained(vertices: Floats, a0: int, a1: int, b0: int, b1: int) -> bool:
+    """Return whether polygon a (rows a0:a1) lies in polygon b (rows b0:b1)."""
     for k in range(a0, a1):
         if not inside(vertices[k, 0], vertices[k, 1], vertices, b0, b1):
             return False
@@ -147,6 +156,11 @@ def _contained(vertices: Floats, a0: int, a1: int, b0: int, b1: int) -> bool:
 def _project(  # noqa: C901 - one kernel, three plain loops
     corners: Floats, starts: Ints, matrix: Floats, shift: Floats, low: float, high: float
 ) -> tuple[Floats, Ints]:
+    """Return a footprint as the arrays of `Polygons`: one hull a part, nested ones dropped.
+
+    `corners` (n, 3) of all parts and `starts` (parts + 1,) as `asset_corners` returns them;
+    `matrix` (3, 3) and `shift` (3,) move them into the house's frame.
+    """
     moved = np.empty_like(corners)
     for k in range(len(corners)):
         for axis in range(3):
@@ -168,7 +182,7 @@ def _project(  # noqa: C901 - one kernel, three plain loops
         vertices = np.concatenate((vertices, hull))
         count += 1
         offsets[count] = len(vertices)
-    # Drop what lies inside an earlier kept or a later polygon of the same thing.
+    # A polygon that was dropped drops no other: of two equal ones the first goes, the second stays.
     keep = np.ones(count, dtype=np.bool_)
     for a in range(count):
         for b in range(count):
@@ -191,7 +205,7 @@ def _project(  # noqa: C901 - one kernel, three plain loops
 
 
 def footprint(asset: Asset, pose: Pose) -> Polygons:
-    """Return what an asset at a pose puts in the agent's way; empty for what does not block."""
+    """Return the footprint of an asset at a pose; empty where the asset does not block."""
     if not asset.blocks:
         return Polygons.of([])
     corners, starts = asset_corners(asset)
@@ -203,7 +217,7 @@ def footprint(asset: Asset, pose: Pose) -> Polygons:
 
 
 def wall_footprints(walls: Iterable[Wall]) -> Polygons:
-    """Rectangles of the walls that stand in the agent's way (lintels hang above it)."""
+    """Return the rectangles of walls that block the agent (lintels hang above it)."""
     return Polygons.of(
         [(w.x_min, w.y_min), (w.x_max, w.y_min), (w.x_max, w.y_max), (w.x_min, w.y_max)]
         for w in walls
@@ -212,14 +226,14 @@ def wall_footprints(walls: Iterable[Wall]) -> Polygons:
 
 
 def house_footprints(house: House) -> Polygons:
-    """Walls, then every thing in order: all that stands in the agent's way without obstacles."""
-    things = (footprint(house.assets[t.asset_id], t.pose) for t in house.objects)
-    return Polygons.joined([wall_footprints(house.walls), *things])
+    """Return the footprints of the walls, then of the furniture in order; no obstacles."""
+    objects = (footprint(house.assets[o.asset_id], o.pose) for o in house.objects)
+    return Polygons.joined([wall_footprints(house.walls), *objects])
 
 
 @njit(cache=True)
 def _bounds(vertices: Floats, offsets: Ints) -> Floats:
-    """Lowest x, y and highest x, y of each polygon, shape (polygons, 4)."""
+    """Return the bounding boxes of polygons: x_min, y_min, x_max, y_max, (polygons, 4) float64."""
     boxes = np.empty((len(offsets) - 1, 4))
     for polygon in range(len(boxes)):
         boxes[polygon, :2] = vertices[offsets[polygon]]
@@ -235,6 +249,7 @@ def _bounds(vertices: Floats, offsets: Ints) -> Floats:
 
 @njit(cache=True)
 def _clearance(first: Floats, starts: Ints, second: Floats, begins: Ints, stop_at: float) -> float:
+    """Return the least distance of two groups given by the arrays of `Polygons`, or `stop_at`."""
     best = stop_at
     ours, theirs = _bounds(first, starts), _bounds(second, begins)
     for b in range(len(theirs)):

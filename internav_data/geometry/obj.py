@@ -1,4 +1,4 @@
-"""Assets as Wavefront text, the one format from which Bullet makes compounds of any size."""
+"""Assets as Wavefront OBJ text, the one format from which Bullet builds large compounds."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def obj_text(asset: Asset) -> str:
-    """Wavefront text with one group a part; Bullet makes each group's hull a convex shape.
+    """Return Wavefront OBJ text of one object a part; Bullet makes the hull of each one shape.
 
     The triangles only name the corners: Bullet builds hulls from the points.
     """

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @njit(cache=True, inline="always")
 def cross(ax: float, ay: float, bx: float, by: float) -> float:
-    """Z component of the cross product of two plane vectors."""
+    """Return the z component of the cross product of two vectors in the plane."""
     return ax * by - ay * bx
 
 
@@ -25,9 +25,10 @@ def cross(ax: float, ay: float, bx: float, by: float) -> float:
 def point_segment_squared(
     px: float, py: float, ax: float, ay: float, bx: float, by: float
 ) -> float:
-    """Squared distance from point p to segment ab, m²."""
+    """Return the squared distance from point p to segment ab, m²."""
     dx, dy = bx - ax, by - ay
     length = dx * dx + dy * dy
+    # Parameter of the nearest point of the line, clamped to the segment's ends.
     t = 0.0
     if length > 0.0:
         t = ((px - ax) * dx + (py - ay) * dy) / length
@@ -38,7 +39,10 @@ def point_segment_squared(
 
 @njit(cache=True)
 def inside(px: float, py: float, vertices: Floats, start: int, stop: int) -> bool:
-    """Whether a point lies in or on a convex polygon (never in a point or segment)."""
+    """Return whether a point lies in or on a convex polygon (never in a point or segment).
+
+    The polygon has the rows start:stop of `vertices` (n, 2), metres.
+    """
     if stop - start < 3:  # noqa: PLR2004 - a polygon has three corners
         return False
     previous = stop - 1
@@ -53,7 +57,10 @@ def inside(px: float, py: float, vertices: Floats, start: int, stop: int) -> boo
 
 @njit(cache=True)
 def point_polygon_distance(px: float, py: float, vertices: Floats, start: int, stop: int) -> float:
-    """Distance from a point to a convex polygon, 0 inside, metres."""
+    """Return the distance (m) from a point to a convex polygon, 0 inside.
+
+    The polygon has the rows start:stop of `vertices` (n, 2), metres.
+    """
     if inside(px, py, vertices, start, stop):
         return 0.0
     best = math.inf
@@ -71,7 +78,7 @@ def point_polygon_distance(px: float, py: float, vertices: Floats, start: int, s
 def segments_cross(
     ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float
 ) -> bool:
-    """Whether segments ab and cd cross properly (touching ends are left to the distances)."""
+    """Return whether segments ab and cd cross properly; ends that touch are left to distances."""
     d1 = cross(bx - ax, by - ay, cx - ax, cy - ay)
     d2 = cross(bx - ax, by - ay, dx - ax, dy - ay)
     d3 = cross(dx - cx, dy - cy, ax - cx, ay - cy)
@@ -83,7 +90,10 @@ def segments_cross(
 def segment_segment_squared(
     ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float
 ) -> float:
-    """Squared distance between segments ab and cd, 0 where they cross, m²."""
+    """Return the squared distance between segments ab and cd, m²; 0 where they cross.
+
+    Segments that do not cross are nearest at an end of one of them.
+    """
     if segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
         return 0.0
     return min(
@@ -98,9 +108,10 @@ def segment_segment_squared(
 def segment_polygon_distance(
     ax: float, ay: float, bx: float, by: float, vertices: Floats, start: int, stop: int
 ) -> float:
-    """Distance between segment ab and a convex polygon, 0 where they meet, metres.
+    """Return the distance (m) between segment ab and a convex polygon, 0 where they meet.
 
-    A disc of radius r swept along ab stays clear of the polygon exactly when this is >= r.
+    The polygon has the rows start:stop of `vertices` (n, 2), metres. A disc of radius r swept along
+    ab stays clear of the polygon exactly when the distance is >= r.
     """
     if inside(ax, ay, vertices, start, stop) or inside(bx, by, vertices, start, stop):
         return 0.0
@@ -126,7 +137,12 @@ def segment_polygon_distance(
 def polygon_distance(
     first: Floats, start: int, stop: int, second: Floats, begin: int, end: int
 ) -> float:
-    """Distance between two convex polygons, 0 where they overlap, metres."""
+    """Return the distance (m) between two convex polygons, 0 where they overlap.
+
+    The polygons have the rows start:stop of `first` (n, 2) and begin:end of `second` (m, 2).
+    """
+    # Overlapping polygons cross at an edge, or the second holds the first (both found below), or
+    # the first holds the second.
     if inside(second[begin, 0], second[begin, 1], first, start, stop):
         return 0.0
     best = math.inf

@@ -1,4 +1,4 @@
-"""Rounding and turning: scalar `math` only, so that every processor agrees to the last bit."""
+"""Rounding and rotations: scalar `math` only, so that processors agree to the last bit."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ if TYPE_CHECKING:
     from internav_data.records import Pose, Quaternion
 
 METRE_DIGITS = 4
-"""Stored positions and distances are rounded to 0.1 mm."""
+"""Decimals of stored positions and distances: 0.1 mm."""
 QUATERNION_DIGITS = 6
+"""Decimals of stored quaternions."""
 
 
 def round_m(value: float) -> float:
@@ -23,7 +24,7 @@ def round_m(value: float) -> float:
 
 
 def round_quaternion(quaternion: Quaternion) -> Quaternion:
-    """Normalise, round to 1e-6 and choose the sign with w >= 0 (x, y, z decide where w is 0)."""
+    """Normalise, round to 1e-6 and choose the sign with w >= 0 (z, y, x decide where w is 0)."""
     length = math.sqrt(sum(q * q for q in quaternion))
     rounded = [round(q / length, QUATERNION_DIGITS) for q in quaternion]
     leading = next((q for q in (rounded[3], rounded[2], rounded[1], rounded[0]) if q != 0.0), 1.0)
@@ -33,19 +34,19 @@ def round_quaternion(quaternion: Quaternion) -> Quaternion:
 
 
 def yaw_quaternion(yaw_deg: float) -> Quaternion:
-    """Quaternion (rounded) of a turn about z, degrees counter-clockwise."""
+    """Return the rounded quaternion of a rotation about z, degrees counter-clockwise."""
     half = math.radians(yaw_deg) / 2.0
     return round_quaternion((0.0, 0.0, math.sin(half), math.cos(half)))
 
 
 def yaw_of(quaternion: Quaternion) -> float:
-    """Yaw of a pose in degrees, in (-180, 180]: the heading of the turned x axis."""
+    """Return the yaw of a rotation, degrees in (-180, 180]: the heading of the rotated x axis."""
     x, y, z, w = quaternion
     return math.degrees(math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
 
 
 def multiply(first: Quaternion, second: Quaternion) -> Quaternion:
-    """Hamilton product: turns by `second`, then by `first`."""
+    """Return the Hamilton product: the rotation by `second`, then by `first`."""
     ax, ay, az, aw = first
     bx, by, bz, bw = second
     return (
@@ -57,7 +58,7 @@ def multiply(first: Quaternion, second: Quaternion) -> Quaternion:
 
 
 def rotation_matrix(quaternion: Quaternion) -> NDArray[np.float64]:
-    """Rotation of the normalised quaternion, shape (3, 3)."""
+    """Return the rotation matrix of a quaternion of any length, (3, 3) float64."""
     x, y, z, w = quaternion
     s = 2.0 / (x * x + y * y + z * z + w * w)
     return np.array(
@@ -70,7 +71,7 @@ def rotation_matrix(quaternion: Quaternion) -> NDArray[np.float64]:
 
 
 def transform(points: NDArray[np.float64], pose: Pose) -> NDArray[np.float64]:
-    """Move points (n, 3) from an asset's frame into the house's, metres."""
+    """Return points (n, 3), metres, moved from an asset's frame into the house's."""
     matrix = rotation_matrix(pose.quaternion)
     x, y, z = points[:, 0], points[:, 1], points[:, 2]
     out = np.empty_like(points, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Corner points of parts: the one polyhedron that physics, footprints and pictures share."""
+"""Corners, bounds and masses of parts: one polyhedron for physics, footprints and pictures."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ if TYPE_CHECKING:
     from internav_data.records import Asset, Vec3
 
 CIRCLE_SIDES = 16
+"""Corners of the prism that stands for a cylinder, and of each ring of a sphere."""
 
 
 def _unit_circle() -> NDArray[np.float64]:
-    """Corners of a 16-gon that touches its bounding square, radius 1, shape (16, 2)."""
+    """Return the corners of a 16-gon of radius 1 that touches its bounding square, (16, 2)."""
     turns = [2.0 * math.pi * k / CIRCLE_SIDES for k in range(CIRCLE_SIDES)]
     return np.array([[round(math.cos(t), 12), round(math.sin(t), 12)] for t in turns]) + 0.0
 
@@ -41,7 +42,7 @@ def _unit_cylinder() -> NDArray[np.float64]:
 
 
 def _unit_sphere() -> NDArray[np.float64]:
-    """Poles and three rings of 16: 50 corners on the unit sphere."""
+    """Return two poles and three rings of 16: 50 corners on the unit sphere, (50, 3)."""
     lift = round(math.sqrt(0.5), 12)
     poles = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]])
     return np.vstack([poles, _ring(lift, -lift), _ring(1.0, 0.0), _ring(lift, lift)])
@@ -51,7 +52,7 @@ _UNIT = {"box": _unit_box(), "cylinder": _unit_cylinder(), "sphere": _unit_spher
 
 
 def part_corners(part: Part) -> NDArray[np.float64]:
-    """Corners of a part in the asset's frame, shape (n, 3), metres. The part is their hull."""
+    """Return the corners of a part in the asset's frame, (n, 3), metres; the part is their hull."""
     if part.shape == "hull":
         local = np.array(part.corners, dtype=np.float64)
     else:
@@ -62,7 +63,10 @@ def part_corners(part: Part) -> NDArray[np.float64]:
 
 @lru_cache(maxsize=4096)
 def asset_corners(asset: Asset) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Corners of all parts (n, 3) and where each part's begin (parts + 1,); cached, read-only."""
+    """Return the corners of all parts and the first row of each part; cached, read-only.
+
+    Corners (n, 3) float64, metres, in the asset's frame; rows (parts + 1,) int64, the last one n.
+    """
     corners = [part_corners(part) for part in asset.parts]
     offsets = np.cumsum([0, *(len(c) for c in corners)]).astype(np.int64)
     stacked = np.vstack(corners)
@@ -72,13 +76,16 @@ def asset_corners(asset: Asset) -> tuple[NDArray[np.float64], NDArray[np.int64]]
 
 
 def asset_bounds(asset: Asset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lowest and highest corner of the asset's own bounding box, two (3,) arrays, metres."""
+    """Return the lowest and highest corner of the bounding box: two (3,) float64, metres."""
     corners, _ = asset_corners(asset)
     return corners.min(axis=0), corners.max(axis=0)
 
 
 def _hull_mass(points: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-    """Volume and centroid of the hull of some points (n, 3)."""
+    """Return the volume (m³) and centroid (3,) of the hull of points (n, 3), metres.
+
+    The hull is cut into tetrahedra from its mean point to each triangle of its surface.
+    """
     from scipy.spatial import ConvexHull  # noqa: PLC0415 - imported when used
 
     hull = ConvexHull(points)
@@ -90,11 +97,12 @@ def _hull_mass(points: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]
 
 
 _FILLED = {"box": 1.0, "cylinder": math.pi / 4.0, "sphere": math.pi / 6.0}
+"""Share of its bounding box that a shape fills."""
 
 
 @lru_cache(maxsize=4096)
 def centre_of_mass(asset: Asset) -> Vec3:
-    """Centre of mass in the asset's frame, as if all its parts were equally dense, metres."""
+    """Return the centre of mass in the asset's frame, metres, of parts of equal density."""
     total, moment = 0.0, np.zeros(3)
     for part in asset.parts:
         if part.shape == "hull":

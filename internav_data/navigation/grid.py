@@ -23,19 +23,15 @@ from internav_data.geometry.planar import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from internav_data.core.typing import Floats
-
-    Counts = NDArray[np.int32]
-    from internav_data.core.typing import Ints
+    from internav_data.core.typing import Floats, Ints, Ints32
 
 NODE, EAST, NORTH = 0, 1, 2
+"""First index of blockers: a node, its edge to +x, its edge to +y."""
 
 
 @njit(cache=True)
 def mark(  # noqa: C901, PLR0912 - one pass over a window, spelt out for speed
-    blockers: Counts,
+    blockers: Ints32,
     vertices: Floats,
     offsets: Ints,
     spacing: float,
@@ -141,7 +137,7 @@ def _leaves(ax: float, ay: float, bx: float, by: float, outline: Floats) -> bool
 
 @njit(cache=True)
 def close_outside(  # noqa: C901 - nodes, their edges, then edges along each side
-    blockers: Counts, outline: Floats, spacing: float
+    blockers: Ints32, outline: Floats, spacing: float
 ) -> None:
     """Block for good all nodes outside an outline and all edges that leave it or the lattice.
 
@@ -179,9 +175,9 @@ def close_outside(  # noqa: C901 - nodes, their edges, then edges along each sid
 
 @njit(cache=True)
 def _spread(
-    blockers: Counts,
-    steps: Counts,
-    queue: Counts,
+    blockers: Ints32,
+    steps: Ints32,
+    queue: Ints32,
     first: int,
     value: int,
     stride: int,
@@ -224,7 +220,7 @@ def _spread(
 
 
 @njit(cache=True)
-def steps_to(blockers: Counts, i: int, j: int) -> Counts:
+def steps_to(blockers: Ints32, i: int, j: int) -> Ints32:
     """Return the steps from every node to node (i, j), (nx, ny) int32; -1 where cut off.
 
     `blockers` (3, nx, ny) int32. Breadth-first.
@@ -237,7 +233,7 @@ def steps_to(blockers: Counts, i: int, j: int) -> Counts:
 
 
 @njit(cache=True)
-def steps_between(blockers: Counts, i: int, j: int, a: int, b: int) -> int:
+def steps_between(blockers: Ints32, i: int, j: int, a: int, b: int) -> int:
     """Return the steps from node (i, j) to node (a, b); -1 where cut off.
 
     `blockers` (3, nx, ny) int32. Breadth-first, up to the second node.
@@ -251,7 +247,7 @@ def steps_between(blockers: Counts, i: int, j: int, a: int, b: int) -> int:
 
 
 @njit(cache=True)
-def components(blockers: Counts) -> Counts:
+def components(blockers: Ints32) -> Ints32:
     """Return the component of every node, (nx, ny) int32; -1 where blocked.
 
     Components are numbered in order of their first node; `blockers` (3, nx, ny) int32.
@@ -268,7 +264,7 @@ def components(blockers: Counts) -> Counts:
 
 
 @njit(cache=True)
-def open_edge(blockers: Counts, i: int, j: int, direction: int) -> bool:
+def open_edge(blockers: Ints32, i: int, j: int, direction: int) -> bool:
     """Return whether a step from node (i, j) is free: direction 0 to +x, 1 to +y, 2 to -x, 3 to -y.
 
     `blockers` (3, nx, ny) int32.
@@ -283,7 +279,7 @@ def open_edge(blockers: Counts, i: int, j: int, direction: int) -> bool:
 
 
 @njit(cache=True)
-def descend(blockers: Counts, steps: Counts, i: int, j: int) -> Ints:
+def descend(blockers: Ints32, steps: Ints32, i: int, j: int) -> Ints:
     """Return nodes (n, 2) int64 of a shortest path from node (i, j), straight on where possible.
 
     `blockers` (3, nx, ny) int32; `steps` (nx, ny) int32 as `steps_to` returns them.

@@ -1,1 +1,1 @@
-"""The camera: meshes of houses and assets, a rasteriser, culling, shading."""
+"""Camera on the processor: meshes, culling by portals, a rasteriser, shading."""

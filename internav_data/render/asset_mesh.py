@@ -1,4 +1,4 @@
-"""Assets as the camera draws them: flat faces of convex parts, kept for the whole process."""
+"""Meshes of assets: flat faces of convex parts, cached for the process."""
 
 from __future__ import annotations
 
@@ -24,33 +24,44 @@ if TYPE_CHECKING:
     Ring = tuple[int, ...]
 
 _FLAT = 1e-6
-"""Faces whose normals and offsets differ by less are one face."""
+"""Difference of normals and offsets (m) below which faces are one face."""
 _STEEP = 0.8
-"""Cosine: of three axes at right angles two at least are this far from any normal."""
+"""Cosine between an axis and a normal below which the axis can be laid into the face: of three
+axes at right angles at least two can."""
 
 
 class Model(NamedTuple):
-    """One asset's share of a mesh: counts where the mesh has first numbers."""
+    """One asset's rows of a `Mesh`, with counts for the mesh's first numbers."""
 
     vertex_counts: Ints
-    """(parts,)"""
+    """Number of vertices of each part, (parts,) int64."""
     face_counts: Ints
-    """(parts,)"""
+    """Number of faces of each part, (parts,) int64."""
     corner_counts: Ints
-    """(faces,)"""
+    """Number of corners of each face, (faces,) int64."""
     vertices: Floats
+    """Rows of `Mesh.vertices`, (vertices, 3)."""
     corners: Ints
+    """Rows of `Mesh.corners`, (corners,)."""
     planes: Floats
+    """Rows of `Mesh.planes`, (faces, 4)."""
     axes: Floats
+    """Rows of `Mesh.axes`, (faces, 8)."""
     looks: NDArray[np.float32]
+    """Rows of `Mesh.looks`, (faces, 7)."""
     sphere: tuple[float, float, float, float]
+    """Row of `Mesh.spheres`."""
     bounds: tuple[float, float, float, float, float]
+    """Row of `Mesh.bounds`."""
 
 
 def _normals(vertices: Floats, rings: Sequence[Ring]) -> Floats:
-    """Newell's unit normals (faces, 3)."""
+    """Return the unit normals of polygons, (faces, 3), by Newell's method (Sutherland et al. 1974).
+
+    `vertices` (n, 3); `rings` are the corners of each polygon.
+    """
     longest = max(len(r) for r in rings)
-    # A corner repeated adds nothing.
+    # Padded to one length: a corner repeated adds nothing to Newell's sum.
     padded = np.array([r + (r[-1],) * (longest - len(r)) for r in rings])
     points = vertices[padded]
     points = points - points[:, :1]
@@ -61,7 +72,8 @@ def _normals(vertices: Floats, rings: Sequence[Ring]) -> Floats:
 
 
 def _outline(triangles: list[Ring]) -> Ring | None:
-    """Corners around some triangles that make one convex face, None where they do not."""
+    """Return the corners around triangles that make one convex face, None where they do not."""
+    # A side that two triangles share runs both ways: the others are the outline.
     sides = [(t[k], t[(k + 1) % 3]) for t in triangles for k in range(3)]
     inner = {(b, a) for a, b in sides}
     edges = {a: b for a, b in sides if (a, b) not in inner}
@@ -78,7 +90,11 @@ def _outline(triangles: list[Ring]) -> Ring | None:
 
 
 def flat_faces(vertices: Floats, triangles: Ints) -> list[Ring]:
-    """Join the triangles (m, 3) of a convex surface that lie in one plane to polygons."""
+    """Join the triangles of a convex surface that lie in one plane to polygons.
+
+    `vertices` (n, 3) float64, metres; `triangles` (m, 3) int64. Triangles whose outline is not one
+    ring stay triangles.
+    """
     rows = [(a, b, c) for a, b, c in triangles.tolist()]
     normals = _normals(vertices, rows)
     offsets = (normals * vertices[triangles[:, 0]]).sum(axis=1)
@@ -98,14 +114,14 @@ def flat_faces(vertices: Floats, triangles: Ints) -> list[Ring]:
 
 @lru_cache(maxsize=8)
 def _fixed_faces(shape: Shape) -> list[Ring]:
-    """Faces of boxes, cylinders and spheres: those of the unit solid."""
+    """Return the faces of a box, cylinder or sphere: those of the unit solid, for any size."""
     origin, whole = (0.0, 0.0, 0.0), (2.0, 2.0, 2.0)
     unit = Part(shape, origin, whole, (0.0, 0.0, 0.0, 1.0), (), (0, 0, 0), "wood")
     return flat_faces(*part_triangles(unit))
 
 
 def _texture(normals: Floats, part: Part, shift: float) -> Floats:
-    """Axes (faces, 8): u along the longest side of the part that lies in the face, v across."""
+    """Return rows of `Mesh.axes`, (faces, 8): u along the part's longest side, v across."""
     order = sorted(range(3), key=lambda k: (-part.size[k], k))
     grain = rotation_matrix(part.rotation).T[order]
     cosines = (normals[:, None, :] * grain[None]).sum(axis=2)
@@ -120,7 +136,7 @@ def _texture(normals: Floats, part: Part, shift: float) -> Floats:
 
 
 def model_of(asset: Asset) -> Model:
-    """Build the polygons of all parts of an asset."""
+    """Build the model of an asset."""
     rings: list[Ring] = []
     parts: list[tuple[Floats, int]] = []
     planes, axes, looks = [], [], []
@@ -131,7 +147,7 @@ def model_of(asset: Asset) -> Model:
         normals = _normals(vertices, faces)
         starts = vertices[[ring[0] for ring in faces]]
         planes.append(np.column_stack([normals, (normals * starts).sum(axis=1)]))
-        # No two parts show the same piece of grain.
+        # Shifted, so that no two parts show the same piece of grain.
         axes.append(_texture(normals, part, 0.37 * number))
         looks += [look_row(part_look(part.material, part.colour))] * len(faces)
         rings += faces
@@ -150,13 +166,14 @@ def model_of(asset: Asset) -> Model:
 
 
 def _starts(counts: Iterable[Ints]) -> Ints:
+    """Return the first numbers that follow from counts, and the total."""
     return np.cumsum(np.concatenate([np.zeros(1, np.int64), *counts]))
 
 
 def bounds_of(
     points: Floats,
 ) -> tuple[tuple[float, float, float, float], tuple[float, float, float, float, float]]:
-    """Return a ball around points (x, y, z, radius) and a box (see `Mesh`)."""
+    """Return a ball and a box around points (n, 3), metres: rows of `Mesh.spheres` and `bounds`."""
     low, high = points.min(axis=0), points.max(axis=0)
     centre = (low + high) / 2.0
     radius = math.sqrt(float(((points - centre) ** 2).sum(axis=1).max()))
@@ -166,7 +183,7 @@ def bounds_of(
 
 
 def mesh_of(models: Sequence[Model]) -> Mesh:
-    """Join models to one mesh."""
+    """Concatenate models to one mesh."""
     return Mesh(
         _starts([np.array([len(m.face_counts) for m in models], np.int64)]),
         np.array([m.sphere for m in models]).reshape(-1, 4),
@@ -183,22 +200,27 @@ def mesh_of(models: Sequence[Model]) -> Mesh:
 
 
 class Library:
-    """All assets drawn so far in this process, in one mesh that grows.
+    """All assets that this process has drawn, in one mesh that grows.
 
     Pictures do not depend on the order in which assets came: only the models' numbers do.
+
+    Attributes
+    ----------
+    max_vertices : int
+        Largest number of vertices of a part.
+    max_corners : int
+        Largest number of corners of a face.
     """
 
     def __init__(self) -> None:
         self._numbers: dict[Asset, int] = {}
         self._models: list[Model] = []
         self._mesh: Mesh | None = None
-        self.most_vertices = 4
-        """Of any part."""
-        self.most_corners = 8
-        """Of any face."""
+        self.max_vertices = 4
+        self.max_corners = 8
 
     def number(self, asset: Asset) -> int:
-        """Return which model an asset is; made when first asked for."""
+        """Return the number of an asset's model; the model is built at the first call."""
         found = self._numbers.get(asset)
         if found is None:
             found = len(self._models)
@@ -206,20 +228,21 @@ class Library:
             self._models.append(model)
             self._numbers[asset] = found
             self._mesh = None
-            self.most_vertices = max(self.most_vertices, int(model.vertex_counts.max()))
-            self.most_corners = max(self.most_corners, int(model.corner_counts.max()))
+            self.max_vertices = max(self.max_vertices, int(model.vertex_counts.max()))
+            self.max_corners = max(self.max_corners, int(model.corner_counts.max()))
         return found
 
     def faces(self, number: int) -> int:
-        """Return how many faces a model has."""
+        """Return the number of faces of a model."""
         return len(self._models[number].planes)
 
     @property
     def mesh(self) -> Mesh:
-        """The mesh of all models so far."""
+        """Mesh of all models so far."""
         if self._mesh is None:
             self._mesh = mesh_of(self._models)
         return self._mesh
 
 
 LIBRARY = Library()
+"""Models of this process."""

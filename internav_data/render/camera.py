@@ -1,8 +1,9 @@
-"""What the agent sees: colour, depth and instance ids, by a rasteriser on the processor.
+"""Pictures of a house: colour, depth and instance ids, by a rasteriser on the processor.
 
-A `StaticScene` is made once for each house, `Props` say where its things and an episode's obstacles
-are now, a `CameraView` adds an eye, and a `Camera` draws any number of views at once. A picture
-depends on its own view alone: not on the batch, on what was drawn before, or on the process.
+A `StaticScene` is made once for each house, `Props` hold the poses of its objects and of an
+episode's obstacles, a `CameraView` adds the pose of a camera, and a `Camera` draws any number of
+views. A picture depends on its own view alone: not on the batch, on earlier pictures, or on the
+process.
 
 Instance ids (int32):
 
@@ -13,7 +14,7 @@ Instance ids (int32):
 -3     wall: walls, lintels, breasts and the casings painted on them
 -4     leaf of a closed door
 -5     window
-1 + k  instance k of the props: thing k of the house for k < len(house.objects), then the obstacles
+1 + k  instance k of the props: house.objects[k], then the obstacles
 ====== ==========================================================
 """
 
@@ -44,40 +45,52 @@ if TYPE_CHECKING:
 
 
 class Frames(NamedTuple):
-    """Pictures of some views."""
+    """Pictures of n views, h = w = the camera's size."""
 
     rgb: NDArray[np.uint8]
-    """(n, h, w, 3)"""
+    """Colours 0 to 255, (n, h, w, 3) uint8."""
     depth: NDArray[np.float32]
-    """(n, h, w): metres along the optical axis; 100 where there is nothing."""
+    """Distances (m) along the optical axis, (n, h, w) float32; 100 where there is nothing."""
     ids: NDArray[np.int32]
-    """(n, h, w): see the module's table."""
+    """Instance ids, (n, h, w) int32: see the module's table."""
 
 
 @dataclass(frozen=True, slots=True)
 class StaticScene:
-    """What never moves in a house: made once, shared by all views of it."""
+    """House as the camera draws it: made once, shared by all views of it."""
 
     house: House
+    """House whose objects `props` places."""
     structure: Structure
+    """Floors, ceilings, walls, doors and windows."""
 
     @classmethod
     def of(cls, house: House) -> Self:
-        """Cut a house's surfaces into rectangles: a few milliseconds."""
+        """Build the scene of a house; takes a few milliseconds."""
         return cls(house, structure_of(house))
 
     def props(self, obstacles: Iterable[tuple[Asset, Pose]] = ()) -> Props:
-        """Return the house's things where they stand, then some obstacles."""
+        """Return the house's objects where they stand, then the obstacles."""
         assets = self.house.assets
-        things = [(assets[t.asset_id], t.pose) for t in self.house.objects]
-        return Props([*things, *obstacles])
+        objects = [(assets[o.asset_id], o.pose) for o in self.house.objects]
+        return Props([*objects, *obstacles])
 
 
 class Props:
-    """Where everything that stands in a house is now; cheap to change between pictures.
+    """Poses of all objects and obstacles in a house; cheap to change between pictures.
 
-    Instance k is thing k of the house, or obstacle k - len(house.objects). Its id is 1 + k. The
-    arrays `models` (n,), `poses` (n, 12) and `present` (n,) are what the kernels read.
+    Instance k is house.objects[k], or obstacle k - len(house.objects). Its id is 1 + k.
+
+    Attributes
+    ----------
+    models : (n,) int64
+        Number of each instance's model in the library.
+    poses : (n, 12) float64
+        Rotation matrix by rows, then position, metres.
+    present : (n,) uint8
+        1 for instances that are drawn, 0 for hidden ones.
+    faces : int
+        Number of faces of all models: the most that a picture can show.
     """
 
     def __init__(self, instances: Sequence[tuple[Asset, Pose]]) -> None:
@@ -85,7 +98,6 @@ class Props:
         self.poses = np.zeros((len(instances), 12))
         self.present = np.ones(len(instances), np.uint8)
         self.faces: int = sum(LIBRARY.faces(m) for m in self.models.tolist())
-        """How many faces may have to be drawn."""
         for k, (_, pose) in enumerate(instances):
             self.move(k, pose)
 
@@ -93,20 +105,20 @@ class Props:
         return len(self.models)
 
     def move(self, instance: int, pose: Pose) -> None:
-        """Put an instance somewhere else."""
+        """Set the pose of an instance."""
         self.poses[instance, :9] = rotation_matrix(pose.quaternion).ravel()
         self.poses[instance, 9:] = (pose.x, pose.y, pose.z)
 
     def hide(self, instance: int) -> None:
-        """Take an instance out of the pictures: it is held."""
+        """Leave an instance out of the pictures, as an object in the agent's hand."""
         self.present[instance] = 0
 
     def show(self, instance: int) -> None:
-        """Let a hidden instance be seen again."""
+        """Draw a hidden instance again."""
         self.present[instance] = 1
 
     def copy(self) -> Props:
-        """Return a copy that may be changed on its own."""
+        """Return a copy with poses of its own; the models are shared."""
         other = Props.__new__(Props)
         other.models, other.faces = self.models, self.faces
         other.poses, other.present = self.poses.copy(), self.present.copy()
@@ -115,31 +127,38 @@ class Props:
 
 @dataclass(frozen=True, slots=True)
 class CameraView:
-    """An eye in a house."""
+    """Scene, poses of its objects and pose of the camera: all that one picture depends on."""
 
-    scenery: StaticScene
+    scene: StaticScene
+    """House to draw."""
     props: Props
+    """Poses of its objects and obstacles."""
     x: float
+    """Position, metres."""
     y: float
     """Position, metres."""
     yaw_deg: float
-    """0 looks along +x, counter-clockwise."""
+    """Heading: 0 looks along +x, counter-clockwise."""
     horizon_deg: float
-    """How far down the camera looks: the agent's -30 to 60."""
+    """Angle below the horizon; the agent's are -30 to 60."""
     z: float = AGENT.camera_height_m
-    """Height, metres."""
+    """Height above the floor, metres."""
 
 
 class Camera:
-    """Draws square pictures of field of view 90 degrees, one thread at a time.
+    """Camera that draws square pictures of field of view 90 degrees; one thread at a time.
 
     Parameters
     ----------
     size
         Pixels a side.
     portals
-        Leave out rooms that no door shows; the pictures are the same without.
+        Whether rooms that no open door shows are skipped; the pictures are the same either way.
 
+    Raises
+    ------
+    UsageError
+        The size is below 1.
     """
 
     def __init__(self, size: int, *, portals: bool = True) -> None:
@@ -152,14 +171,20 @@ class Camera:
         self._scratch: Scratch | None = None
 
     def frames(self, count: int) -> Frames:
-        """Return buffers for some pictures, to be given to `render`."""
+        """Return buffers for `count` pictures, to be passed to `render`."""
         shape = (count, self.size, self.size)
         return Frames(
             np.zeros((*shape, 3), np.uint8), np.zeros(shape, np.float32), np.zeros(shape, np.int32)
         )
 
     def render(self, views: Sequence[CameraView], out: Frames | None = None) -> Frames:
-        """Draw views into `out` (its first len(views) pictures) or into new arrays."""
+        """Draw views into `out` (its first len(views) pictures) or into new arrays; return them.
+
+        Raises
+        ------
+        UsageError
+            `out` holds fewer pictures than there are views, or pictures of another size.
+        """
         target = self.frames(len(views)) if out is None else out
         shape = (self.size, self.size)
         if len(target.rgb) < len(views) or target.ids.shape[1:] != shape:
@@ -178,7 +203,7 @@ class Camera:
         depth: NDArray[np.float32],
         ids: NDArray[np.int32],
     ) -> int:
-        structure, props, library = view.scenery.structure, view.props, LIBRARY.mesh
+        structure, props, library = view.scene.structure, view.props, LIBRARY.mesh
         scratch = self._buffers(structure, props)
         eye = np.array((view.x, view.y, view.z))
         axes = camera_axes(view.yaw_deg, view.horizon_deg)
@@ -189,9 +214,13 @@ class Camera:
         return drawn
 
     def _buffers(self, structure: Structure, props: Props) -> Scratch:
-        """Return buffers large enough for a scene; they only ever grow."""
+        """Return buffers large enough for a scene; they only ever grow.
+
+        A picture shows at most the faces of all props and of the house. The room to spare (factor
+        2) keeps a camera that serves many houses from growing its buffers at each.
+        """
         faces = props.faces + len(structure.mesh.planes)
-        vertices, corners = LIBRARY.most_vertices, LIBRARY.most_corners + 2
+        vertices, corners = LIBRARY.max_vertices, LIBRARY.max_corners + 2
         old = self._scratch
         if (
             old is not None
@@ -221,14 +250,14 @@ class Camera:
 
 @lru_cache(maxsize=256)
 def camera_axes(yaw_deg: float, horizon_deg: float) -> Floats:
-    """Right, down and forward of a camera as rows (3, 3), the house's frame."""
+    """Return the camera's right, down and forward as rows (3, 3) float64, in the house's frame."""
     yaw, pitch = math.radians(yaw_deg), math.radians(horizon_deg)
     c, s = math.cos(yaw), math.sin(yaw)
     if yaw_deg % 90.0 == 0.0:
-        # Quarter turns look exactly along an axis.
+        # Quarter turns look exactly along an axis, not 6e-17 beside it.
         c, s = float(round(c)), float(round(s))
     level, down = math.cos(pitch), math.sin(pitch)
     axes = np.array([[s, -c, 0.0], [-c * down, -s * down, -level], [c * level, s * level, -down]])
-    # Shared by all who ask again.
+    # Cached: all callers share the array.
     axes.flags.writeable = False
     return axes

@@ -1,4 +1,9 @@
-"""One picture: cull, draw, shade. Numba."""
+"""One picture: cull rooms, draw faces, cast shadows, shade pixels. Numba.
+
+Frames: the camera looks along its z axis, x points right and y down. A pixel (column, row) has its
+centre at (column + 0.5, row + 0.5); a point (x, y, z) of the camera's frame lies in the picture at
+focal * (x, y) / z + middle, where focal = middle = half the picture's width (90 degrees).
+"""
 
 from __future__ import annotations
 
@@ -18,35 +23,41 @@ if TYPE_CHECKING:
 
 
 class Scratch(NamedTuple):
-    """Buffers of one camera, used again for every picture."""
+    """Buffers of one camera, used again for every picture; most = largest number of drawn faces."""
 
     inverse: Singles
-    """(h, w): 1 / z."""
+    """Depth buffer: 1 / z, (h, w) float32, 1 / m."""
     faces: Ints32
-    """(h, w): number of the drawn face, -1 for none."""
+    """Number of the drawn face that each pixel shows, (h, w) int32; -1 for none."""
     drawn: Ints32
-    """(most, 2)"""
-    made: Image
-    """(most,)"""
+    """Face of the mesh and frame of each drawn face, (most, 2) int32."""
+    prepared: Image
+    """Whether a drawn face has its record, (most,) uint8."""
     records: Singles
-    """(most, RECORD)"""
+    """Shading parameters of each drawn face, (most, RECORD) float32: see `prepare`."""
     frames: Floats
-    """(instances + 1, 15)"""
+    """Transform of the house (row 0) and of instance k (row 1 + k), (instances + 1, 15) float64:
+    rotation into the camera's frame by rows (9), translation (3), the eye in the object's own
+    frame (3)."""
     points: Floats
-    """(vertices of a part, 5)"""
+    """Vertices of the part being drawn, (vertices, 5) float64: x, y, z in the camera's frame,
+    metres; x, y in the picture, pixels."""
     outline: Floats
-    """(2, corners + 1 of a face)"""
+    """Corners of the face being drawn, x and y in pixels, (2, corners + 1) float64."""
     spans: Ints32
-    """(2, h)"""
+    """First column and end of each row of the face being drawn, (2, h) int32."""
     seen: Ints32
-    """(instances + 1,): how many instances may show, then which."""
+    """Number of instances that may show, then their numbers, (instances + 1,) int32."""
     shadow: Singles
-    """(h, w): share of light taken away."""
+    """Share of the light that shadows take away, (h, w) float32."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _frame(axes: Floats, eye: Floats, pose: Floats, out: Floats) -> None:
-    """Compose camera and pose (12,: rotation by rows, position) to a frame of `draw_parts`."""
+def _compose(axes: Floats, eye: Floats, pose: Floats, out: Floats) -> None:
+    """Write a row of `Scratch.frames`: camera and pose (12,: rotation by rows, position) composed.
+
+    `axes` (3, 3) and `eye` (3,) as for `picture`.
+    """
     dx, dy, dz = pose[9] - eye[0], pose[10] - eye[1], pose[11] - eye[2]
     for r in range(3):
         a, b, c = axes[r, 0], axes[r, 1], axes[r, 2]
@@ -58,7 +69,7 @@ def _frame(axes: Floats, eye: Floats, pose: Floats, out: Floats) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _house(
+def _draw_structure(
     mesh: Mesh,
     windows: Floats,
     axes: Floats,
@@ -67,11 +78,14 @@ def _house(
     middle: float,
     scratch: Scratch,
 ) -> int:
-    """Draw the house's own surfaces, each within the window of its room."""
+    """Draw the house's own surfaces, room by room; return the number of drawn faces.
+
+    `windows` (rooms, 4) as `room_windows` writes them: rooms with an empty one are skipped.
+    """
     frame = scratch.frames[0]
     pose = np.zeros(12)
     pose[0] = pose[4] = pose[8] = 1.0
-    _frame(axes, eye, pose, frame)
+    _compose(axes, eye, pose, frame)
     count = 0
     for room in range(windows.shape[0]):
         window = windows[room]
@@ -85,7 +99,7 @@ def _house(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _things(
+def _draw_objects(
     mesh: Mesh,
     models: Ints,
     poses: Floats,
@@ -99,9 +113,13 @@ def _things(
     scratch: Scratch,
     count: int,
 ) -> int:
-    """Draw everything that stands in the house."""
+    """Draw the instances that may show; return the number of drawn faces so far.
+
+    `models` (n,), `poses` (n, 12), `present` (n,) as in `Props`; `windows` (rooms, 4).
+    """
+    # An instance may reach into several rooms, so it is clipped to the picture, not to a window.
     limit = middle / focal
-    whole = np.array([-limit, -limit, limit, limit])
+    entire = np.array([-limit, -limit, limit, limit])
     centre, local = np.empty(3), np.empty(3)
     scratch.seen[0] = 0
     for k in range(models.shape[0]):
@@ -115,23 +133,23 @@ def _things(
         dx, dy, dz = centre[0] - eye[0], centre[1] - eye[1], centre[2] - eye[2]
         for r in range(3):
             local[r] = axes[r, 0] * dx + axes[r, 1] * dy + axes[r, 2] * dz
-        # Its shadow may show where it does not.
+        # The shadow reaches further than the object, and may show alone.
         radius += MARGIN_M
         if not ball_in_rooms(centre, local, radius, rooms.boxes, rooms.box_rooms, windows):
             continue
-        _frame(axes, eye, pose, frame)
+        _compose(axes, eye, pose, frame)
         scratch.seen[0] += 1
         scratch.seen[scratch.seen[0]] = k
         count = draw_parts(
             mesh, mesh.first_part[model], mesh.first_part[model + 1], frame, k + 1, focal, middle,
-            whole, scratch.inverse, scratch.faces, scratch.drawn, count,
+            entire, scratch.inverse, scratch.faces, scratch.drawn, count,
             scratch.points, scratch.outline, scratch.spans,
         )  # fmt: skip
     return count
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _shadows(
+def _draw_shadows(
     mesh: Mesh,
     models: Ints,
     poses: Floats,
@@ -141,7 +159,7 @@ def _shadows(
     middle: float,
     scratch: Scratch,
 ) -> None:
-    """Let all things drawn darken the floor."""
+    """Write the shadows of all drawn instances on the floor."""
     scratch.shadow[:, :] = 0.0
     for n in range(1, scratch.seen[0] + 1):
         k = scratch.seen[n]
@@ -169,15 +187,24 @@ def picture(
     depth: Singles,
     ids: Ints32,
 ) -> int:
-    """Draw one picture of field of view 90 degrees; return how many faces were drawn.
+    """Draw one picture of field of view 90 degrees; return the number of drawn faces.
 
     Parameters
     ----------
+    structure, rooms
+        Surfaces of the house, and its rooms for culling.
+    library
+        Models of assets.
+    models, poses, present
+        Instances, as in `Props`: (n,) int64, (n, 12) float64, (n,) uint8.
     axes, eye
-        Right, down and forward as rows (3, 3); position (3,), metres: the house's frame.
+        Camera: right, down and forward as rows (3, 3); position (3,), metres, house's frame.
     portals
-        Whether rooms that no door shows are left out: the same picture, sooner.
-
+        Whether rooms that no open door shows are skipped: the same picture, sooner.
+    scratch
+        Buffers, changed.
+    rgb, depth, ids
+        Picture to write: (h, w, 3) uint8, (h, w) float32 metres, (h, w) int32.
     """
     focal = middle = scratch.inverse.shape[1] / 2.0
     scratch.inverse[:, :] = 1.0 / FAR_M
@@ -191,15 +218,16 @@ def picture(
     else:
         windows[:, :2] = -1.0
         windows[:, 2:] = 1.0
-    count = _house(structure, windows, axes, eye, focal, middle, scratch)
-    count = _things(
+    count = _draw_structure(structure, windows, axes, eye, focal, middle, scratch)
+    count = _draw_objects(
         library, models, poses, present, rooms, windows, axes, eye, focal, middle, scratch, count
     )
-    _shadows(library, models, poses, axes, eye, focal, middle, scratch)
-    scratch.made[:count] = 0
+    _draw_shadows(library, models, poses, axes, eye, focal, middle, scratch)
+    # Deferred shading: only faces that still show when all are drawn cost a record.
+    scratch.prepared[:count] = 0
     shade(
         structure, rooms.labels, library, scratch.frames, axes, eye[2], focal, middle,
-        scratch.inverse, scratch.shadow, scratch.faces, scratch.drawn, scratch.made,
+        scratch.inverse, scratch.shadow, scratch.faces, scratch.drawn, scratch.prepared,
         scratch.records, rgb, depth, ids,
     )  # fmt: skip
     return count

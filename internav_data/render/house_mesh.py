@@ -1,4 +1,4 @@
-"""A house's own surfaces in the arrays that the camera's kernels read."""
+"""Mesh of a house's own surfaces, in the arrays that the camera's kernels read."""
 
 from __future__ import annotations
 
@@ -23,14 +23,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """A house's own surfaces: a model a room, of the rectangles seen from it, a part each."""
+    """House's own surfaces: one model a room, one part for each rectangle seen from it."""
 
     mesh: Mesh
+    """Rectangles; model k is those of room k of the house."""
     rooms: Rooms
+    """Instance ids of the rectangles, and the rooms for portal culling."""
 
 
 def _corners(tile: Tile) -> NDArray[np.float64]:
-    """Four corners of a rectangle, counter-clockwise from the side it is seen from."""
+    """Return the corners of a rectangle, (4, 3), counter-clockwise from the side that is seen."""
     sheet = tile.sheet
     a, b = PLANE_AXES[sheet.axis]
     (u0, v0), (u1, v1) = sheet.low, sheet.high
@@ -44,7 +46,7 @@ def _corners(tile: Tile) -> NDArray[np.float64]:
 
 
 def _axes(tile: Tile) -> list[float]:
-    """Axes of u and v: the plane's own two, from the tile's origin."""
+    """Return a row of `Mesh.axes`: u and v are the plane's own axes, from the tile's origin."""
     a, b = PLANE_AXES[tile.sheet.axis]
     u, v = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
     u[a] = v[b] = 1.0
@@ -52,6 +54,7 @@ def _axes(tile: Tile) -> list[float]:
 
 
 def _door_corners(door: Door) -> list[list[float]]:
+    """Return the corners of a door's opening on the wall's centre line, 4 x 3, metres."""
     half = door.width_m / 2.0
     dx, dy = (half, 0.0) if door.yaw_deg == 0.0 else (0.0, half)
     low, high = (door.x - dx, door.y - dy), (door.x + dx, door.y + dy)
@@ -59,7 +62,7 @@ def _door_corners(door: Door) -> list[list[float]]:
 
 
 def _model(tiles: Sequence[Tile]) -> Model:
-    """Return what is seen from one room as a model."""
+    """Return the rectangles seen from one room as a model."""
     planes = np.zeros((len(tiles), 4))
     for row, tile in zip(planes, tiles, strict=True):
         row[tile.sheet.axis] = tile.sheet.sign
@@ -80,7 +83,7 @@ def _model(tiles: Sequence[Tile]) -> Model:
 
 
 def structure_of(house: House) -> Structure:
-    """Build a house's own surfaces."""
+    """Build the mesh of a house's own surfaces."""
     tiles = house_tiles(house)
     by_room = [[t for t in tiles if t.room == room.room_id] for room in house.rooms]
     index = {room.room_id: k for k, room in enumerate(house.rooms)}

@@ -1,4 +1,4 @@
-"""What surfaces look like: patterns by formula, and how parts and materials choose theirs."""
+"""Appearance of surfaces: patterns by formula, and the choice of one by material."""
 
 from __future__ import annotations
 
@@ -14,30 +14,40 @@ if TYPE_CHECKING:
     from internav_data.records import RGB, Material
 
 PLAIN: Final = 0
+"""Pattern of one colour."""
 SPECKLE: Final = 1
-"""Noise in squares: `a` squares a metre, `b` how strong."""
+"""Pattern of noise in squares: `a` squares a metre, strength `b`."""
 GRAIN: Final = 2
-"""Wood: u runs along the grain."""
+"""Pattern of wood: u runs along the grain."""
 PLANKS: Final = 3
+"""Pattern of floor boards along u."""
 TILES: Final = 4
-"""`a` side of a tile, `b` width of the joint, metres."""
+"""Pattern of tiles of side `a` with joints of width `b`, metres."""
 BRICKS: Final = 5
+"""Pattern of bricks in mortar."""
 STRIPES: Final = 6
+"""Pattern of stripes along v, one light and one dark in `a` metres."""
 METAL: Final = 7
+"""Pattern of brushed metal."""
 SCREEN: Final = 8
+"""Pattern of a screen with a gleam."""
 PANE: Final = 9
-"""A window, `a` wide and `b` high, metres; u and v from its lower corner."""
+"""Pattern of a window, `a` wide and `b` high, metres; u and v from its lower corner."""
 DOOR_LEAF: Final = 10
-"""A door, `a` wide and `b` high, metres; u and v from its lower corner."""
+"""Pattern of a door, `a` wide and `b` high, metres; u and v from its lower corner."""
 
 
 class Look(NamedTuple):
-    """How one face is coloured."""
+    """Colour and pattern of a face."""
 
     colour: RGB
+    """Base colour."""
     pattern: int
+    """Number of a pattern, as `PLANKS`."""
     a: float = 0.0
+    """First parameter of the pattern, 0 for patterns without one."""
     b: float = 0.0
+    """Second parameter of the pattern, 0 for patterns without one."""
     skirting: bool = False
     """Whether a skirting board runs along the floor: walls only."""
 
@@ -50,42 +60,44 @@ class Mesh(NamedTuple):
     """
 
     first_part: Ints
-    """(models + 1,)"""
+    """First part of each model, (models + 1,) int64."""
     spheres: Floats
-    """(models, 4): centre and radius of a ball that holds the model, its own frame, metres."""
+    """Centre and radius of a ball around each model, (models, 4), own frame, metres."""
     bounds: Floats
-    """(models, 5): x_min, y_min, x_max, y_max, z_max, its own frame, metres."""
+    """x_min, y_min, x_max, y_max, z_max of each model, (models, 5), own frame, metres."""
     first_vertex: Ints
-    """(parts + 1,)"""
+    """First vertex of each part, (parts + 1,) int64."""
     first_face: Ints
-    """(parts + 1,)"""
+    """First face of each part, (parts + 1,) int64."""
     vertices: Floats
-    """(vertices, 3), metres."""
+    """Vertices in the model's own frame, (vertices, 3), metres."""
     first_corner: Ints
-    """(faces + 1,)"""
+    """First corner of each face, (faces + 1,) int64."""
     corners: Ints
-    """(corners,): a vertex, counted from its part's first."""
+    """Vertex of each corner, counted from its part's first, (corners,) int64."""
     planes: Floats
-    """(faces, 4): unit normal outwards, distance from the origin."""
+    """Unit normal outwards and distance from the origin (m) of each face, (faces, 4)."""
     axes: Floats
-    """(faces, 8): u = axes[0:3] . p + axes[3], v = axes[4:7] . p + axes[7], metres."""
+    """Texture axes of each face, (faces, 8): u = axes[0:3] . p + axes[3] and
+    v = axes[4:7] . p + axes[7] at point p, metres."""
     looks: NDArray[np.float32]
-    """(faces, 7): red, green, blue, pattern, a, b, skirting."""
+    """Red, green, blue, pattern, a, b, skirting of each face, (faces, 7): see `Look`."""
 
 
 class Rooms(NamedTuple):
-    """What a house adds to its mesh: what its rectangles are, and how rooms are joined."""
+    """Instance ids of a house's rectangles, and its rooms joined by doors, for portal culling."""
 
     labels: Ints
-    """(parts,): instance id of each rectangle. Part and face have the same number."""
+    """Instance id of each rectangle, (parts,) int64; part and face have the same number."""
     boxes: Floats
-    """(boxes, 4): x_min, y_min, x_max, y_max of rooms' boxes, up to the walls' centre lines."""
+    """x_min, y_min, x_max, y_max (m) of boxes that tile the rooms, up to the walls' centre lines,
+    (boxes, 4)."""
     box_rooms: Ints
-    """(boxes,): index of the room."""
+    """Index of the room of each box, (boxes,) int64."""
     doors: Floats
-    """(doors, 4, 3): corners of each open door's rectangle, on the wall's centre line."""
+    """Corners (m) of each open door's rectangle, on the wall's centre line, (doors, 4, 3)."""
     door_rooms: Ints
-    """(doors, 2): indices of the rooms it joins."""
+    """Indices of the two rooms of each open door, (doors, 2) int64."""
 
 
 _PART_LOOKS: Mapping[str, tuple[int, float, float]] = {
@@ -107,25 +119,25 @@ _HOUSE_PATTERNS: Mapping[str, tuple[int, float, float]] = {
 
 
 _PAINTED = 185
-"""Wood whose channels are all at least this bright is painted: no grain."""
+"""Least brightness of all channels of painted wood, which shows no grain."""
 
 
 def part_look(material: str, colour: RGB) -> Look:
-    """Return how a part of an asset is coloured."""
+    """Return the look of a part of an asset."""
     if material == "wood" and min(colour) >= _PAINTED:
         return Look(colour, PLAIN)
     return Look(colour, *_PART_LOOKS.get(material, (PLAIN, 0.0, 0.0)))
 
 
 def floor_look(material: Material) -> Look:
-    """Return how a floor is coloured."""
+    """Return the look of a floor."""
     tiles = (TILES, 0.45, 0.010)
     known = {**_HOUSE_PATTERNS, "tiles": tiles}
     return Look(material.colour, *known.get(material.pattern, (SPECKLE, 12.0, 0.03)))
 
 
 def wall_look(material: Material) -> Look:
-    """Return how a wall is coloured: smaller tiles, and a skirting board."""
+    """Return the look of a wall: smaller tiles than a floor's, and a skirting board."""
     tiles = (TILES, 0.18, 0.007)
     known = {**_HOUSE_PATTERNS, "tiles": tiles}
     pattern, a, b = known.get(material.pattern, (PLAIN, 0.0, 0.0))

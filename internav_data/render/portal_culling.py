@@ -1,7 +1,8 @@
-"""Which rooms can be seen, and through how much of the picture: doors as portals, numba.
+"""Portal culling: the rooms that can be seen through open doors, and in which window. Numba.
 
-A window here is a rectangle of slopes (x / z and y / z in the camera's frame): left, top, right,
-bottom. It is empty where left >= right. Culling never changes a picture, only its price.
+After Luebke and Georges ("Portals and mirrors: simple, fast evaluation of potentially visible
+sets", 1995). A window here is a rectangle of slopes (x / z and y / z in the camera's frame): left,
+top, right, bottom. It is empty where left >= right. Culling never changes a picture, only its cost.
 """
 
 from __future__ import annotations
@@ -16,16 +17,20 @@ if TYPE_CHECKING:
     from internav_data.core.typing import Floats, Ints
 
 NEAR_M = 0.05
-"""Nothing nearer is drawn. The agent's disc keeps things 0.2 m away: 0.115 m at a corner."""
+"""Distance (m) of the near plane, before which nothing is drawn. The agent's disc keeps objects
+0.2 m away: 0.115 m along the optical axis at a corner of the picture."""
 _THICK_M = 0.0601
-"""Half a wall: who stands in a doorway is in both its rooms."""
-_ROUNDS = 256
-"""Doors looked through at most: far more than any house needs, and a bound."""
+"""Half a wall (m): a camera in a doorway is in both its rooms."""
+_MAX_ROUNDS = 256
+"""Maximum number of doors in a row to look through: a bound far above any house's need."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def door_window(door: Floats, eye: Floats, axes: Floats, window: Floats) -> None:
-    """Bound a door's rectangle (4, 3), cut off behind the near plane; empty where behind it."""
+    """Write the window (4,) of a door's rectangle (4, 3), cut at the near plane; empty if behind.
+
+    `eye` (3,) and `axes` (3, 3) as for `room_windows`, metres.
+    """
     window[0] = window[1] = 1e9
     window[2] = window[3] = -1e9
     for k in range(4):
@@ -34,8 +39,9 @@ def door_window(door: Floats, eye: Floats, axes: Floats, window: Floats) -> None
         bx, by, bz = door[j, 0] - eye[0], door[j, 1] - eye[1], door[j, 2] - eye[2]
         z0 = axes[2, 0] * ax + axes[2, 1] * ay + axes[2, 2] * az
         z1 = axes[2, 0] * bx + axes[2, 1] * by + axes[2, 2] * bz
-        # A sliver nearer than anything drawn may be cut off: so far and no further.
+        # Cut at half the near distance: no more is lost than lies before every drawn face.
         near = NEAR_M * 0.5
+        # Up to two points of an edge: its first end if in front, and where it pierces the plane.
         for end in range(2):
             if end == 0:
                 if z0 < near:
@@ -49,6 +55,7 @@ def door_window(door: Floats, eye: Floats, axes: Floats, window: Floats) -> None
             z = axes[2, 0] * px + axes[2, 1] * py + axes[2, 2] * pz
             x = (axes[0, 0] * px + axes[0, 1] * py + axes[0, 2] * pz) / z
             y = (axes[1, 0] * px + axes[1, 1] * py + axes[1, 2] * pz) / z
+            # Rounding must not make a window smaller than the door.
             window[0] = min(window[0], x - 1e-6)
             window[1] = min(window[1], y - 1e-6)
             window[2] = max(window[2], x + 1e-6)
@@ -56,10 +63,13 @@ def door_window(door: Floats, eye: Floats, axes: Floats, window: Floats) -> None
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _start(
+def _open_own_rooms(
     eye: Floats, reach: float, boxes: Floats, box_rooms: Ints, windows: Floats, limit: float
 ) -> int:
-    """Open the whole picture to the rooms the eye is in; to all where it is in none."""
+    """Give the entire picture to the rooms that hold the eye, or to all where none does.
+
+    Returns the number of boxes that hold the eye.
+    """
     found = 0
     for b in range(boxes.shape[0]):
         if (
@@ -87,30 +97,31 @@ def room_windows(
     door_rooms: Ints,
     windows: Floats,
 ) -> None:
-    """Find the window through which each room can be seen.
+    """Find the window in which each room can be seen.
 
     Parameters
     ----------
     eye, axes
-        Position (3,), metres; right, down and forward (3, 3) as rows.
+        Camera: position (3,), metres; right, down and forward as rows (3, 3).
     limit
         Slope at the picture's edge.
     boxes, box_rooms, doors, door_rooms
-        See `Structure`.
+        Rooms: (boxes, 4), (boxes,), (doors, 4, 3), (doors, 2), as in `Rooms`.
     windows
-        Written, (rooms, 4).
-
+        Windows to write, (rooms, 4) float64; empty for rooms that cannot be seen.
     """
     windows[:, :2] = 1e9
     windows[:, 2:] = -1e9
-    if _start(eye, _THICK_M, boxes, box_rooms, windows, limit) == 0:
+    if _open_own_rooms(eye, _THICK_M, boxes, box_rooms, windows, limit) == 0:
         return
     through = np.empty((doors.shape[0], 4))
     for d in range(doors.shape[0]):
         door_window(doors[d], eye, axes, through[d])
+    # A room shows in the bounding box of its doors' windows, each cut to the window of the room
+    # before. Windows only grow, so the rounds end once none does.
     grown = True
     rounds = 0
-    while grown and rounds < _ROUNDS:
+    while grown and rounds < _MAX_ROUNDS:
         grown = False
         rounds += 1
         for d in range(doors.shape[0]):
@@ -134,9 +145,10 @@ def room_windows(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def ball_in_window(x: float, y: float, z: float, radius: float, window: Floats) -> bool:
-    """Whether a ball (camera's frame) may show in a window."""
+    """Return whether a ball (camera's frame, metres) may show in a window (4,)."""
     if window[0] >= window[2] or z + radius <= NEAR_M:
         return False
+    # The planes through the eye and the window's sides: signed distance against the radius.
     for k in range(2):
         at = x if k == 0 else y
         low, high = window[k], window[k + 2]
@@ -156,9 +168,10 @@ def ball_in_rooms(
     box_rooms: Ints,
     windows: Floats,
 ) -> bool:
-    """Whether a ball shows in the window of any room it reaches into.
+    """Return whether a ball may show in the window of any room that it reaches into.
 
-    `centre` is the house's frame, `local` the camera's; a ball outside all rooms always shows.
+    `centre` (3,) in the house's frame and `local` (3,) in the camera's, metres; `boxes` (boxes, 4),
+    `box_rooms` (boxes,), `windows` (rooms, 4). A ball outside all rooms may always show.
     """
     reached = False
     for b in range(boxes.shape[0]):

@@ -1,9 +1,10 @@
-"""Convex polygons into a depth buffer: culling, near clipping, spans. Numba, no fastmath.
+"""Convex polygons into a depth buffer: culling, near clipping, scanlines. Numba, no fastmath.
 
 A pixel belongs to a face when its centre lies in it, left and upper edges included, right and
-lower ones not. Where an edge crosses a row is always computed from its upper end, so two faces
-that share an edge agree to the last bit: no crack, no pixel twice. The buffer holds 1 / z, which
-is linear in the picture: float32 resolves a micrometre at 10 m.
+lower ones not (the top-left rule of OpenGL and Direct3D). The crossing of an edge with a row is
+always computed from the edge's upper end, so two faces that share an edge agree to the last bit: no
+crack, no pixel twice. The buffer holds 1 / z, which is linear in the picture: float32 resolves a
+micrometre at 10 m.
 """
 
 from __future__ import annotations
@@ -21,20 +22,21 @@ if TYPE_CHECKING:
     from internav_data.render.materials import Mesh
 
 _NEARER = np.float32(1.000004)
-"""What a face must be nearer by to hide another: of two in one plane the first drawn stays whole
-instead of both showing in stripes."""
+"""Ratio of 1 / z by which a face must be nearer to hide another: of two faces in one plane the
+first drawn stays in front, where both would show in stripes."""
 _EDGE_ON_M = 1e-9
-"""A face whose plane is no further below the eye is seen from behind or from its edge."""
+"""Height (m) of the eye over a face's plane below which the face is seen edge-on or from behind."""
 _NOT_YET, _OUTSIDE, _AHEAD, _CUT = -2, -1, 0, 1
-"""Where a part lies: not looked at, out of the window, before the near plane wholly or partly."""
+"""States of a part: not projected yet; out of the window; beyond the near plane; cut by it."""
 _LEFT, _RIGHT, _ABOVE, _BELOW, _BEHIND = 1, 2, 4, 8, 16
+"""Bits of an outcode (Cohen and Sutherland): the planes outside of which a vertex lies."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _edge(
     x0: float, y0: float, x1: float, y1: float, first: int, last: int, width: int, columns: Ints32
 ) -> None:
-    """Write the first pixel right of an edge (y0 < y1) for rows [first, last)."""
+    """Write the first column right of an edge (y0 < y1) for rows [first, last)."""
     slope = (x1 - x0) / (y1 - y0)
     for row in range(first, last):
         x = math.ceil(x0 + (row + 0.5 - y0) * slope - 0.5)
@@ -45,9 +47,10 @@ def _edge(
 def scan(
     count: int, px: Floats, py: Floats, height: int, width: int, lefts: Ints32, rights: Ints32
 ) -> tuple[int, int]:
-    """Write the pixels [left, right) of each row of a convex polygon; return rows [top, bottom).
+    """Write the columns [left, right) of each row of a convex polygon; return rows [top, bottom).
 
-    Corners run counter-clockwise as seen (y points down).
+    The corners are px[:count], py[:count] (pixels), counter-clockwise as seen (y points down), so
+    that edges down the picture are left ones; `lefts` and `rights` (height,) int32.
     """
     top, bottom = height, 0
     for k in range(count):
@@ -80,9 +83,20 @@ def fill(
     lefts: Ints32,
     rights: Ints32,
 ) -> bool:
-    """Draw a convex polygon whose 1 / z is nx x + ny y + nz at picture point (x, y), pixels.
+    """Draw a convex polygon; return whether it covers any pixel, hidden or not.
 
-    True when it covers any pixel, hidden or not.
+    Parameters
+    ----------
+    count, px, py
+        Number of corners; their columns and rows, (count or more,) float64, pixels.
+    nx, ny, nz
+        Plane: 1 / z is nx * x + ny * y + nz at the picture's point (x, y), pixels.
+    face
+        Number to write where the polygon is nearest.
+    depth, faces
+        Buffers (h, w): 1 / z float32, number of the face int32.
+    lefts, rights
+        Work space, (h,) int32.
     """
     height, width = depth.shape
     top, bottom = scan(count, px, py, height, width, lefts, rights)
@@ -94,6 +108,7 @@ def fill(
             covered = True
             # From the span's own start: a float32 then carries no more than the span's range.
             start = np.float32(nx * (a + 0.5) + ny * (row + 0.5) + nz)
+            # Both stores are unconditional, so that the loop has no branch and vectorises.
             for x in range(a, b):
                 inverse = start + step * np.float32(np.int32(x) - np.int32(a))
                 nearer = inverse > depth[row, x] * _NEARER
@@ -103,7 +118,7 @@ def fill(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _place(
+def _project_part(
     mesh: Mesh,
     part: int,
     frame: Floats,
@@ -112,10 +127,10 @@ def _place(
     window: Floats,
     points: Floats,
 ) -> int:
-    """Bring a part's vertices into the camera's frame and the picture.
+    """Write a part's vertices into `points` as `Scratch.points` has them.
 
-    Returns _OUTSIDE when all lie outside the window, _CUT when the near plane cuts them, else
-    _AHEAD. Row of `points`: x, y, z (camera), x, y (pixels).
+    Returns _OUTSIDE where all lie beyond one side of the window (4, slopes) or before the near
+    plane, _CUT where some lie before it, else _AHEAD.
     """
     outside, state = 31, _AHEAD
     base = mesh.first_vertex[part]
@@ -145,7 +160,11 @@ def _place(
 def _clip(
     mesh: Mesh, face: int, points: Floats, focal: float, middle: float, px: Floats, py: Floats
 ) -> int:
-    """Cut a face at the near plane; a shared edge is cut from its far end by both its faces."""
+    """Cut a face at the near plane into px, py; return the number of corners.
+
+    After Sutherland and Hodgman (1974). A shared edge is cut from its far end by both its faces, so
+    that they agree to the last bit.
+    """
     count = 0
     begin, end = mesh.first_corner[face], mesh.first_corner[face + 1]
     for c in range(begin, end):
@@ -184,26 +203,34 @@ def draw_parts(
     outline: Floats,
     spans: Ints32,
 ) -> int:
-    """Draw the faces of some parts that look at the eye; return how many are drawn so far.
+    """Draw the front faces of parts [begin, end); return the number of drawn faces so far.
 
     Parameters
     ----------
-    frame
-        (15,): rotation into the camera's frame (rows), translation, the eye in the parts' frame.
-    drawn
-        (most, 2): of each drawn face its number in the mesh and its frame.
-
+    frame, frame_index
+        Row of `Scratch.frames`, (15,), and its number.
+    focal, middle
+        Focal length and centre of the picture, pixels.
+    window
+        Rectangle of slopes outside of which nothing needs to be drawn, (4,).
+    depth, faces
+        Buffers (h, w) float32 and int32.
+    drawn, drawn_count
+        Face and frame of each drawn face, (most, 2) int32; the number of those before.
+    points, outline, spans
+        Work space, as in `Scratch`: (vertices, 5), (2, corners + 1), (2, h).
     """
     px, py, lefts, rights = outline[0], outline[1], spans[0], spans[1]
     for part in range(begin, end):
         placed = _NOT_YET
         for face in range(mesh.first_face[part], mesh.first_face[part + 1]):
             ax, ay, az = mesh.planes[face, 0], mesh.planes[face, 1], mesh.planes[face, 2]
+            # Back-face culling in the object's own frame: most faces cost no projection.
             above = ax * frame[12] + ay * frame[13] + az * frame[14] - mesh.planes[face, 3]
             if above <= _EDGE_ON_M:
                 continue
             if placed == _NOT_YET:
-                placed = _place(mesh, part, frame, focal, middle, window, points)
+                placed = _project_part(mesh, part, frame, focal, middle, window, points)
             if placed == _OUTSIDE:
                 break
             if placed == _AHEAD:
@@ -214,6 +241,8 @@ def draw_parts(
                     px[k], py[k] = points[i, 3], points[i, 4]
             else:
                 count = _clip(mesh, face, points, focal, middle, px, py)
+            # The plane n . p = -above of the camera's frame, with p = z * ((x - middle) / focal,
+            # (y - middle) / focal, 1), solved for 1 / z: linear in the pixel (x, y).
             scale = -1.0 / above
             nx = (frame[0] * ax + frame[1] * ay + frame[2] * az) * scale / focal
             ny = (frame[3] * ax + frame[4] * ay + frame[5] * az) * scale / focal

@@ -1,4 +1,4 @@
-"""From the depth buffer to colours: every pixel is shaded once, for the face that won it. Numba."""
+"""Deferred shading: every pixel is shaded once, for the nearest face. Numba."""
 
 from __future__ import annotations
 
@@ -15,17 +15,22 @@ if TYPE_CHECKING:
     from internav_data.render.materials import Mesh
 
 FAR_M = 100.0
-"""Depth where there is nothing."""
+"""Depth (m) of pixels that show nothing."""
 RECORD = 18
-"""Floats a drawn face: u (0-3), v (4-7), light, pixel width, look (10-14), skirting, pattern."""
+"""Length of a face's record: u (0-3), v (4-7), light (8), pixel width (9), red, green, blue, a, b
+(10-14), skirting (15), pattern (16), whether upright (17)."""
 _UPRIGHT = 0.3
-"""Slope of the normal below which a face counts as a wall."""
+"""Vertical component of a normal below which its face counts as upright, like a wall."""
 SKIRTING_M = F(0.085)
+"""Height (m) of a skirting board."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def light_of(nx: float, ny: float, nz: float) -> float:
-    """How bright a surface is by where it faces: from above most, no two walls of a room alike."""
+    """Return the brightness of a surface by its unit normal, brightest from above.
+
+    The terms in nx and ny make the four walls of a room differ, so that corners show.
+    """
     above, below = max(0.0, nz), max(0.0, -nz)
     return 0.83 + 0.19 * above + 0.15 * below + 0.09 * nx * nx + 0.03 * (nx + ny)
 
@@ -34,9 +39,14 @@ def light_of(nx: float, ny: float, nz: float) -> float:
 def prepare(
     mesh: Mesh, face: int, frame: Floats, axes: Floats, focal: float, middle: float, out: Singles
 ) -> None:
-    """Write what shading needs of a face: u and v are offset + z (x-step x + y-step y + constant).
+    """Write the record (RECORD,) of a face.
 
-    `frame` as for `draw_part`, `axes` the camera's right, down and forward as rows.
+    u is record[0] + z * (record[1] * column + record[2] * row + record[3]), v the same from
+    record[4]: texture axes are linear in the camera's frame, where a pixel's point is z * ((column
+    + 0.5 - middle) / focal, (row + 0.5 - middle) / focal, 1).
+
+    `frame` (15,) as in `Scratch.frames`; `axes` (3, 3): the camera's right, down and forward as
+    rows.
     """
     for t in range(2):
         a0, a1 = mesh.axes[face, 4 * t], mesh.axes[face, 4 * t + 1]
@@ -56,8 +66,10 @@ def prepare(
     nx = axes[0, 0] * cx + axes[1, 0] * cy + axes[2, 0] * cz
     ny = axes[0, 1] * cx + axes[1, 1] * cy + axes[2, 1] * cz
     nz = axes[0, 2] * cx + axes[1, 2] * cy + axes[2, 2] * cz
+    # (nx, ny, nz) is the normal in the house's frame, where light falls from above.
     out[8] = light_of(nx, ny, nz)
     above = a0 * frame[12] + a1 * frame[13] + a2 * frame[14] - offset
+    # Width of a pixel on the face: z / focal, over the cosine of the angle above / z.
     out[9] = 1.0 / (focal * max(above, 1e-3))
     for k in range(3):
         out[10 + k] = mesh.looks[face, k]
@@ -72,7 +84,7 @@ def _byte(value: float) -> Any:  # noqa: ANN401 - numba reads types, not annotat
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _run(
+def _shade_span(
     record: Singles,
     row: int,
     begin: int,
@@ -85,7 +97,11 @@ def _run(
     rgb: Image,
     depth: Singles,
 ) -> None:
-    """Shade pixels [begin, end) of a row, all of one face."""
+    """Shade the columns [begin, end) of a row, all of one face.
+
+    `high` is the eye's height (m), `rise` the rise of the row's rays for a metre along the optical
+    axis, `per_pixel` the width of a pixel one metre away.
+    """
     y = F(row)
     u_start, u_step, u_row = record[0], record[1], record[2] * y + record[3]
     v_start, v_step, v_row = record[4], record[5], record[6] * y + record[7]
@@ -101,7 +117,7 @@ def _run(
         light = base * (F(0.84) + F(0.20) * min(nearness, F(0.8)))
         level = F(1.0)
         if upright:
-            # Less light reaches what is near the floor.
+            # Less light reaches the foot of a wall.
             level = high + z * rise
             light *= F(0.86) + F(0.14) * min(F(1.0), max(level, F(0.0)) * F(2.2))
         else:
@@ -137,21 +153,37 @@ def shade(
     shadow: Singles,
     faces: Ints32,
     drawn: Ints32,
-    made: Image,
+    prepared: Image,
     records: Singles,
     rgb: Image,
     depth: Singles,
     ids: Ints32,
 ) -> None:
-    """Shade a whole picture; a face's record is made when its first pixel comes up.
+    """Shade a picture; a face's record is prepared at its first pixel.
 
-    `made` (most,) holds zeros for the faces drawn; frame 0 is the house's own, frame 1 + k that
-    of instance k.
+    Parameters
+    ----------
+    structure, labels, library
+        Mesh of the house, instance ids of its faces (faces,), mesh of the assets.
+    frames
+        Transforms, (instances + 1, 15): row 0 of the house, row 1 + k of instance k.
+    axes, eye_height
+        Camera's right, down and forward as rows (3, 3); its height, metres.
+    focal, middle
+        Focal length and centre of the picture, pixels.
+    inverse, shadow, faces
+        Finished buffers (h, w): 1 / z, share of light taken away, number of the drawn face.
+    drawn
+        Face and frame of each drawn face, (most, 2) int32.
+    prepared, records
+        Whether a drawn face has its record, (most,) uint8, 0 at first; records (most, RECORD).
+    rgb, depth, ids
+        Picture to write: (h, w, 3) uint8, (h, w) float32 metres, (h, w) int32.
     """
     height, width = inverse.shape
     per_pixel = F(1.0 / focal)
     for row in range(height):
-        # World height along the ray: no picture is ever rolled.
+        # A point at depth z lies eye_height + z * rise above the floor: no picture is ever rolled.
         rise = F(axes[2, 2] + axes[1, 2] * (row + 0.5 - middle) / focal)
         begin = 0
         while begin < width:
@@ -167,24 +199,15 @@ def shade(
             else:
                 face, frame = drawn[number, 0], drawn[number, 1]
                 record = records[number]
-                if made[number] == 0:
-                    made[number] = 1
+                if prepared[number] == 0:
+                    prepared[number] = 1
                     mesh = structure if frame == 0 else library
                     prepare(mesh, face, frames[frame], axes, focal, middle, record)
                 label = np.int32(labels[face] if frame == 0 else frame)
                 for x in range(begin, end):
                     ids[row, x] = label
-                _run(
-                    record,
-                    row,
-                    begin,
-                    end,
-                    F(eye_height),
-                    rise,
-                    per_pixel,
-                    inverse,
-                    shadow,
-                    rgb,
-                    depth,
-                )
+                _shade_span(
+                    record, row, begin, end, F(eye_height), rise, per_pixel, inverse, shadow,
+                    rgb, depth,
+                )  # fmt: skip
             begin = end

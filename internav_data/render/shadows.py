@@ -1,7 +1,7 @@
-"""Soft shadows under what stands on the floor: without them things seem to float. Numba.
+"""Soft shadows under objects on the floor, which seem to float without them. Numba.
 
-A shadow is the rectangle around a thing, grown by a margin over which it fades. It darkens what
-lies within 3 cm of the floor, rugs included, and touches neither depth nor ids.
+A shadow is the rectangle around an object, grown by a margin over which it fades. It darkens the
+floor and all within 3 cm above it, rugs included, and changes neither depth nor ids.
 """
 
 from __future__ import annotations
@@ -18,19 +18,26 @@ if TYPE_CHECKING:
     from internav_data.core.typing import Floats, Ints32, Singles
 
 MARGIN_M = 0.12
-"""No further than a wall is thick: shadows stay in their room."""
+"""Distance (m) over which a shadow fades: no more than a wall is thick, so that it stays in its
+room."""
 _STRENGTH = np.float32(0.34)
+"""Share of the light that a shadow takes away at its middle."""
 _FLOOR_M = np.float32(0.03)
+"""Height (m) below which points are darkened."""
 _TALL_M = 0.05
-"""What is lower (rugs) or stands higher above the floor has no shadow."""
+"""Least height (m) of an object with a shadow (rugs are lower), and its greatest distance from the
+floor."""
 _UPRIGHT = 0.98
-"""Cosine of the tilt: what has toppled has no shadow either."""
+"""Cosine of the greatest tilt: toppled objects have no shadow."""
 _CORNERS = 4
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def casts_shadow(pose: Floats, bounds: Floats) -> bool:
-    """Whether a thing, `bounds` x_min, y_min, x_max, y_max, z_max, stands upright on the floor."""
+    """Return whether an object stands upright on the floor and is tall enough for a shadow.
+
+    `pose` (12,) as in `Props.poses`, `bounds` (5,) as in `Mesh.bounds`.
+    """
     return bounds[4] > _TALL_M and pose[8] > _UPRIGHT and abs(pose[11]) < _TALL_M
 
 
@@ -38,7 +45,10 @@ def casts_shadow(pose: Floats, bounds: Floats) -> bool:
 def _corners(
     frame: Floats, height: float, bounds: Floats, focal: float, middle: float, outline: Floats
 ) -> int:
-    """Bring the grown rectangle into the picture, cut at the near plane; return its corners."""
+    """Write the grown rectangle's corners, cut at the near plane; return their number.
+
+    `frame` (15,) as in `Scratch.frames`; `height` is the floor's in the object's own frame.
+    """
     count = 0
     x0, y0 = bounds[0] - MARGIN_M, bounds[1] - MARGIN_M
     x1, y1 = bounds[2] + MARGIN_M, bounds[3] + MARGIN_M
@@ -80,9 +90,22 @@ def cast_shadow(
     outline: Floats,
     spans: Ints32,
 ) -> None:
-    """Write into `shadow` (h, w) how much light a thing takes away; the darkest of all counts.
+    """Write the shadow of an object; where shadows overlap the darkest counts.
 
-    `frame`, `axes` as for `prepare`; `inverse` the finished buffer of 1 / z.
+    Parameters
+    ----------
+    frame, pose, bounds
+        Object: (15,) as in `Scratch.frames`, (12,) as in `Props.poses`, (5,) as in `Mesh.bounds`.
+    axes, eye_height
+        Camera's right, down and forward as rows (3, 3); its height, metres.
+    focal, middle
+        Focal length and centre of the picture, pixels.
+    inverse
+        Finished buffer of 1 / z, (h, w) float32.
+    shadow
+        Share of light taken away, (h, w) float32; changed.
+    outline, spans
+        Work space: (2, 5 or more) float64, (2, h) int32.
     """
     count = _corners(frame, -pose[11], bounds, focal, middle, outline)
     size = inverse.shape[0]
@@ -99,6 +122,7 @@ def cast_shadow(
         level = np.float32(0.5 - middle)
         x_row = np.float32(frame[6] + frame[3] * below) + along_x * level
         y_row = np.float32(frame[7] + frame[4] * below) + along_y * level
+        # Each pixel's point, brought back into the object's own plane: z from the depth buffer.
         for x in range(spans[0, row], spans[1, row]):
             z = one / inverse[row, x]
             if np.float32(eye_height) + z * rise > _FLOOR_M:

@@ -1,7 +1,7 @@
-"""How bright and which colour a surface is at (u, v): planks, tiles, panes… by formula, numba.
+"""Brightness and colour of a surface at (u, v): planks, tiles, panes… by formula. Numba.
 
-Everything is float32 and takes the width of a pixel on the surface, so that what is finer than a
-pixel fades out instead of flickering.
+`u` and `v` are metres on the surface, `pixel` the width of a pixel there: detail finer than a pixel
+fades out, where it would flicker. All numbers are float32.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from internav_data.render.materials import (
 )
 
 F: Any = np.float32
-"""Numbers are single on purpose: one double would make all that it meets double."""
+"""Constructor of constants: one double among them would make the results doubles too."""
 
 
 @njit(cache=True, nogil=True, inline="always", error_model="numpy")
 def noise(i: float, j: float) -> float:
-    """Hash two whole numbers to a number in [0, 1)."""
+    """Return a number in [0, 1) hashed from two whole numbers."""
     n = (np.int64(i) * 374761393 + np.int64(j) * 668265263) & 0x7FFFFFFF
     n = ((n ^ (n >> 13)) * 1274126177) & 0x7FFFFFFF
     return F(n & 0xFFFF) * F(1.0 / 65536.0)
@@ -38,19 +38,21 @@ def noise(i: float, j: float) -> float:
 
 @njit(cache=True, nogil=True, inline="always", error_model="numpy")
 def _fade(period: float, pixel: float) -> float:
-    """Return how much of a pattern is left: all at 2.5 pixels a period, nothing below one."""
+    """Return the share of a pattern that is left: 1 from 2.5 pixels a period, 0 below one."""
     return min(max((period / pixel - F(1.0)) * F(0.66), F(0.0)), F(1.0))
 
 
 @njit(cache=True, nogil=True, inline="always", error_model="numpy")
 def _line(into: float, width: float, pixel: float) -> float:
-    """Share of a pixel `into` metres past a line's start that the line covers."""
+    """Return the share of a pixel, `into` metres past a line's start, that the line covers."""
+    # A thin line is drawn up to four times wider and that much paler: its mean stays.
     thick = max(width, min(pixel, F(4.0) * width))
     return width / thick if into < thick else F(0.0)
 
 
 @njit(cache=True, nogil=True, inline="always", error_model="numpy")
 def _grain(u: float, v: float, pixel: float) -> float:
+    """Return the brightness of wood: year rings bent along u, and fine streaks close by."""
     along = u * F(1.3)
     wave = along - np.floor(along) - F(0.5)
     rings = v * F(16.0) + F(1.6) * wave * wave
@@ -64,6 +66,7 @@ def _grain(u: float, v: float, pixel: float) -> float:
 
 @njit(cache=True, nogil=True, inline="always", error_model="numpy")
 def _planks(u: float, v: float, pixel: float) -> float:
+    """Return the brightness of floor boards 1/7 m wide, shifted row by row, each of a tone."""
     row = np.floor(v * F(7.0))
     shift = noise(row, F(7.0))
     along = u * F(0.75) + shift * F(3.0)
@@ -77,6 +80,7 @@ def _planks(u: float, v: float, pixel: float) -> float:
 
 @njit(cache=True, nogil=True, inline="always", error_model="numpy")
 def _tiles(u: float, v: float, side: float, joint: float, pixel: float) -> float:
+    """Return the brightness of square tiles, each of a tone, with darker joints."""
     column, row = np.floor(u / side), np.floor(v / side)
     seam = max(_line(u - column * side, joint, pixel), _line(v - row * side, joint, pixel))
     tone = F(0.94) + F(0.10) * noise(column, row)
@@ -85,6 +89,7 @@ def _tiles(u: float, v: float, side: float, joint: float, pixel: float) -> float
 
 @njit(cache=True, nogil=True, inline="always", error_model="numpy")
 def _speckle(u: float, v: float, per_m: float, strength: float, pixel: float) -> float:
+    """Return the brightness of noise of two scales, the broad one six times coarser."""
     broad_m = per_m * F(0.17)
     broad = noise(np.floor(u * broad_m), np.floor(v * broad_m)) - F(0.5)
     tone = F(0.25) * broad * _fade(F(1.0) / broad_m, pixel)
@@ -98,7 +103,7 @@ def _speckle(u: float, v: float, per_m: float, strength: float, pixel: float) ->
 def tone_at(  # noqa: PLR0911 - one for each pattern
     pattern: int, u: float, v: float, a: float, b: float, pixel: float
 ) -> float:
-    """Return the brightness of a pattern of one colour; `a` and `b` as in `Look`."""
+    """Return the factor of brightness of a pattern of one colour; `a` and `b` as in `Look`."""
     if pattern == SPECKLE:
         return _speckle(u, v, a, b, pixel)
     if pattern == GRAIN:
@@ -118,7 +123,7 @@ def tone_at(  # noqa: PLR0911 - one for each pattern
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _leaf(u: float, v: float, width: float, height: float) -> float:
-    """Brightness of a door: a frame, two raised panels, a gap around."""
+    """Return the brightness of a door: a frame, two raised panels, a gap around."""
     across = abs(u / width - F(0.5))
     high = v / height
     tone = _grain(v, u, F(0.01))
@@ -132,6 +137,7 @@ def _leaf(u: float, v: float, width: float, height: float) -> float:
 def _bricks(
     u: float, v: float, red: float, green: float, blue: float, pixel: float
 ) -> tuple[float, float, float]:
+    """Return the colour of bricks of 24 x 8 cm, every other row shifted by half, in mortar."""
     row = np.floor(v * F(12.5))
     shifted = u + (F(0.12) if np.int64(row) & 1 else F(0.0))
     column = np.floor(shifted * F(1.0 / 0.24))
@@ -151,7 +157,7 @@ def _bricks(
 def _pane(
     u: float, v: float, red: float, green: float, blue: float, width: float, height: float
 ) -> tuple[float, float, float]:
-    """Sky over a hedge; a frame and a mullion."""
+    """Return the colour of a window: sky over a hedge, a frame and a mullion."""
     border = min(u, width - u, v, height - v)
     if border < F(0.05) or abs(u - width * F(0.5)) < F(0.022):
         return F(240.0), F(240.0), F(238.0)
@@ -178,7 +184,7 @@ def paint(
     b: float,
     pixel: float,
 ) -> tuple[float, float, float]:
-    """Return the colour of a pattern of several colours, 0 to 255."""
+    """Return red, green and blue (0 to 255) of a pattern of several colours."""
     if pattern == BRICKS:
         return _bricks(u, v, red, green, blue, pixel)
     if pattern == PANE:

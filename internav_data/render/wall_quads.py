@@ -1,4 +1,4 @@
-"""A house's surfaces as rectangles: floors, ceilings, walls by room, casings, panes and leaves."""
+"""Surfaces of a house as rectangles: floors, ceilings, walls by room, casings, panes and leaves."""
 
 from __future__ import annotations
 
@@ -22,59 +22,75 @@ if TYPE_CHECKING:
     from internav_data.records import Door, House, Room, Vec3, Wall, Window
 
 NOTHING: Final = 0
+"""Instance id of pixels that show nothing."""
 FLOOR: Final = -1
+"""Instance id of floors."""
 CEILING: Final = -2
+"""Instance id of ceilings."""
 WALL: Final = -3
-"""Walls, lintels and breasts, with the casings painted on them."""
+"""Instance id of walls, lintels and breasts, with the casings painted on them."""
 DOOR: Final = -4
-"""The leaf of a closed door."""
+"""Instance id of the leaf of a closed door."""
 WINDOW: Final = -5
+"""Instance id of windows."""
 
 _CEILING = Look((238, 238, 234), PLAIN)
 _CASING = Look((236, 233, 226), PLAIN)
 _PANE_COLOUR = (176, 208, 236)
 _LEAF_COLOUR = (126, 84, 56)
 _CASING_M = 0.07
+"""Width of the casing around doors and windows."""
 _BESIDE_M = 0.01
-"""How far in front of a surface the room that sees it is looked for."""
+"""Distance in front of a surface at which the room that sees it is looked up."""
 
 
 class _Hole(NamedTuple):
-    """A door's or a window's box in its wall, metres."""
+    """Box that a door or a window cuts from its wall, metres."""
 
     low: Vec3
     high: Vec3
     leaf: bool
+    """Whether a closed door fills it."""
 
 
 class Sheet(NamedTuple):
-    """An axis-parallel rectangle: flat along `axis`, seen from the side of `sign`."""
+    """Axis-parallel rectangle."""
 
     axis: int
+    """Axis of the normal: 0, 1 or 2 for x, y or z."""
     sign: int
+    """Side from which it is seen: 1 from above on the axis, -1 from below."""
     at: float
+    """Position on the axis, metres."""
     low: tuple[float, float]
+    """Lower bounds along the two other axes (`PLANE_AXES`), metres."""
     high: tuple[float, float]
+    """Upper bounds along the two other axes, metres."""
 
 
 class Tile(NamedTuple):
-    """A rectangle of one look, seen from one room."""
+    """Rectangle of one look, seen from one room."""
 
     sheet: Sheet
+    """Place and size."""
     look: Look
+    """Colour and pattern."""
     room: int
+    """Id of the room."""
     label: int
     """Instance id."""
     origin: tuple[float, float] = (0.0, 0.0)
-    """Where u = v = 0."""
+    """Point of the plane at which u = v = 0, metres."""
 
 
 UP: Final = 2
+"""Axis z."""
 PLANE_AXES = ((1, 2), (0, 2), (0, 1))
-"""The two axes of a rectangle that is flat along x, y or z."""
+"""Axes along the sides of a rectangle whose normal is along x, y or z."""
 
 
 def _hole(item: Door | Window, bottom: float, *, leaf: bool) -> _Hole:
+    """Return the hole of a door or window whose lower edge is `bottom` metres above the floor."""
     half, thick = item.width_m / 2.0, 0.06
     dx, dy = (half, thick) if item.yaw_deg == 0.0 else (thick, half)
     low = (item.x - dx, item.y - dy, bottom)
@@ -87,7 +103,7 @@ def _holes(house: House) -> list[_Hole]:
 
 
 def _cuts(low: float, high: float, values: Iterable[float]) -> list[float]:
-    """Return the ends and all values between them, no two within 0.1 mm."""
+    """Return `low`, `high` and the values between them, ascending, no two within 0.1 mm."""
     out = [low]
     for value in sorted(values):
         if out[-1] + 1e-4 < value < high - 1e-4:
@@ -96,6 +112,7 @@ def _cuts(low: float, high: float, values: Iterable[float]) -> list[float]:
 
 
 def _sides(wall: Wall, ceiling: float) -> list[Sheet]:
+    """Return the sides of a wall's box, without those on the floor and at the ceiling."""
     low, high = (wall.x_min, wall.y_min, wall.z_min), (wall.x_max, wall.y_max, wall.z_max)
     out = []
     for axis, (a, b) in enumerate(PLANE_AXES):
@@ -107,7 +124,7 @@ def _sides(wall: Wall, ceiling: float) -> list[Sheet]:
 def _near(
     sheet: Sheet, low: Sequence[float], high: Sequence[float], reach: float = _BESIDE_M
 ) -> bool:
-    """Whether a box comes within reach of a rectangle."""
+    """Return whether a box comes within `reach` metres of a rectangle."""
     a, b = PLANE_AXES[sheet.axis]
     return (
         low[sheet.axis] - reach <= sheet.at <= high[sheet.axis] + reach
@@ -119,6 +136,7 @@ def _near(
 
 
 def _within(point: Sequence[float], low: Sequence[float], high: Sequence[float]) -> bool:
+    """Return whether a point lies inside a box, not on its surface."""
     return all(low[k] < point[k] < high[k] for k in range(3))
 
 
@@ -136,7 +154,11 @@ class _Builder:
         self.lines = [sorted({p[k] for r in house.rooms for p in r.polygon}) for k in (0, 1)]
 
     def wall(self, sheet: Sheet) -> list[Tile]:
-        """Cut one side of a wall into rectangles of one look, seen from one room."""
+        """Cut one side of a wall into rectangles of one look, each seen from one room.
+
+        The lines of walls, holes, casings and room borders cut the side into cells; cells that look
+        alike are joined again, first up each column, then across columns.
+        """
         boxes = [box for box in self.boxes if _near(sheet, *box)]
         holes = [h for h in self.holes if _near(sheet, h.low, h.high, _CASING_M + _BESIDE_M)]
         grid = []
@@ -161,6 +183,7 @@ class _Builder:
         boxes: list[tuple[Vec3, Vec3]],
         holes: list[_Hole],
     ) -> Tile | None:
+        """Return the tile of one cell; None where a wall covers it or no room sees it."""
         point = [0.0, 0.0, 0.0]
         a, b = PLANE_AXES[sheet.axis]
         point[a], point[b] = (u[0] + u[1]) / 2.0, (v[0] + v[1]) / 2.0
@@ -172,6 +195,7 @@ class _Builder:
             return None
         piece = sheet._replace(low=(u[0], v[0]), high=(u[1], v[1]))
         for hole in holes:
+            # Grown by the casing in the plane, and across it so as to hold the point beside.
             margin = (_CASING_M, _BESIDE_M + 1e-3)
             grown = [margin[k == sheet.axis] for k in range(3)]
             low = [hole.low[k] - grown[k] for k in range(3)]
@@ -187,7 +211,7 @@ class _Builder:
 
 
 def _merge(first: Tile | None, second: Tile | None, along: int) -> Tile | None:
-    """Join two neighbours along an axis of their plane, None where they differ."""
+    """Return two neighbours joined along one axis of their plane, None where they differ."""
     if first is None or second is None or first[1:] != second[1:]:
         return None
     a, b = first.sheet, second.sheet
@@ -199,6 +223,7 @@ def _merge(first: Tile | None, second: Tile | None, along: int) -> Tile | None:
 
 
 def _joined(tiles: list[Tile | None], along: int) -> list[Tile | None]:
+    """Return a row of cells with equal neighbours joined."""
     out: list[Tile | None] = []
     for tile in tiles:
         merged = _merge(out[-1], tile, along) if out else None
@@ -210,7 +235,9 @@ def _joined(tiles: list[Tile | None], along: int) -> list[Tile | None]:
 
 
 def _joined_columns(columns: list[list[Tile | None]]) -> list[Tile | None]:
+    """Return the tiles of all columns, joined with an equal one of the column before."""
     out: list[Tile | None] = []
+    # Tiles of the last column, which the next one may still extend.
     open_tiles: list[Tile | None] = []
     for column in columns:
         grown: list[Tile | None] = []
@@ -227,7 +254,7 @@ def _joined_columns(columns: list[list[Tile | None]]) -> list[Tile | None]:
 
 
 def room_boxes(house: House, room: Room) -> list[tuple[float, float, float, float]]:
-    """Cut a room's polygon into boxes, (x_min, y_min, x_max, y_max), metres."""
+    """Return boxes that tile a room's polygon: (x_min, y_min, x_max, y_max), metres."""
     xs, ys = (sorted({p[k] for p in room.polygon}) for k in (0, 1))
     out = []
     for y0, y1 in pairwise(ys):
@@ -246,7 +273,7 @@ def room_boxes(house: House, room: Room) -> list[tuple[float, float, float, floa
 
 
 def _pane(house: House, window: Window) -> Tile:
-    """Return a window's pane, on the wall's centre line, seen from its room."""
+    """Return the pane of a window, on the wall's centre line, seen from its room."""
     axis = 1 if window.yaw_deg == 0.0 else 0
     middle, at = (window.x, window.y) if axis == 1 else (window.y, window.x)
     probe = [window.x, window.y]
@@ -259,7 +286,7 @@ def _pane(house: House, window: Window) -> Tile:
 
 
 def house_tiles(house: House) -> list[Tile]:
-    """Return all rectangles that can be seen from inside a house."""
+    """Return the rectangles that can be seen from inside a house."""
     surfaces = {m.name: m for m in house.materials}
     tiles: list[Tile] = []
     for room in house.rooms:
