@@ -331,6 +331,7 @@ ARRAYS = 'def area(corners: {}) -> float:\n    """Return the area of {}."""\n'
 @pytest.mark.parametrize("annotation", ["NDArray[np.float64]", "np.ndarray", "torch.Tensor | None"])
 def test_arrays_without_a_shape_are_found_in_strict_rooms_only(annotation, monkeypatch):
     source = ARRAYS.format(annotation, "corners")
+    monkeypatch.setattr(language, "STRICT_SHAPES", frozenset())
     assert found(source) == ([], [])
     monkeypatch.setattr(language, "STRICT_SHAPES", frozenset({"geometry"}))
     assert found(source)[0] == [("shapes", 1)]
