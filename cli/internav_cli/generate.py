@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -17,7 +17,10 @@ from internav_cli.options import (
     progress,
 )
 
-NAMED = 10
+if TYPE_CHECKING:
+    from internav_data.generation.report import Report
+
+MAX_NAMED_SCENES = 10
 """Quarantined scenes that are named at the end."""
 
 
@@ -44,6 +47,13 @@ under way. Any number of workers gives the same bytes.""",
 @click.option("--scenes", type=int, default=12_000, show_default=True, callback=positive)
 @click.option("--episodes-per-scene", type=int, help="A tenth of it in test scenes.  [default: 50]")
 @click.option("--workers", type=int, callback=positive, help="Processes.  [default: one a core]")
+@click.option(
+    "--executor",
+    type=click.Choice(["local"]),
+    default="local",
+    show_default=True,
+    help="Where scenes are made: local is processes on this machine.",
+)
 @config_options
 @click.option(
     "--unseen-assets",
@@ -73,6 +83,7 @@ def command(
     scenes: int,
     episodes_per_scene: int | None,
     workers: int | None,
+    executor: str,
     unseen_assets: bool | None,
     keep_unsolvable: bool | None,
     push_model: str | None,
@@ -108,24 +119,26 @@ def command(
     if dry_run:
         from internav_data.generation.forecast import forecast
 
-        told = forecast(config, scenes, workers or 0, progress())
-        click.echo(told.to_json() if as_json else told.summary())
+        made = forecast(config, scenes, workers or 0, progress())
+        click.echo(made.to_json() if as_json else made.summary())
         return 0
     name_dataset(out)
-    return _generate(out, config, scenes, workers or 0, as_json=as_json)
-
-
-def _generate(out: Path | None, config: Any, scenes: int, workers: int, *, as_json: bool) -> int:  # noqa: ANN401
     from internav_data.dataset import dataset_folder
     from internav_data.generation import generate
+
+    folder = dataset_folder(out)
+    report = generate(folder, config, scenes, workers or 0, progress(), executor=executor)
+    return _print_report(report, as_json=as_json)
+
+
+def _print_report(report: Report, *, as_json: bool) -> int:
     from internav_data.generation.report import summary
 
-    report = generate(dataset_folder(out), config, scenes, workers, progress())
     click.echo(summary(report), err=True)
-    for scene_id, reason in report.quarantined[:NAMED]:
+    for scene_id, reason in report.quarantined[:MAX_NAMED_SCENES]:
         click.echo(f"quarantined {scene_id}: {reason}", err=True)
-    if len(report.quarantined) > NAMED:
-        rest = len(report.quarantined) - NAMED
+    if len(report.quarantined) > MAX_NAMED_SCENES:
+        rest = len(report.quarantined) - MAX_NAMED_SCENES
         click.echo(f"and {rest} more quarantined: manifest.json names them", err=True)
     if as_json:
         click.echo(json.dumps(report.plain()))

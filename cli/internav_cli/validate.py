@@ -57,7 +57,7 @@ def command(
     as_json: bool,
 ) -> int:
     """Prove DATASET right by independent, slower ways, or say what in it is wrong."""
-    from internav_data.generation.run import cores
+    from internav_data.generation.executors import cores
     from internav_data.records.errors import ValidationError
     from internav_data.verification import validate
 

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 TEST_SHARE = 10
 """A test scene has one episode for every ten of other scenes, as in the paper (5 for 50)."""
-COMMAND_LINE_ONLY = ("scenes", "workers", "engine", "out")
-"""What belongs to a run and not to a dataset's config."""
+COMMAND_LINE_ONLY = ("scenes", "workers", "executor", "out")
+"""Options of a run that are no part of a dataset's config."""
 _TEST_ADVICE = "ask for 1 or more episodes, or 0 for a tenth of episodes_per_scene"
 
 

@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from internav_data.core.progress import clock
+from internav_data.generation.executors import DEFAULT_EXECUTOR, cores, get_executor
 from internav_data.generation.progress import GenerationProgress
-from internav_data.generation.run import check_counts, cores
+from internav_data.generation.run import check_scenes
 from internav_data.generation.scenes import asset_folders, build_scene
 from internav_data.records.errors import QuarantineError
 from internav_data.records.splits import split_of_scene
@@ -81,14 +82,14 @@ def forecast(
         Not one scene of the sample could be made.
 
     """
-    check_counts(scenes, workers)
+    check_scenes(scenes)
     config.check()
     (progress or GenerationProgress()).say(f"making up to {SAMPLE_SCENES} scenes to measure")
     sample = _sample(config, range(min(scenes, SAMPLE_SCENES)))
     made, tried = len(sample.houses), len(sample.houses) + sample.failed
     share = made / tried
     episodes = sum(config.episodes_of(split_of_scene(scene)) for scene in range(scenes))
-    workers = workers or cores()
+    workers = get_executor(DEFAULT_EXECUTOR, workers).slots
     at_once = min(workers, cores(), scenes)
     alone = scenes * sample.house_s / made + episodes * sample.episode_s / len(sample.episodes)
     size = _bytes(sample, scenes, episodes)

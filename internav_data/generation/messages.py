@@ -1,9 +1,9 @@
-"""What workers tell the process that started them. Plain data: it travels pickled."""
+"""Messages between a run and its workers. Plain data: they travel pickled."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from internav_data.records.errors import (
     CorruptDataError,
@@ -13,6 +13,9 @@ from internav_data.records.errors import (
     ValidationError,
 )
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
 _KINDS = {
     kind.__name__: kind
     for kind in (InternavError, UsageError, ValidationError, QuarantineError, CorruptDataError)
@@ -20,36 +23,51 @@ _KINDS = {
 
 
 @dataclass(frozen=True, slots=True)
+class Recipe:
+    """Work of a worker: `setup(payload)` once, then the function that it returned for every task.
+
+    Payload, tasks and results travel pickled.
+    """
+
+    setup: Callable[[Any], Callable[[Any], Any]]
+    """A module-level function: workers import it by name."""
+    payload: Any
+    """Argument of `setup`."""
+
+
+@dataclass(frozen=True, slots=True)
 class Ready:
     """Setup is done: tasks may come."""
 
     seconds: float
-    """How long it took; shows whether kernels were compiled."""
+    """Duration of the setup; shows whether kernels were compiled."""
 
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """A task is finished."""
+    """Result of a task that succeeded."""
 
     task: Any
     value: Any
+    """Return value of the recipe's function."""
 
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """A task cannot be done; doing it again would fail in the same way."""
+    """Result of a task that would fail in the same way if it were done again."""
 
     task: Any
     reason: str
     attempts: int
-    """How often it was tried."""
+    """Number of tries."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fatal:
-    """Nothing can be done any more: setup failed, or the disk is full or read-only."""
+    """Error that ends the run: setup failed, or the disk is full or read-only."""
 
     kind: str
+    """Class name of the error."""
     reason: str
 
     def error(self) -> InternavError:
@@ -59,9 +77,10 @@ class Fatal:
 
 @dataclass(frozen=True, slots=True)
 class WorkerExited:
-    """The process is gone."""
+    """A worker process has ended."""
 
     cause: str
+    """Signal or exit code, and the last line on stderr."""
 
 
 Message = Ready | Done | Failed | Fatal | WorkerExited

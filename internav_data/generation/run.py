@@ -1,15 +1,14 @@
-"""Many scenes: seeds to a finished dataset, whatever happens on the way.
+"""Runs: from a config to a finished dataset, through kills and resumes.
 
-Every scene is a pure function of the config and its index. Workers store each one whole; scenes
-are put together in order of their index once all are there. So neither the number of workers nor
-the order in which they end, nor any kill and resume, changes a byte.
+Every scene is a pure function of the config and its index. Workers stage each finished scene as one
+file; scenes are put together in order of their index once all are there. So neither the executor,
+the number of workers and the order in which they end, nor any kill and resume, changes a byte.
 """
 
 from __future__ import annotations
 
 import contextlib
 import math
-import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -28,7 +27,8 @@ from internav_data.dataset import (
     staged_scenes,
 )
 from internav_data.generation.config import GenerationConfig
-from internav_data.generation.messages import Done
+from internav_data.generation.executors import DEFAULT_EXECUTOR, Executor, get_executor
+from internav_data.generation.messages import Done, Failed, Recipe
 from internav_data.generation.progress import GenerationProgress
 from internav_data.generation.report import Report, report_of
 from internav_data.generation.scenes import (
@@ -36,7 +36,6 @@ from internav_data.generation.scenes import (
     asset_folders,
     scene_maker,
 )
-from internav_data.generation.worker_pool import Recipe, WorkerPool
 from internav_data.houses.quota import room_count
 from internav_data.records import Pose
 from internav_data.records.errors import InternavError, QuarantineError, UsageError
@@ -57,12 +56,12 @@ BUSY = f"another {GENERATOR} is writing this dataset; wait for it to end or choo
 """Reason for which a second run in the same folder is refused."""
 MAX_SCENES = 1_000_000
 """Scene ids have six digits."""
-HOPELESS = 20
-"""When this many scenes fail before one succeeds, the config is at fault."""
-NAMED = 5
-"""So many meshes are named in one line."""
-TAIL = 8
-"""Scenes a worker that are handed out largest first at the end, so that all end together."""
+MAX_FIRST_FAILURES = 20
+"""Scenes that fail before one succeeds, after which the config is at fault."""
+MAX_NAMED_MESHES = 5
+"""Meshes that one error message names."""
+TAIL_SCENES = 8
+"""Last scenes, a slot of the executor, that begin largest first, so that all slots end together."""
 
 
 def generate(
@@ -72,6 +71,7 @@ def generate(
     workers: int = 0,
     progress: GenerationProgress | None = None,
     assets: Catalogue | None = None,
+    executor: str | Executor = DEFAULT_EXECUTOR,
     setup: Callable[[ScenePayload], Callable[[int], int]] = scene_maker,
 ) -> Report:
     """Make a dataset of scenes 0 to scenes - 1, continue an unfinished one, or extend one.
@@ -81,22 +81,24 @@ def generate(
     out
         The dataset's folder: new, empty, or one that holds a dataset of this config.
     config
-        What decides every scene.
+        Settings of every scene.
     scenes
-        How many scenes the dataset is to hold.
+        Number of scenes that the dataset is to hold.
     workers
-        Processes; 0 for one a core.
+        Number of scenes made at the same time; 0 for the executor's default, one a core.
     progress
-        Told about every scene; silent by default.
+        Reporter of every scene; silent by default.
     assets
         The catalogue of the config's asset folders, if it is loaded already.
+    executor
+        Name in `EXECUTORS`, or an executor, which then has its own number of workers.
     setup
-        What workers do; tests put stubs here.
+        Recipe of the workers; tests pass stubs.
 
     Raises
     ------
     UsageError
-        A config that cannot be meant, or a folder that holds something else.
+        A count or setting out of its bounds, or a folder that holds something else.
     LockedError
         Another generator is at work in the folder.
     InterruptedRunError
@@ -108,7 +110,8 @@ def generate(
 
     """
     progress = progress or GenerationProgress()
-    check_counts(scenes, workers)
+    check_scenes(scenes)
+    chosen = get_executor(executor, workers) if isinstance(executor, str) else executor
     config.check()
     assets = assets or _catalogue(config)
     identity = identity_for(config, assets)
@@ -120,10 +123,10 @@ def generate(
             _forget_idle_staging(store)
             open_staging(store, identity, GenerationConfig().identity(assets.digest))
             done = _done_before(store, scenes)
-            plan = _Plan(config, scenes, tuple(k for k in range(scenes) if k not in done))
+            queue = _SceneQueue(config, scenes, tuple(k for k in range(scenes) if k not in done))
             recipe = Recipe(setup, ScenePayload(config, assets, store))
-            with Interrupts() as stop, WorkerPool(workers or cores(), recipe, stop) as crew:
-                _make(crew, plan, progress, store)
+            with Interrupts() as stop:
+                _make(chosen, recipe, queue, progress, stop)
                 if stop():
                     raise InterruptedRunError(_interruption(out, progress), stop.signum)
             manifest = _assembled(store, identity, assets, scenes, progress)
@@ -141,7 +144,14 @@ def _catalogue(config: GenerationConfig) -> Catalogue:
 
 
 def check_standing(assets: Iterable[Asset]) -> None:
-    """Raise UsageError for meshes that do not stay where they are put: none would be spawned."""
+    """Refuse meshes that do not stay where they are put: none of them would be spawned.
+
+    Raises
+    ------
+    UsageError
+        Some meshes tip over or roll away; it names them.
+
+    """
     from internav_data.physics import Body, settle  # noqa: PLC0415 - pybullet, for users with meshes
     from internav_data.physics.scene import UPRIGHT  # noqa: PLC0415 - as above
 
@@ -152,28 +162,30 @@ def check_standing(assets: Iterable[Asset]) -> None:
     )
     fallen = [f"{asset_id} {refusal}" for asset_id, refusal in rests if refusal]
     if fallen:
+        named = ", ".join(fallen[:MAX_NAMED_MESHES])
+        more = ", …" if len(fallen) > MAX_NAMED_MESHES else ""
         raise UsageError(
             f"assets: {len(fallen)} of your meshes do not stay where they are put "
-            f"({', '.join(fallen[:NAMED])}{', …' if len(fallen) > NAMED else ''}); write "
+            f"({named}{more}); write "
             "lay_flat = true or ignore = true for them in assets.toml, or turn them yourself"
         )
 
 
-def check_counts(scenes: int, workers: int) -> None:
-    """Raise UsageError for counts that cannot be meant."""
+def check_scenes(scenes: int) -> None:
+    """Check the number of scenes of a dataset.
+
+    Raises
+    ------
+    UsageError
+        It is not 1 to `MAX_SCENES`.
+
+    """
     if not 1 <= scenes <= MAX_SCENES:
         raise UsageError(f"scenes is {scenes}: ask for 1 to {MAX_SCENES:,} scenes")
-    if workers < 0:
-        raise UsageError(f"workers is {workers}: ask for 1 or more, or 0 for one a core")
-
-
-def cores() -> int:
-    """Return how many processors this process may use."""
-    return len(os.sched_getaffinity(0))
 
 
 def identity_for(config: GenerationConfig, assets: Catalogue) -> Identity:
-    """Return what makes another run the same dataset."""
+    """Return the identity of a dataset: runs with equal ones make the same scenes."""
     return Identity(
         generator=GENERATOR,
         generator_version=__version__,
@@ -197,44 +209,59 @@ def _done_before(store: Store, scenes: int) -> frozenset[int]:
 
 
 @dataclass(frozen=True, slots=True)
-class _Plan:
-    """What a run has to do."""
+class _SceneQueue:
+    """Scenes that a run has to make."""
 
     config: GenerationConfig
     scenes: int
+    """Number of scenes of the dataset, those made before included."""
     todo: tuple[int, ...]
+    """Scenes to make, ascending."""
 
     def expected(self, scene: int) -> int:
-        """Return how many episodes a scene should have."""
+        """Return the number of episodes that a scene should have."""
         return self.config.episodes_of(split_of_scene(scene))
 
-    def ordered(self, workers: int) -> list[int]:
+    def ordered(self, slots: int) -> list[int]:
         """Return the scenes to make; the last ones largest first, so that all workers end together.
 
-        Whatever the order, the dataset is the same.
+        The dataset does not depend on the order.
         """
-        cut = max(0, len(self.todo) - TAIL * workers)
+        cut = max(0, len(self.todo) - TAIL_SCENES * slots)
         seed = self.config.seed
         tail = sorted(self.todo[cut:], key=lambda scene: -room_count(seed, scene))
         return [*self.todo[:cut], *tail]
 
 
-def _make(crew: WorkerPool, plan: _Plan, progress: GenerationProgress, store: Store) -> None:
+def _make(
+    executor: Executor,
+    recipe: Recipe,
+    queue: _SceneQueue,
+    progress: GenerationProgress,
+    stop: Interrupts,
+) -> None:
     """Have the scenes made; those that cannot be are stored as quarantined."""
-    before = plan.scenes - len(plan.todo)
-    progress.begin(plan.scenes, before, sum(plan.expected(scene) for scene in plan.todo))
-    for result in crew.run(plan.ordered(crew.size), progress.tick):
-        scene, episodes = result.task, 0
-        if isinstance(result, Done):
-            episodes = result.value
-        else:
-            progress.say(f"scene-{scene:06d} is quarantined: {result.reason}")
-            split = split_of_scene(scene)
-            attempts = result.attempts
-            stage_quarantine(store, scene, result.reason, split=split, attempts=attempts)
-        progress.scene(episodes, expected=plan.expected(scene))
-        if not before and progress.quarantined == progress.scenes >= HOPELESS:
-            raise _hopeless(store, progress.scenes, result.reason)
+    store: Store = recipe.payload.store
+    before = queue.scenes - len(queue.todo)
+    progress.begin(queue.scenes, before, sum(queue.expected(scene) for scene in queue.todo))
+
+    def tick() -> bool:
+        progress.tick()
+        return not stop()
+
+    results = executor.run(recipe, queue.ordered(executor.slots), tick)
+    with contextlib.closing(results):  # after an error workers end at once, with the iterator
+        for result in results:
+            scene = result.task
+            episodes = result.value if isinstance(result, Done) else 0
+            if isinstance(result, Failed):
+                progress.say(f"scene-{scene:06d} is quarantined: {result.reason}")
+                split, attempts = split_of_scene(scene), result.attempts
+                stage_quarantine(store, scene, result.reason, split=split, attempts=attempts)
+            progress.scene(episodes, expected=queue.expected(scene))
+            none_made = not before and progress.quarantined == progress.scenes
+            if isinstance(result, Failed) and none_made and progress.scenes >= MAX_FIRST_FAILURES:
+                raise _hopeless(store, progress.scenes, result.reason)
     progress.end()
 
 
@@ -259,7 +286,7 @@ def _assembled(
 
 
 def _forget_idle_staging(store: Store) -> None:
-    """Remove what is staged by a run that ended before its first scene did.
+    """Remove the staging of a run that ended before its first scene did.
 
     It would bind the folder to that run's config, which the user may just be mending.
     """
@@ -268,7 +295,7 @@ def _forget_idle_staging(store: Store) -> None:
 
 
 def _hopeless(store: Store, count: int, reason: str) -> QuarantineError:
-    """Return the error for a config that no scene can be made by; what it staged is forgotten."""
+    """Return the error for a config by which no scene can be made; remove what it staged."""
     if not has_manifest(store):
         store.remove(STAGING)
     return QuarantineError(f"none of {count} scenes could be made: {reason}; nothing was written")
@@ -284,7 +311,7 @@ def _interruption(out: Path, progress: GenerationProgress) -> str:
 
 @contextlib.contextmanager
 def _disk_errors(out: Path) -> Iterator[None]:
-    """Turn what a disk refuses into an error that says what to do."""
+    """Turn errors of the disk into one that says what to do."""
     try:
         yield
     except OSError as error:

@@ -1,4 +1,4 @@
-"""What runs inside a worker process: set up once, then one task after the other."""
+"""Main loop of a worker process: set up once, then one task after the other."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ from internav_data.records.errors import InternavError, QuarantineError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from internav_data.generation.messages import Recipe
+
 
 def main(fd: int) -> None:
     """Serve the socket `fd` until its other end closes."""
@@ -37,22 +39,26 @@ def main(fd: int) -> None:
 
 
 def _serve(pipe: Connection[Any, Any]) -> None:
-    setup, payload = pipe.recv()
+    recipe: Recipe = pipe.recv()
     began = time.perf_counter()
     try:
-        work = setup(payload)
+        work = recipe.setup(recipe.payload)
     except InternavError as error:
         pipe.send(Fatal(type(error).__name__, str(error)))
         return
-    except Exception as error:  # noqa: BLE001 - whatever it is, the other side has to hear of it
-        pipe.send(Fatal("InternavError", f"a worker could not be set up: {_told(error)}"))
+    except Exception as error:  # noqa: BLE001 - any error must reach the parent
+        pipe.send(Fatal("InternavError", f"a worker could not be set up: {_described(error)}"))
         return
     pipe.send(Ready(time.perf_counter() - began))
     while True:
-        pipe.send(_answer(work, pipe.recv()))
+        pipe.send(run_task(work, pipe.recv()))
 
 
-def _answer(work: Callable[[Any], Any], task: Any) -> Done | Failed | Fatal:  # noqa: ANN401
+def run_task(work: Callable[[Any], Any], task: Any) -> Done | Failed | Fatal:  # noqa: ANN401
+    """Do a task and return its result; of errors, their messages.
+
+    A process that runs out of memory exits: its executor may try the task in a new one.
+    """
     try:
         return Done(task, work(task))
     except QuarantineError as error:
@@ -68,12 +74,12 @@ def _answer(work: Callable[[Any], Any], task: Any) -> Done | Failed | Fatal:  # 
         )
     except MemoryError:
         os._exit(1)  # a new process may have more luck: the parent tries again
-    except Exception as error:  # noqa: BLE001 - whatever it is, the other side has to hear of it
-        return Failed(task, _told(error), 1)
+    except Exception as error:  # noqa: BLE001 - any error must reach the parent
+        return Failed(task, _described(error), 1)
 
 
-def _told(error: Exception) -> str:
-    """Return what happened and where, without the paths of this machine: it may be stored."""
+def _described(error: Exception) -> str:
+    """Return an error's class, message, file and line; no folders, as it may be stored in data."""
     frames = traceback.extract_tb(error.__traceback__)
     where = f" ({Path(frames[-1].filename).name}:{frames[-1].lineno})" if frames else ""
     return f"{type(error).__name__}: {error}{where}"

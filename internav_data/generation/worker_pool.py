@@ -1,8 +1,8 @@
-"""Worker processes of our own, each on a pipe: one that dies costs one retry of its task.
+"""Worker processes, each on a pipe: one that dies costs one retry of its task.
 
 A `ProcessPoolExecutor` fails all pending work when one of its processes dies, and multiprocessing's
-spawn runs the caller's `__main__` again. Workers here are plain interpreters that are told over a
-socket what to import; they see the socket close when this process dies, and end.
+spawn runs the caller's `__main__` again. Workers here are plain interpreters that receive the
+function to import over a socket; they see the socket close when this process dies, and end.
 """
 
 from __future__ import annotations
@@ -15,10 +15,9 @@ import sys
 import tempfile
 import time
 from collections import Counter, deque
-from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from internav_data.generation.messages import Done, Failed, Fatal, Ready, WorkerExited
 from internav_data.records.errors import InternavError
@@ -27,16 +26,16 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
     from types import TracebackType
 
-    from internav_data.generation.messages import Message
+    from internav_data.generation.messages import Message, Recipe
 
-MAX_DEATHS = 3
-"""A task whose worker died this often is given up."""
-MAX_STARTS = 3
-"""Workers that die this often in a row before they are ready cannot start at all."""
+MAX_CRASHES = 3
+"""Crashes of its workers after which a task is given up."""
+MAX_FALSE_STARTS = 3
+"""Workers that die in a row before they are ready, after which none can start."""
 GRACE_S = 5.0
-"""After an interruption workers get this long to finish what they do (process control, no data)."""
+"""Seconds that workers have to finish their tasks after an interruption."""
 TICK_S = 0.25
-"""The longest a signal waits to be seen."""
+"""Longest time between two calls of `tick`, seconds."""
 SINGLE_THREADED = dict.fromkeys(
     (
         "OMP_NUM_THREADS",
@@ -48,31 +47,11 @@ SINGLE_THREADED = dict.fromkeys(
     ),
     "1",
 )
-"""One thread a process: the cores are shared by processes, and idle pools cost memory."""
+"""Environment of a worker: one thread a process, as processes share the cores already."""
 
 
 class CannotStartError(InternavError):
-    """Worker processes end before they can do anything."""
-
-
-class StopFlag(Protocol):
-    """Tells whether the run is to end; see `interrupts.Interrupts`."""
-
-    def __call__(self) -> bool:
-        """Return True once nothing new is to be begun."""
-        ...
-
-
-@dataclass(frozen=True, slots=True)
-class Recipe:
-    """What a worker is: `setup(payload)` once, then what it returned for every task.
-
-    `setup` is a module-level function (workers import it by name); payload, tasks and results
-    travel pickled.
-    """
-
-    setup: Callable[[Any], Callable[[Any], Any]]
-    payload: Any
+    """Worker processes end before they are ready."""
 
 
 class _Worker:
@@ -97,12 +76,12 @@ class _Worker:
         self.ready = False
         self.task: Any = None
         self.busy = False
-        self.send((recipe.setup, recipe.payload))
+        self.send(recipe)
 
-    def send(self, thing: object) -> None:
-        """Send; a worker that has just died is noticed when its pipe is read."""
+    def send(self, message: object) -> None:
+        """Send a recipe or a task; a worker that has just died is noticed when its pipe is read."""
         try:
-            self.pipe.send(thing)
+            self.pipe.send(message)
         except (BrokenPipeError, ConnectionResetError):
             return
 
@@ -115,18 +94,18 @@ class _Worker:
         try:
             message: Message = self.pipe.recv()
         except (EOFError, ConnectionResetError):
-            return WorkerExited(self._obituary())
+            return WorkerExited(self._exit_cause())
         return message
 
-    def _obituary(self) -> str:
+    def _exit_cause(self) -> str:
         try:
             code = self.process.wait(timeout=GRACE_S)
         except subprocess.TimeoutExpired:
             self.process.kill()
             code = self.process.wait()
-        return _cause(code, self.last_words())
+        return _cause(code, self.last_stderr_line())
 
-    def last_words(self) -> str:
+    def last_stderr_line(self) -> str:
         """Return the last line that the process wrote to stderr."""
         self._stderr.seek(0)
         lines = self._stderr.read().decode(errors="replace").strip().splitlines()
@@ -142,21 +121,28 @@ def _environment() -> dict[str, str]:
     return os.environ | SINGLE_THREADED | {"PYTHONPATH": path}
 
 
-def _cause(code: int, words: str) -> str:
+def _cause(code: int, stderr_line: str) -> str:
     if code < 0:
         name = signal.Signals(-code).name
         hint = "; the system may be short of memory" if name == "SIGKILL" else ""
         return f"its worker was killed by {name}{hint}"
-    return f"its worker ended with code {code}" + (f": {words}" if words else "")
+    return f"its worker ended with code {code}" + (f": {stderr_line}" if stderr_line else "")
 
 
 class WorkerPool:
-    """Some workers that do tasks in any order; use it as a context manager."""
+    """Processes that do tasks in any order; use it as a context manager.
 
-    def __init__(self, size: int, recipe: Recipe, stop: StopFlag = lambda: False) -> None:
+    Parameters
+    ----------
+    size
+        Maximum number of processes; none starts before there is a task for it.
+    recipe
+        Work of the processes.
+    """
+
+    def __init__(self, size: int, recipe: Recipe) -> None:
         self.size = size
         self._recipe = recipe
-        self._stop = stop
         self._workers: list[_Worker] = []
         self._false_starts = 0
 
@@ -187,29 +173,30 @@ class WorkerPool:
         """Process ids of the workers alive."""
         return tuple(worker.process.pid for worker in self._workers)
 
-    def run(self, tasks: Iterable[Any], tick: Callable[[], None] = lambda: None) -> Iterator[Any]:
-        """Yield a `Done` or `Failed` for each task, in the order in which they end.
+    def run(
+        self, tasks: Iterable[Any], tick: Callable[[], bool] = lambda: True
+    ) -> Iterator[Done | Failed]:
+        """Yield the result of each task, in the order in which they end.
 
-        `tick` is called a few times a second. Once the stop flag is up nothing new begins, what is
-        under way is given some seconds to end, and the iterator ends early.
+        `tick` is called a few times a second. Once it returns False no further task begins, those
+        under way have `GRACE_S` to end, and the iterator ends early.
 
         Raises
         ------
         InternavError
-            What a worker's setup or a full disk said; `CannotStartError` when workers die before
-            they are ready.
+            A worker's setup failed, or the disk is full; `CannotStartError` when workers die
+            before they are ready.
 
         """
-        todo, deaths = deque(tasks), Counter[Any]()
-        while not self._stop():
-            self._staff(todo)
+        todo, crashes = deque(tasks), Counter[Any]()
+        while tick():
+            self._assign(todo)
             if not any(worker.busy for worker in self._workers) and not todo:
                 return
-            yield from self._listen(todo, deaths)
-            tick()
-        yield from self._wind_down()
+            yield from self._collect(todo, crashes)
+        yield from self._drain()
 
-    def _staff(self, todo: deque[Any]) -> None:
+    def _assign(self, todo: deque[Any]) -> None:
         """Give each idle worker a task, and start workers while there are tasks for them."""
         for worker in self._workers:
             if worker.ready and not worker.busy and todo:
@@ -218,7 +205,7 @@ class WorkerPool:
         for _ in range(min(self.size - len(self._workers), len(todo) - starting)):
             self._workers.append(_Worker(self._recipe))
 
-    def _listen(self, todo: deque[Any], deaths: Counter[Any]) -> Iterator[Any]:
+    def _collect(self, todo: deque[Any], crashes: Counter[Any]) -> Iterator[Done | Failed]:
         pipes = {worker.pipe: worker for worker in self._workers}
         for pipe in wait(list(pipes), timeout=TICK_S):
             worker = pipes[pipe]  # type: ignore[index] # only connections were given
@@ -228,34 +215,34 @@ class WorkerPool:
             elif isinstance(message, Fatal):
                 raise message.error()
             elif isinstance(message, WorkerExited):
-                yield from self._bury(worker, message, todo, deaths)
+                yield from self._handle_crash(worker, message, todo, crashes)
             else:
                 worker.busy = False
                 yield message
 
-    def _bury(
-        self, worker: _Worker, message: WorkerExited, todo: deque[Any], deaths: Counter[Any]
-    ) -> Iterator[Any]:
-        """Take a dead worker's task back, or give it up."""
+    def _handle_crash(
+        self, worker: _Worker, message: WorkerExited, todo: deque[Any], crashes: Counter[Any]
+    ) -> Iterator[Failed]:
+        """Hand a dead worker's task out again, or give it up."""
         self._workers.remove(worker)
         worker.close()
         if not worker.ready:
             self._false_starts += 1
-            if self._false_starts >= MAX_STARTS:
+            if self._false_starts >= MAX_FALSE_STARTS:
                 raise CannotStartError(
                     f"worker processes cannot start: {message.cause}; "
                     "run `internav-gen doctor` to see what is missing"
                 )
         elif worker.busy:
-            deaths[worker.task] += 1
-            if deaths[worker.task] < MAX_DEATHS:
+            crashes[worker.task] += 1
+            if crashes[worker.task] < MAX_CRASHES:
                 todo.appendleft(worker.task)
             else:
-                reason = f"{message.cause}, {MAX_DEATHS} times"
-                yield Failed(worker.task, reason, MAX_DEATHS)
+                reason = f"{message.cause}, {MAX_CRASHES} times"
+                yield Failed(worker.task, reason, MAX_CRASHES)
 
-    def _wind_down(self) -> Iterator[Any]:
-        """Wait for what is under way, so that it need not be done again."""
+    def _drain(self) -> Iterator[Done | Failed]:
+        """Wait for the tasks under way, so that they need not be done again."""
         deadline = time.monotonic() + GRACE_S
         while any(worker.busy for worker in self._workers) and time.monotonic() < deadline:
             busy = {worker.pipe: worker for worker in self._workers if worker.busy}

@@ -1,4 +1,4 @@
-"""What the workers of these tests do; imported by name in their processes."""
+"""Setups of workers in tests; imported by name in their processes."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ def square(payload):
 
 
 def troubled(folder):
-    """Tasks 3, 5, 7 and 11 each fail in a way of their own; the folder remembers deaths."""
+    """Tasks 3, 5, 7 and 11 each fail in a way of their own; the folder remembers crashes."""
 
     def work(task):
         with (Path(folder) / f"begun-{task}").open("a") as file:
             file.write(f"{os.getpid()}\n")
-        deaths = len((Path(folder) / f"begun-{task}").read_text().split())
-        if task == 3 and deaths == 1:
+        crashes = len((Path(folder) / f"begun-{task}").read_text().split())
+        if task == 3 and crashes == 1:
             os.kill(os.getpid(), signal.SIGKILL)
         if task == 5:
             os.kill(os.getpid(), signal.SIGSEGV)

@@ -1,0 +1,102 @@
+"""Executors: who runs the scenes changes no byte of the dataset."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+
+import pytest
+import worker_stubs
+from scene_stubs import CATALOGUE, stub
+
+from internav_data.generation.config import load_config
+from internav_data.generation.executors import (
+    EXECUTORS,
+    Executor,
+    LocalExecutor,
+    cores,
+    get_executor,
+)
+from internav_data.generation.messages import Done, Fatal, Recipe
+from internav_data.generation.run import generate
+from internav_data.generation.worker import run_task
+from internav_data.records.errors import InternavError, QuarantineError, UsageError
+
+CONFIG = load_config(overrides=["episodes_per_scene=3"])
+
+
+@dataclass
+class InProcess:
+    """Runs every task in this process, the last one first: what another executor needs at least."""
+
+    slots: int = 1
+    closed: bool = False
+
+    def run(self, recipe, tasks, tick):
+        work = recipe.setup(recipe.payload)
+        try:
+            for task in reversed(list(tasks)):
+                if not tick():
+                    return
+                result = run_task(work, task)
+                if isinstance(result, Fatal):
+                    raise result.error()
+                yield result
+        finally:
+            self.closed = True
+
+
+def made(out, executor, scenes=12, **orders):
+    out.parent.mkdir(parents=True, exist_ok=True)
+    (out.parent / "stub.json").write_text(json.dumps(orders))
+    report = generate(out, CONFIG, scenes, assets=CATALOGUE, executor=executor, setup=stub)
+    files = sorted(path for path in out.rglob("*") if path.is_file())
+    return report, {path.relative_to(out).as_posix(): path.read_bytes() for path in files}
+
+
+def test_another_executor_makes_the_same_bytes(tmp_path):
+    one, local = made(tmp_path / "a" / "d", "local", quarantine=[5])
+    two, here = made(tmp_path / "b" / "d", InProcess(), quarantine=[5])
+    assert here == local
+    assert one.quarantined == two.quarantined == (("scene-000005", "nothing can be blocked"),)
+
+
+def test_an_executor_is_closed_when_the_run_fails(tmp_path):
+    executor = InProcess()
+    with pytest.raises(QuarantineError, match="none of 20 scenes could be made"):
+        made(tmp_path / "d", executor, scenes=100, hopeless=True)
+    assert executor.closed
+
+
+def test_an_error_that_ends_the_run_is_the_callers(tmp_path):
+    with pytest.raises(InternavError, match="No space left on device"):
+        made(tmp_path / "d", InProcess(), full=3)
+
+
+def test_executors_are_chosen_by_name():
+    for name, executor in EXECUTORS.items():
+        made = get_executor(name, 3)
+        assert isinstance(made, Executor)
+        assert isinstance(made, executor)
+        assert made.slots == 3
+        assert get_executor(name).slots == cores()
+    with pytest.raises(UsageError, match=r"executor is 'cluster': expected one of local"):
+        get_executor("cluster")
+    with pytest.raises(UsageError, match=r"workers is -1: ask for 1 or more"):
+        get_executor("local", -1)
+
+
+def test_local_workers_end_once_tick_says_so():
+    seen = []
+    results = LocalExecutor(2).run(Recipe(worker_stubs.slow, 0.2), range(1000), lambda: not seen)
+    for result in results:
+        assert isinstance(result, Done)
+        seen.append(result.task)
+    assert 1 <= len(seen) <= 4
+
+
+def test_the_command_offers_every_executor():
+    from internav_cli.generate import command
+
+    (option,) = (option for option in command.params if option.name == "executor")
+    assert set(option.type.choices) == set(EXECUTORS)

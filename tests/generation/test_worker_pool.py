@@ -1,0 +1,91 @@
+import os
+import time
+
+import pytest
+import worker_stubs
+
+from internav_data.generation.messages import Done, Failed, Recipe
+from internav_data.generation.worker_pool import CannotStartError, WorkerPool
+from internav_data.records.errors import InternavError, UsageError
+
+
+def outcomes(recipe, tasks, size=2):
+    with WorkerPool(size, recipe) as pool:
+        return list(pool.run(tasks))
+
+
+def test_all_tasks_are_done_once():
+    results = outcomes(Recipe(worker_stubs.square, 1), range(20))
+    assert sorted((r.task, r.value) for r in results) == [(n, n * n + 1) for n in range(20)]
+
+
+def test_workers_are_kept_between_runs():
+    with WorkerPool(1, Recipe(worker_stubs.square, 0)) as pool:
+        first = [r.value for r in pool.run([2])]
+        pids = pool.processes
+        second = [r.value for r in pool.run([3, 4])]
+        assert pool.processes == pids, "workers are kept between runs"
+    assert (first, second) == ([4], [9, 16])
+
+
+def test_no_more_workers_than_tasks():
+    with WorkerPool(8, Recipe(worker_stubs.square, 0)) as pool:
+        list(pool.run([1]))
+        assert len(pool.processes) == 1
+
+
+def test_a_crash_costs_a_retry_and_the_third_gives_the_task_up(tmp_path):
+    results = outcomes(Recipe(worker_stubs.troubled, str(tmp_path)), range(12))
+    done = {r.task for r in results if isinstance(r, Done)}
+    failed = {r.task: r.reason for r in results if isinstance(r, Failed)}
+    assert done == {0, 1, 2, 3, 4, 6, 8, 9, 10}
+    assert set(failed) == {5, 7, 11}
+    assert "SIGSEGV, 3 times" in failed[5]
+    assert failed[7] == "no way can be blocked here"
+    assert failed[11].startswith("ValueError: a bug (worker_stubs.py:")
+    begun = {n: (tmp_path / f"begun-{n}").read_text().split() for n in range(12)}
+    assert len(begun[3]) == 2
+    assert len(set(begun[5])) == 3, "each try in a new process"
+    assert all(len(begun[n]) == 1 for n in range(12) if n not in {3, 5})
+
+
+def test_an_error_of_setup_is_raised_in_the_caller():
+    with pytest.raises(UsageError, match=r"duck\.obj is no mesh"):
+        outcomes(Recipe(worker_stubs.refusing, "duck.obj"), [1, 2, 3])
+
+
+def test_workers_that_cannot_start_end_the_run():
+    with pytest.raises(CannotStartError, match="ended with code 9"):
+        outcomes(Recipe(worker_stubs.stillborn, None), [1])
+
+
+def test_a_full_disk_ends_the_run():
+    with pytest.raises(InternavError, match=r"No space left on device \(/data/1\)") as caught:
+        outcomes(Recipe(worker_stubs.full_disk, None), [1])
+    assert caught.value.exit_code == 1
+
+
+def test_once_stopped_only_tasks_under_way_end():
+    ended = []
+    with WorkerPool(2, Recipe(worker_stubs.slow, 0.2)) as pool:
+        for result in pool.run(range(1000), tick=lambda: not ended):
+            ended.append(result.task)  # noqa: PERF401 - the flag reads it meanwhile
+    assert 2 <= len(ended) <= 4
+
+
+def test_workers_are_gone_afterwards():
+    with WorkerPool(2, Recipe(worker_stubs.square, 0)) as pool:
+        list(pool.run(range(4)))
+        pids = pool.processes
+    assert pids
+    for pid in pids:
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
+
+
+def test_an_error_in_the_caller_ends_workers_at_once():
+    began = time.monotonic()
+    with pytest.raises(RuntimeError), WorkerPool(1, Recipe(worker_stubs.slow, 60)) as pool:
+        for _ in pool.run([1], tick=lambda: (_ for _ in ()).throw(RuntimeError)):
+            pass
+    assert time.monotonic() - began < 10
