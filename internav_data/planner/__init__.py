@@ -1,1 +1,1 @@
-"""Navigation among movable obstacles (Stilman and Kuffner 2005): the expert."""
+"""Expert of navigation among movable obstacles (NAMO, Stilman and Kuffner 2005)."""

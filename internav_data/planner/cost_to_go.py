@@ -1,7 +1,8 @@
-"""Fields of cost over poses, for the expert: numba kernels.
+"""Cost-to-go fields over the agent's poses, for the expert; kernels compiled by numba.
 
-A pose is a number: 4 * (i * ny + j) + quarter. Every action costs one. Things that can be moved do
-not close an edge but add a price, once, when the way enters what they block.
+A pose is a number: 4 * (i * ny + j) + quarter, for lattice node (i, j) and quarter turn. Actions
+cost 1 each. A movable object does not close the edges that it blocks: it adds a price, once, where
+a path enters the blocked region.
 """
 
 # numba's njit is untyped, and so is what it returns.
@@ -22,15 +23,16 @@ if TYPE_CHECKING:
     from internav_data.core.typing import Costs, Floats, Ints, Masks
 
 FAR: Final = 1_000_000
-"""Cost of a pose that is cut off."""
+"""Cost of a pose from which the goal cannot be reached."""
 BUCKETS: Final = 128
-"""More than any single step can cost: prices are cut there."""
+"""Number of buckets, a bound of the cost of a single step: higher prices are clipped to it."""
 SLACK_M: Final = 1e-6
-"""Poses are only proposed here: the world says what it sees."""
+"""Tolerance of the visibility test, metres: poses are only proposed here, the world decides."""
 
 
 @njit(cache=True)
 def _ahead(node: int, quarter: int, ny: int) -> int:
+    """Return the node in front of a node; a number outside the lattice beyond its border."""
     if quarter == 0:
         return node + ny
     if quarter == 1:
@@ -50,7 +52,7 @@ def _step_cost(
     banned: int,
     prices: Ints,
 ) -> int:
-    """Cost of MoveAhead from a node, FAR where it cannot be."""
+    """Return the cost of MoveAhead from a node; FAR if it is impossible."""
     there = _ahead(node, quarter, ny)
     if there < 0 or there >= fixed.shape[1]:
         return FAR
@@ -58,6 +60,7 @@ def _step_cost(
     edge = node if quarter < 2 else there  # noqa: PLR2004 - backwards along an edge
     if fixed[path, edge] != 0 or (masks[path, edge] & banned) != 0:
         return FAR
+    # Only objects that do not block the node already: each is paid for once, on entering.
     entered = masks[path, edge] & ~masks[NODE, node]
     cost = 1
     bit = 0
@@ -73,14 +76,38 @@ def _step_cost(
 def bucket_dijkstra(
     fixed: Masks, masks: Ints, banned: int, prices: Ints, ny: int, seeds: Ints, until: int
 ) -> Costs:
-    """Cost from every pose to the nearest of some poses, FAR where cut off.
+    """Return the cost from every pose to the nearest of some seed poses.
 
-    Shapes: fixed (3, nodes) uint8 and masks (3, nodes) int64, rows as in the lattice's blockers:
-    what closes a node or an edge for good, and one bit for each movable thing that blocks it.
-    Things in `banned` close theirs as well; the others cost their price. Dijkstra over buckets.
-    Once the pose `until` is known, so is all that its way down meets: costs above are bounds only.
-    A negative one asks for all.
+    Dijkstra's algorithm with a circular array of buckets (Dial 1969), run backwards from the seeds.
+
+    Parameters
+    ----------
+    fixed : (3, nodes) uint8
+        Nonzero where a node or an edge is closed for good; rows as in the lattice's blockers
+        (nodes, edges to the east, edges to the north).
+    masks : (3, nodes) int64
+        Bits of the movable objects that block each node and edge.
+    banned
+        Bits of the objects that cannot be moved: they close what they block.
+    prices : (62,) int64
+        Price of moving each other object.
+    ny
+        Nodes along y.
+    seeds : (n,) int64
+        Poses of cost 0.
+    until
+        Pose after whose cost is known the search stops: costs up to its own are then exact, higher
+        ones are upper bounds. Negative for all poses.
+
+    Returns
+    -------
+    (poses,) int32
+        Cost of each pose; FAR where cut off.
+
     """
+    # Buckets are linked lists in three arrays: heads by bucket, then pose and next entry by entry.
+    # Each pose is expanded once and enters three others at most; an entry whose pose has become
+    # cheaper since is skipped.
     poses = 4 * fixed.shape[1]
     costs = np.full(poses, FAR, dtype=np.int32)
     entry = np.empty(3 * poses + len(seeds), dtype=np.int32)
@@ -104,7 +131,7 @@ def bucket_dijkstra(
             node, quarter = pose // 4, pose % 4
             for kind in range(3):
                 if kind == 0:
-                    # Who steps ahead to here comes from behind.
+                    # MoveAhead to here comes from the node behind.
                     behind = _ahead(node, (quarter + 2) % 4, ny)
                     if behind < 0 or behind >= fixed.shape[1]:
                         continue
@@ -128,7 +155,23 @@ def bucket_dijkstra(
 def descend(
     fixed: Masks, masks: Ints, banned: int, prices: Ints, ny: int, costs: Costs, pose: int
 ) -> tuple[Ints, Ints]:
-    """Follow a field down: the poses passed (n,), and the things entered on each step (n,)."""
+    """Follow a field from a pose down to a seed.
+
+    Parameters
+    ----------
+    fixed, masks, banned, prices, ny
+        Arguments of `bucket_dijkstra` that gave the field.
+    costs : (poses,) int32
+        Field to follow.
+    pose
+        First pose; its cost is below FAR.
+
+    Returns
+    -------
+    poses, entered : (n,) int64 each
+        Poses from the first to the seed, and the bits of the objects entered on each step.
+
+    """
     limit = costs[pose] + 1
     poses = np.empty(limit, dtype=np.int64)
     entered = np.zeros(limit, dtype=np.int64)
@@ -156,20 +199,20 @@ def descend(
 def viewpoints(
     points: Floats, reachable: Costs, ny: int, views: Floats, looks: Ints, after: Costs
 ) -> tuple[Ints, Ints, Ints]:
-    """Find poses from which some point may be seen within reach, by cost.
+    """Find the poses from which an object may be seen within reach, cheapest first.
 
     Parameters
     ----------
     points : (n, 3) float64
-        A thing's visibility points, metres.
+        Visibility points of the object, metres.
     reachable, after : (poses,) int32
-        Cost of getting to each pose, and of going on from there once the thing is out of the way.
+        Cost of reaching each pose, and of going on from it once the object is out of the way.
     ny
         Nodes along y.
     views : (h, 2) float64
         Cosine and sine of each horizon.
     looks : (h,) int64
-        Actions until the camera is there.
+        Number of actions until the camera has each horizon; negative if it cannot.
 
     Returns
     -------
@@ -199,6 +242,7 @@ def viewpoints(
                         horizons[count] = h
                         costs[count] = reachable[pose] + looks[h] + 1 + after[pose]
                         count += 1
+    # A stable sort: ties keep the order of poses, then horizons.
     order = np.argsort(costs[:count], kind="mergesort")
     return poses[:count][order], horizons[:count][order], costs[:count][order]
 
@@ -207,6 +251,7 @@ def viewpoints(
 def _may_see(
     points: Floats, i: int, j: int, quarter: int, cos_down: float, sin_down: float
 ) -> bool:
+    """Return whether a point is in reach and in view; other objects are not asked."""
     ahead_x = 1.0 if quarter == 0 else (-1.0 if quarter == 2 else 0.0)  # noqa: PLR2004
     ahead_y = 1.0 if quarter == 1 else (-1.0 if quarter == 3 else 0.0)  # noqa: PLR2004
     for k in range(len(points)):

@@ -1,4 +1,4 @@
-"""What the expert plans over: what closes the lattice for good, and who blocks the rest."""
+"""Planning problem of a search: closed nodes and edges, and the objects that block the others."""
 
 from __future__ import annotations
 
@@ -17,19 +17,23 @@ if TYPE_CHECKING:
     from internav_data.world import HouseModel, MovableObject, World
 
 MAX_OBJECTS: Final = 62
-"""Bits of a mask; things beyond, the farthest from the start and the goal, count as fixed."""
+"""Number of bits of a mask. Further objects, the farthest from start and goal, count as fixed."""
 PICK_PRICE: Final = 1
+"""Estimated cost of picking up an object, actions. Lower prices make the search try more and solve
+more."""
 PUSH_PRICE: Final = 2
+"""Estimated cost of pushing an object out of the way, actions."""
 FURNITURE_PRICE: Final = 2
+"""Extra price of the house's furniture."""
 DROP_PRICE: Final = 2
-"""What moving a thing out of the way costs at a guess. A low one searches more and finds more."""
+"""Extra price of picking up an object while another one is held."""
 EVERYTHING: Final = (1 << MAX_OBJECTS) - 1
-"""All movable things banned: the lattice as it lies."""
+"""Bits of all objects: with them banned, a field is that of the lattice as objects lie."""
 
 
 @lru_cache(maxsize=8)
 def _static_blockers(model: HouseModel) -> Masks:
-    """(3, nodes) uint8: what is closed with every movable thing away; cached, read-only."""
+    """Return what fixed objects close, (3, nodes) uint8; cached, read-only."""
     nx, ny = model.lattice.shape
     blockers = np.zeros((3, nx, ny), dtype=np.int32)
     corners = np.ascontiguousarray(model.house.outline, dtype=np.float64)
@@ -42,7 +46,7 @@ def _static_blockers(model: HouseModel) -> Masks:
 
 @lru_cache(maxsize=2048)
 def _blocked_indices(item: MovableObject, nx: int, ny: int) -> Ints:
-    """Which nodes and edges a thing blocks, as indices into a flat (3, nx, ny)."""
+    """Return the nodes and edges that an object blocks, as indices into a flat (3, nx, ny)."""
     blockers = np.zeros((3, nx, ny), dtype=np.int32)
     plan = item.footprint
     grid.mark(blockers, plan.vertices, plan.offsets, SPACING_M, CLEARANCE_M, 1)
@@ -51,20 +55,22 @@ def _blocked_indices(item: MovableObject, nx: int, ny: int) -> Ints:
 
 @dataclass(frozen=True, slots=True)
 class PlanningProblem:
-    """A search's fixed part: which things have a bit, and what is closed for good."""
+    """The parts of a search that no action changes: closed edges, movable objects, goal."""
 
     ny: int
+    """Nodes along y."""
     shape: tuple[int, int]
+    """Nodes along x and y."""
     fixed: Masks
-    """(3, nodes)."""
+    """Nonzero where a node or an edge is closed for good, (3, nodes) uint8."""
     objects: tuple[int, ...]
-    """Index of the thing of each bit."""
+    """Index in the world of the object of each bit."""
     goals: Ints
-    """The poses at the goal."""
+    """The four poses at the goal, (4,) int64."""
 
     @staticmethod
     def of(world: World) -> PlanningProblem:
-        """Gather what no action of a world can change."""
+        """Return the planning problem of a world."""
         nx, ny = world.model.lattice.shape
         movable: list[int] = []
         lasting: list[int] = []
@@ -87,7 +93,7 @@ class PlanningProblem:
         return PlanningProblem(ny, (nx, ny), fixed, tuple(ranked[:MAX_OBJECTS]), goals)
 
     def masks(self, world: World) -> Ints:
-        """(3, nodes) int64: who blocks what, as things lie."""
+        """Return the bits of the objects that block each node and edge, (3, nodes) int64."""
         masks = np.zeros(self.fixed.shape, dtype=np.int64)
         flat = masks.reshape(-1)
         for bit, k in enumerate(self.objects):
@@ -97,14 +103,18 @@ class PlanningProblem:
         return masks
 
     def prices(self, world: World) -> Ints:
-        """(62,) int64: what moving each thing costs at a guess; picking needs an empty hand."""
+        """Return the estimated price of moving each object, (62,) int64.
+
+        Picking up costs more while the hand is full.
+        """
         prices = np.zeros(MAX_OBJECTS, dtype=np.int64)
         full = DROP_PRICE if world.held >= 0 else 0
         furniture = len(world.model.items)
         for bit, k in enumerate(self.objects):
             pickable = world.items[k].dynamics.pickable
             prices[bit] = PICK_PRICE + full if pickable else PUSH_PRICE
-            # It stands in groups and against walls, where pushes are slow to solve and seldom help.
+            # Furniture stands in groups and along walls: its pushes are slow to solve and seldom
+            # help.
             prices[bit] += FURNITURE_PRICE if k < furniture else 0
         return prices
 
@@ -113,7 +123,10 @@ class PlanningProblem:
         return 4 * (world.i * self.ny + world.j) + world.quarter
 
     def costs(self, masks: Ints, banned: int, prices: Ints, until: int = -1) -> Costs:
-        """Cost from every pose to the goal, Done left out; `until` as in `bucket_dijkstra`."""
+        """Return the cost from every pose to the goal, (poses,) int32, without the action Done.
+
+        Parameters as in `bucket_dijkstra`.
+        """
         costs: Costs = bucket_dijkstra(
             self.fixed, masks, banned, prices, self.ny, self.goals, until
         )
@@ -122,14 +135,15 @@ class PlanningProblem:
     def path(
         self, masks: Ints, banned: int, prices: Ints, costs: Costs, pose: int
     ) -> tuple[Ints, Ints]:
-        """Poses to the goal down a field, and the things entered on each step."""
+        """Return the poses down a field to the goal, and the bits entered on each step."""
         poses, entered = descend(self.fixed, masks, banned, prices, self.ny, costs, pose)
         return poses, entered
 
     def reach(self, masks: Ints, pose: int) -> tuple[Costs, Costs]:
-        """Cost from a pose to every pose, things as they lie; and the same field turned round.
+        """Return the cost from a pose to every pose, objects as they lie, and its reverse field.
 
-        To go from a to b is to go from b to a facing the other way.
+        A path from a to b is a path from b to a with the agent turned round on every node: one
+        backward field serves both. Both are (poses,) int32; `walk` takes the reverse one.
         """
         seeds = np.array([turned_round(pose)], dtype=np.int64)
         none = np.zeros(MAX_OBJECTS, dtype=np.int64)
@@ -137,7 +151,7 @@ class PlanningProblem:
         return back.reshape(-1, 4)[:, [2, 3, 0, 1]].reshape(-1), back
 
     def walk(self, masks: Ints, back: Costs, pose: int) -> list[int]:
-        """Poses from where `reach` began to a pose."""
+        """Return the poses from the start of a reverse field (see `reach`) to a pose."""
         none = np.zeros(MAX_OBJECTS, dtype=np.int64)
         poses, _ = descend(self.fixed, masks, EVERYTHING, none, self.ny, back, turned_round(pose))
         return [turned_round(p) for p in reversed(poses.tolist())]

@@ -1,4 +1,8 @@
-"""Guess which pushes clear a way, by sliding plans over the floor: a screen, not the truth."""
+"""Heuristic of pushes: an estimate without physics of whether a push clears a path.
+
+The object's footprint slides without turning over the floor, as far as Coulomb friction lets it or
+until it meets another footprint. The search orders its candidates by this; the world decides.
+"""
 
 from __future__ import annotations
 
@@ -20,13 +24,18 @@ if TYPE_CHECKING:
     from internav_data.world import World
 
 STEP_M: Final = 0.15
-"""How finely a slide is tried for what stands in its way."""
+"""Step in which a slide is tested against other footprints, metres."""
 GRAVITY: Final = 9.81
+"""Acceleration of gravity, m/s²."""
 
 
-def slide_m(world: World, thing: int) -> float:
-    """How far a thing slides on free ground when pushed, metres: Coulomb's law."""
-    dynamics, spec = world.items[thing].dynamics, world.push_spec
+def slide_m(world: World, index: int) -> float:
+    """Return the distance that a pushed object slides on free ground, metres.
+
+    By Coulomb friction: the force accelerates it at `gain` up to a speed v, over v² / 2 gain, then
+    friction brakes it over v² / 2 brake.
+    """
+    dynamics, spec = world.items[index].dynamics, world.push_spec
     brake = dynamics.friction * GRAVITY
     gain = spec.force_n / dynamics.mass_kg - brake
     if gain <= 0.0:
@@ -36,36 +45,47 @@ def slide_m(world: World, thing: int) -> float:
 
 
 def path_marks(poses: Sequence[int], nodes: int) -> Ints:
-    """Nodes and edges that a way of poses uses, as indices into a flat (3, nodes)."""
+    """Return the nodes and edges of a path, as ascending indices into a flat (3, nodes).
+
+    Parameters
+    ----------
+    poses
+        Successive poses, as numbers.
+    nodes
+        Number of nodes of the lattice.
+
+    """
     here = np.array(poses, dtype=np.int64)
     place, quarter = here // 4, here[:-1] % 4
     steps = place[:-1] != place[1:]
+    # An edge is stored at its western or southern node, the one with the smaller number.
     edge = np.minimum(place[:-1], place[1:])[steps]
     row = np.where(quarter[steps] % 2 == 0, EAST, NORTH)
     return np.unique(np.concatenate([NODE * nodes + place, row * nodes + edge]))
 
 
 def clearing_pushes(
-    world: World, thing: int, path: Ints, shape: tuple[int, int]
+    world: World, index: int, path: Ints, shape: tuple[int, int]
 ) -> tuple[bool, ...]:
-    """Whether a push along each of the four headings of the house may clear a way of a thing.
+    """Return whether a push along each of the four headings may clear a path of an object.
 
     Parameters
     ----------
     world
-        As things lie.
-    thing
-        An item that can be pushed and is not held.
-    way
-        Indices into a flat (3, nx, ny), from `path_marks`.
+        World with the object and its surroundings.
+    index
+        Index of an object that can be pushed and is not held.
+    path
+        Nodes and edges of the path, indices into a flat (3, nx, ny), from `path_marks`.
     shape
-        nx, ny.
+        Nodes along x and y.
+
     """
-    far = slide_m(world, thing)
-    footprint = world.items[thing].footprint
+    far = slide_m(world, index)
+    footprint = world.items[index].footprint
     low, high = footprint.vertices.min(axis=0) - far, footprint.vertices.max(axis=0) + far
     round_it = grown(dop8_of_rectangle(*low.tolist(), *high.tolist()), 0.0)
-    movable = [k for k, _ in world.near(round_it, thing) if k < len(world.items)]
+    movable = [k for k, _ in world.near(round_it, index) if k < len(world.items)]
     solid = [world.model.footprints, *(world.items[k].footprint for k in movable)]
     out = []
     for heading in range(4):
@@ -79,13 +99,13 @@ def clearing_pushes(
 def _slid(
     footprint: Polygons, ahead: tuple[float, float], far: float, solid: Sequence[Polygons]
 ) -> Polygons:
-    """Move a plan as far along a heading as it goes before it runs into something."""
+    """Move a footprint along a heading, at most `far` metres, until it meets another one."""
     there, went = footprint, 0.0
     before = [clearance(footprint, other, 1.0) for other in solid]
     while went < far:
         went = min(far, went + STEP_M)
         moved = Polygons(footprint.vertices + went * np.array(ahead), footprint.offsets)
-        # What touches from the start does not hinder a push away from it.
+        # A footprint that is touched from the start does not hinder a push away from it.
         if any(
             clearance(moved, other, 1.0) <= 0.0 < gap
             for other, gap in zip(solid, before, strict=True)

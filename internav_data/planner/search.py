@@ -1,16 +1,19 @@
-"""Search for an expert: which thing to move from where, and whether to go round instead.
+"""The expert: actions that reach the goal in the true world, cheap in steps.
 
-Best first over worlds. What is known exactly is what was spent so far; what lies ahead is guessed
-by a field in which entering a thing costs a price. Visiting a world proposes interactions with the
-things that its guessed way enters (each from the cheapest poses that see the thing), and a visit in
-which one of them may not be moved. An interaction is asked of the true world only once it is the
-most promising entry of all.
+It gives imitation data and the ceiling of every metric. The problem is navigation among movable
+obstacles (NAMO, Stilman and Kuffner 2005). The method is a best-first search over worlds that asks
+the true world lazily, for a push costs milliseconds and a field of costs far less:
 
-What the expert's search is made of: worlds after some actions, and what to ask of them next.
+1. A world's f-cost is the number of actions so far plus an estimate of those ahead: a cost-to-go
+   field in which entering the region of a movable object costs a price (`cost_to_go`).
+2. Expanding a search node follows its field to the goal. For every object that the path enters, it
+   proposes candidates (interactions from the cheapest poses that see the object), and a node in
+   which that object is banned, so that the path must go round it.
+3. A candidate is carried out in the true world only once it has the least f-cost of all entries. If
+   it succeeds, the world after it becomes a search node.
 
-The expert: actions that reach the goal in the true world, cheap in steps.
-
-It gives imitation data and every metric's ceiling. No expert is returned that was not replayed.
+The estimate may be too high, so the first plan need not be the shortest: bounds on tries and a
+ratio of acceptance end the search. Every plan is replayed before it is returned.
 """
 
 from __future__ import annotations
@@ -42,24 +45,28 @@ if TYPE_CHECKING:
 
 
 ALIKE_M: Final = 0.05
-"""Worlds whose things lie this near count as one."""
+"""Resolution of the search's notion of equal worlds: positions are rounded to it, metres."""
 
 
 @dataclass(slots=True, eq=False)
 class SearchState:
-    """A world after some actions. The world is never changed."""
+    """A world that the search has reached, and the actions that lead to it."""
 
     world: World
+    """The world; never changed."""
     actions: tuple[int, ...]
     masks: Ints
+    """Bits of the objects that block each node and edge, (3, nodes) int64."""
     prices: Ints
+    """Estimated price of moving each object, (62,) int64."""
     last: tuple[int, int] = (-1, -1)
-    """The thing pushed last, and along which heading of the house."""
+    """Index of the object pushed last, and the heading of that push in the house."""
     penalty: int = 0
-    """What was added to its promises because its pushes looked unlikely to lead on."""
+    """Penalty in the f-costs of its entries, for pushes that looked unlikely to help."""
     proposed: int = 0
-    """Bits of the things whose interactions were proposed."""
+    """Bits of the objects for which candidates were proposed."""
     visited: set[int] = field(default_factory=set)
+    """Sets of banned objects, as bits, for which a search node was made."""
 
     @property
     def spent(self) -> int:
@@ -69,40 +76,47 @@ class SearchState:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SearchNode:
-    """A world to look at, some things taken as fixed (bits), and the field of costs for that."""
+    """A world to expand under the assumption that some objects are not moved."""
 
     state: SearchState
     banned: int
+    """Bits of the objects that are not moved."""
     costs: Costs
+    """Cost-to-go field under that assumption, (poses,) int32."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """An interaction to ask of the world, from a pose, and what its world would begin with."""
+    """An interaction, from a pose, that the true world has not been asked about."""
 
     state: SearchState
     pose: int
+    """Pose, as a number, from which the agent acts."""
     horizon: int
-    """Index into HORIZONS_DEG."""
+    """Index into HORIZONS_DEG of the camera's angle."""
     action: Action
     back: Costs
+    """Reverse field of `PlanningProblem.reach`, which gives the walk to the pose."""
     fallback: Candidate | None = None
-    """The same from another node, where the agent may be less in the way."""
+    """The same interaction from another node, where the agent may be less in the way."""
     f_cost: int = 0
     last: tuple[int, int] = (-1, -1)
+    """`SearchState.last` of the world after it."""
     penalty: int = 0
+    """`SearchState.penalty` of the world after it."""
 
 
 def coarse_position(pose: Pose | None) -> tuple[int, ...]:
-    """Return where a thing lies, coarsely; () for a held one."""
+    """Return an object's position in units of `ALIKE_M`; () for a held one."""
     return () if pose is None else (round(pose.x / ALIKE_M), round(pose.y / ALIKE_M))
 
 
 def bits_in_order(entered: Iterable[int]) -> tuple[int, ...]:
-    """Bits of masks in the order in which they first appear, low ones first."""
+    """Return the bits of masks in the order in which they first appear, low ones first."""
     bits: dict[int, None] = {}
     for mask in entered:
         left = mask
+        # x & -x is the lowest bit that is set.
         while left:
             low = left & -left
             bits[low.bit_length() - 1] = None
@@ -111,7 +125,7 @@ def bits_in_order(entered: Iterable[int]) -> tuple[int, ...]:
 
 
 def moves(poses: Sequence[int]) -> tuple[int, ...]:
-    """Actions that lead through poses, each of which is one action from the last."""
+    """Return the actions that lead through poses, each one action after the last."""
     actions = []
     for before, after in pairwise(poses):
         if before // 4 != after // 4:
@@ -124,34 +138,35 @@ def moves(poses: Sequence[int]) -> tuple[int, ...]:
 
 
 def looks_between(horizon_deg: int, horizon: int) -> tuple[int, ...]:
-    """Actions that turn the camera from one horizon to another."""
+    """Return the actions that turn the camera to a horizon, an index into HORIZONS_DEG."""
     steps = horizon - HORIZONS_DEG.index(horizon_deg)
     action = Action.LOOK_DOWN if steps > 0 else Action.LOOK_UP
     return (int(action),) * abs(steps)
 
 
 MAX_TRIES: Final = 10
-"""Interactions asked of the world; those that are too heavy cost nothing and do not count, nor do
-pushes that go on as the last one did. Of the blocked episodes that 16 solve, 10 solve 98 % in two
-thirds of the time: nearly all of it goes to those that none solves."""
+"""Maximum number of interactions tried in the true world. Objects that are too heavy do not count,
+nor do pushes that continue the last one. 10 tries solve 98 % of the blocked episodes that 16 solve,
+in 2/3 of the time; most time is spent on unsolvable episodes."""
 MAX_QUERIES: Final = 20
-"""Interactions asked in all, pushes that go on included."""
+"""Maximum number of interactions asked in all, pushes that continue the last one included."""
 MAX_MOVERS: Final = 1
-"""Pushes that may move more things besides are not asked: they cost most and seldom help."""
+"""Maximum number of further objects that a push may move; others cost most and seldom help."""
 MAX_EXTRA_TRIES: Final = 2
-"""Interactions still tried once a plan is known: of 400 plans a third one shortens 2."""
+"""Maximum number of tries once a plan is known: of 400 plans a third try shortens 2."""
 ACCEPT_RATIO: Final = 0.95
-"""A plan is good enough once no other promises to be shorter than this share of it."""
+"""Share of a plan's length. The plan is accepted once no entry has an f-cost below it."""
 MAX_EXPANSIONS: Final = 150
+"""Maximum number of entries taken from the queue."""
 MAX_VIEWPOINTS: Final = 40
-"""Poses that are asked whether they see a thing."""
+"""Maximum number of poses tested for seeing an object."""
 PUSH_NODES: Final = 2
-"""Nodes that a thing is pushed from: from one of them the agent may be in the way."""
+"""Number of nodes from which an object is pushed: at one of them the agent may be in the way."""
 TURN_PENALTY: Final = 2
-"""What pushing a thing another way than just before adds to the guess: pushes go on as a rule."""
+"""Penalty of pushing an object in another direction than just before: pushes mostly continue."""
 UNLIKELY_PENALTY: Final = 2
-"""What a push that would not clear the way, as it seems, adds to the guess; it is asked later, not
-never: the seeming leaves out what turns or topples."""
+"""Penalty of a push that would not clear the path by the heuristic. It is asked later, not never:
+the heuristic leaves out turning and toppling."""
 
 _VIEWS: Final = np.array(
     [(math.cos(math.radians(d)), math.sin(math.radians(d))) for d in HORIZONS_DEG]
@@ -164,16 +179,29 @@ _RANKS: Final = {
     Action.PUSH_BACK: 4,
     Action.DROP: 5,
 }
-"""Which of two equally promising entries comes first; a visit's rank is 0."""
+"""Order of entries of equal f-cost, lowest first; a search node's rank is 0."""
 _AGENTS_FAULT: Final = ("the agent is in the way", "would come to lie on the agent")
-"""Failures that another place to stand may mend."""
+"""Failures that another position of the agent may avoid."""
 _PUSHES: Final = (Action.PUSH_LEFT, Action.PUSH_RIGHT, Action.PUSH_AHEAD, Action.PUSH_BACK)
 
 
 def search(world: World, limit: int) -> tuple[int, ...] | None:
-    """Find actions, at most `limit`, that end with Done at the goal; None without any.
+    """Find actions that end with Done at the goal.
 
-    The world is not changed. Bounded by counts; a pure function of the world.
+    A pure function of the world, bounded by counts and never by time.
+
+    Parameters
+    ----------
+    world
+        World to begin in; it is not changed.
+    limit
+        Maximum number of actions, Done included.
+
+    Returns
+    -------
+    tuple of int or None
+        Numbers of the actions; None if no plan was found.
+
     """
     return _BestFirstSearch(world, limit).run()
 
@@ -183,7 +211,7 @@ class _BestFirstSearch:
         self.problem = PlanningProblem.of(world)
         self.best: tuple[int, ...] | None = None
         self.bound = limit + 1
-        """A plan has to be shorter than this."""
+        """Length below which a plan is an improvement."""
         self.tries_left = MAX_TRIES
         self.queries_left = MAX_QUERIES
         self.queue: list[tuple[int, int, int, SearchNode | Candidate]] = []
@@ -216,7 +244,8 @@ class _BestFirstSearch:
         last: tuple[int, int] = (-1, -1),
         penalty: int = 0,
     ) -> None:
-        """Take up a world, unless it was reached as cheaply before."""
+        """Add a world to the search, unless it was reached as cheaply before."""
+        # Poses differ in their last digits with every history: worlds are told apart coarsely.
         poses = tuple(coarse_position(world.items[k].pose) for k in self.problem.objects)
         agent = (world.i, world.j, world.quarter, world.horizon_deg)
         key = (*agent, world.held, world.interaction, poses)
@@ -228,7 +257,7 @@ class _BestFirstSearch:
         self._consider(state, 0)
 
     def _consider(self, state: SearchState, banned: int) -> None:
-        """Put a visit into the queue, where the goal may be reached at all."""
+        """Put a search node into the queue, if the goal may be reached from its world."""
         if banned in state.visited:
             return
         state.visited.add(banned)
@@ -247,6 +276,7 @@ class _BestFirstSearch:
             self._accept(state, poses.tolist())
             return
         if node.banned == 0:
+            # Before any interaction is tried: a short way round may make all of them needless.
             self._detour(state, pose)
             if f_cost >= self.bound:
                 return
@@ -257,6 +287,7 @@ class _BestFirstSearch:
         wanted = False
         path = path_marks(poses.tolist(), problem.fixed.shape[1])
         for bit in bits:
+            # Once per world: other nodes of it lead to the same interactions.
             if not state.proposed >> bit & 1:
                 state.proposed |= 1 << bit
                 dynamics = state.world.items[problem.objects[bit]].dynamics
@@ -268,7 +299,7 @@ class _BestFirstSearch:
             self._propose_drops(node, poses[: first + 1].tolist(), reach, back)
 
     def _detour(self, state: SearchState, pose: int) -> None:
-        """Know the way without any interaction, where there is one: it bounds all others."""
+        """Accept the path without any interaction, if there is one: it bounds all plans."""
         problem = self.problem
         costs = problem.costs(state.masks, EVERYTHING, state.prices, pose)
         if costs[pose] < FAR:
@@ -283,12 +314,13 @@ class _BestFirstSearch:
             self.best, self.bound = actions, len(actions)
 
     def _propose(self, node: SearchNode, bit: int, reach: Costs, back: Costs, path: Ints) -> None:
-        """Propose to push a thing, or to pick it up, from the cheapest poses that see it."""
+        """Propose to push an object, or to pick it up, from the cheapest poses that see it."""
         state, problem = node.state, self.problem
         thing = problem.objects[bit]
         item = state.world.items[thing]
         if item.pose is None:
             return
+        # The cost beyond the interaction, as if it had moved the object out of every path.
         prices = state.prices.copy()
         prices[bit] = 0
         after = problem.costs(state.masks, node.banned, prices)
@@ -298,6 +330,7 @@ class _BestFirstSearch:
         found = viewpoints(points, reach, problem.ny, _VIEWS, looks, after)
         pick = item.dynamics.pickable
         probe = state.world.copy()
+        # `viewpoints` knows nothing of occlusion and of other objects nearer by: the world decides.
         places: list[tuple[int, int, int]] = []
         for place in zip(*(f[:MAX_VIEWPOINTS].tolist() for f in found), strict=True):
             if all(place[0] // 4 != known[0] // 4 for known in places):
@@ -322,7 +355,8 @@ class _BestFirstSearch:
         back: Costs,
         clears: tuple[bool, ...] = (),
     ) -> None:
-        """Put an interaction into the queue, from the first place; the others are its spares."""
+        """Put an interaction from the first place into the queue; the others are its fallbacks."""
+        # From the last place to the first, so that each candidate holds the next as its fallback.
         entry = None
         for pose, horizon, cost in reversed(places):
             penalty, last = state.penalty, (-1, -1)
@@ -342,7 +376,7 @@ class _BestFirstSearch:
     def _propose_drops(
         self, node: SearchNode, path: Sequence[int], reach: Costs, back: Costs
     ) -> None:
-        """Propose to empty the hand on the way to the next thing to pick up, in any direction."""
+        """Propose to drop the held object on the path to the next object to pick up."""
         state, problem = node.state, self.problem
         prices = state.prices.copy()
         for bit, thing in enumerate(problem.objects):
@@ -358,13 +392,14 @@ class _BestFirstSearch:
                 self._push(state.spent + cost, _RANKS[Action.DROP], entry)
 
     def _attempt(self, entry: Candidate) -> None:
-        """Ask the world; where it works, go on from there."""
+        """Carry out a candidate in the true world; on success add the world after it."""
         state, problem = entry.state, self.problem
         if entry.action.kind == "push" and state.world.count_movers(*entry.last) > MAX_MOVERS:
             return
         world = state.world.copy()
         self._place(world, entry.pose, entry.horizon)
         result = world.step(entry.action)
+        # The push of an object alone is cached: finding it too heavy costs next to nothing.
         if result.reason != "too heavy":
             self.queries_left -= 1
             goes_on = result.success and entry.last == state.last
@@ -384,23 +419,23 @@ class _BestFirstSearch:
 
 
 MAX_STEPS: Final = 500
-"""An episode ends after this many actions."""
+"""Maximum number of actions of an episode."""
 
 
 def solve(world: World, limit: int = MAX_STEPS) -> Expert | None:
-    """Plan from a world as it stands, and replay the plan in a world in the same state.
+    """Search for a plan from a world, and replay it in a world in the same state.
 
     Parameters
     ----------
     world
-        Where to begin; it is not changed.
+        World to begin in; it is not changed.
     limit
-        Most actions, Done included.
+        Maximum number of actions, Done included.
 
     Returns
     -------
     Expert or None
-        None where no plan was found within the search's bounds: nothing that blocks the way can
+        None if no plan was found within the search's bounds: no object that blocks the path can
         be moved, or moving it does not help.
 
     """
@@ -414,7 +449,9 @@ def expert_of_episode(
     assets: Mapping[str, Asset],
     push_model: PushModel = "force",
 ) -> Expert | None:
-    """Solve an episode from its start; parameters as in `World.of_episode`, result as in `solve`.
+    """Solve an episode from its start.
+
+    Parameters as in `World.of_episode`, result as in `solve`.
 
     Raises
     ------
@@ -426,9 +463,13 @@ def expert_of_episode(
 
 
 def replay(world: World, actions: Sequence[int]) -> Expert | None:
-    """Act, and count; None unless every action succeeds and the last one is Done at the goal.
+    """Carry out actions in a world, which they change, and count them.
 
-    The world is changed.
+    Returns
+    -------
+    Expert or None
+        None unless every action succeeds and the last one is Done at the goal.
+
     """
     counts: Counter[int] = Counter()
     for action in actions:

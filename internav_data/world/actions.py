@@ -30,7 +30,7 @@ class Action(IntEnum):
     Attributes
     ----------
     kind : str
-        Behaviour in the world, one of `ActionKind`.
+        Kind of behaviour in the world, one of `ActionKind`.
     words : str
         Imperative for captions.
     description : str

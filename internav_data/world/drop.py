@@ -1,4 +1,4 @@
-"""Drop: the first spot round the agent where a held thing comes to rest."""
+"""Drop: the first spot around the agent at which a held object comes to rest."""
 
 from __future__ import annotations
 
@@ -37,24 +37,24 @@ if TYPE_CHECKING:
     from internav_data.world.house_model import MovableObject
 
 GAPS_M: Final = tuple(round(0.05 * k, 2) for k in range(1, 11))
-"""Distances from the agent's disc, nearest first."""
+"""Distances tried between the agent's disc and the object, metres, nearest first."""
 BEARINGS_DEG: Final = (0, *(s * b for b in range(15, 180, 15) for s in (1, -1)), 180)
-"""From straight ahead to behind, left first."""
+"""Bearings tried, degrees from straight ahead (left positive): ahead to behind, left first."""
 ROOM_M: Final = 0.01
-"""Nothing may be nearer than this before it is let go."""
+"""Minimum distance to all other objects before the object is released, metres."""
 NEAR_M: Final = 0.5
-"""What is farther away than this cannot be touched while a thing settles."""
+"""Distance beyond which a settling object can touch nothing, metres."""
 _AHEAD: Final = tuple((math.cos(math.radians(b)), math.sin(math.radians(b))) for b in BEARINGS_DEG)
 
 
 class DropObstructions(NamedTuple):
-    """What a dropped thing must keep clear of."""
+    """Obstructions that a dropped object must keep clear of."""
 
     walls: Polygons
     solid: Sequence[Polygons]
-    """Footprints of all that is fixed and of all that can move."""
+    """Footprints of all fixed objects and of the movable ones near by."""
     bodies: Callable[[Dop8], Sequence[Body]]
-    """Gathers what reaches into an octagon of the house."""
+    """Function from an 8-DOP of the house to the bodies that reach into it."""
 
 
 def drop(
@@ -64,9 +64,29 @@ def drop(
     obstructions: DropObstructions,
     engine: str = DEFAULT_ENGINE,
 ) -> SettleResult | None:
-    """Find room for a held object: gap after gap at bearing after bearing; None without room.
+    """Find room for a held object around the agent.
 
-    The object stands upright, turned as the agent is.
+    All bearings are tried at the smallest gap, then at the next. The object stands upright and
+    turned like the agent.
+
+    Parameters
+    ----------
+    held
+        Object to put down.
+    agent
+        Position of the agent, metres.
+    heading
+        The agent's quarter turns counter-clockwise from +x.
+    obstructions
+        Walls, footprints and bodies to keep clear of.
+    engine
+        Name of the physics engine.
+
+    Returns
+    -------
+    SettleResult or None
+        The object at rest; None if there is no room.
+
     """
     turn = round_quaternion(TURNS[heading])
     plan = _standing(held.asset, heading)
@@ -89,14 +109,15 @@ def _standing(asset: Asset, heading: int) -> Polygons:
 
 
 def _spot(plan: Polygons, agent: Vec2, ux: float, uy: float, gap: float) -> Vec2:
-    """Where the thing's near side is a gap away from the agent's disc."""
+    """Return the spot along (ux, uy) at which the object is a gap away from the agent's disc."""
+    # The object's support towards the agent, from its own origin.
     nearest = min((ux * x + uy * y for x, y in plan.vertices.tolist()), default=0.0)
     far = AGENT.radius_m + gap - nearest
     return round_m(agent[0] + far * ux), round_m(agent[1] + far * uy)
 
 
 def _fits(plan: Polygons, spot: Vec2, agent: Vec2, obstructions: DropObstructions) -> bool:
-    """Whether there is room, and no wall in between."""
+    """Return whether there is room and no wall between the agent and the spot."""
     there = Polygons(plan.vertices + np.array(spot), plan.offsets)
     if any(clearance(there, other, ROOM_M) < ROOM_M for other in obstructions.solid):
         return False
@@ -106,6 +127,7 @@ def _fits(plan: Polygons, spot: Vec2, agent: Vec2, obstructions: DropObstruction
 
 @njit(cache=True)
 def _crosses(ax: float, ay: float, bx: float, by: float, vertices: Floats, offsets: Ints) -> bool:
+    """Return whether the segment from a to b meets one of some convex polygons."""
     for k in range(len(offsets) - 1):
         start, stop = offsets[k], offsets[k + 1]
         if segment_polygon_distance(ax, ay, bx, by, vertices, start, stop) == 0.0:
@@ -122,6 +144,7 @@ def _let_go(
     settled = settle(body, ROOM_M, lambda: obstructions.bodies(around), engine)
     if settled.refusal:
         return None
+    # Judged again at rest, on the rounded pose: falling, it may have slid or tilted.
     exact = footprint(asset, settled.pose)
     if any(clearance(exact, other, ROOM_M) <= 0.0 for other in obstructions.solid):
         return None

@@ -1,4 +1,4 @@
-"""A house as worlds share it: what never moves, and where its movable furniture stands."""
+"""House model: the parts of a house that all its worlds share, as `MjModel` is to `MjData`."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from internav_data.records import Asset, Dynamics, House, Pose, Vec2
 
 MAX_TANGENT_GRAPHS: Final = 16
-"""Any-angle graphs kept a house: one for each set of furniture that was moved."""
+"""Maximum number of tangent graphs kept per house: one for each set of moved furniture."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MovableObject:
-    """An object that can move: its dynamics and its pose, or that it is held."""
+    """An object that can move, at its pose or held in the agent's hand."""
 
     asset: Asset
     pose: Pose | None
@@ -34,9 +34,13 @@ class MovableObject:
     dynamics: Dynamics
     """Mass, friction and abilities of this object; those of the asset do not count."""
     footprint: Polygons
+    """Footprint in the house, metres; empty while it is held."""
     dop8: Dop8
+    """8-DOP in the house, metres."""
     low_m: float
+    """Height of its lowest point, metres; inf while it is held."""
     high_m: float
+    """Height of its highest point, metres; -inf while it is held."""
 
     @staticmethod
     def of(body: Body) -> MovableObject:
@@ -56,29 +60,30 @@ class MovableObject:
 
 
 def is_movable(asset: Asset) -> bool:
-    """Things of the obstacle types that can be pushed or picked up, furniture included."""
+    """Return whether furniture of an asset can move: obstacle types that an agent can handle."""
     dynamics = asset.dynamics
     return asset.spawnable and (dynamics.pushable or dynamics.pickable)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HouseModel:
-    """What all worlds in a house share. Nothing in it is ever changed."""
+    """Parts of a house that all its worlds share; never changed."""
 
     house: House
     fixed: tuple[Body, ...]
-    """Walls, then things that never move; rugs and their like left out."""
+    """Walls, then furniture that never moves, without rugs and the like."""
     dop8s: Floats
-    """How far each of `fixed` reaches in the plane, (n, 8)."""
+    """8-DOPs of `fixed`, (n, 8) float64, metres."""
     walls: Polygons
+    """Footprints of the walls, metres."""
     footprints: Polygons
-    """Of all that is fixed, walls first."""
+    """Footprints of `fixed`, walls first, metres."""
     items: tuple[MovableObject, ...]
     """Furniture that can move, in the house's order."""
     object_ids: tuple[int, ...]
-    """Which thing of the house each item is."""
+    """Object id in the house of each item."""
     lattice: Lattice
-    """With all furniture in its place; never changed."""
+    """Lattice with all furniture in its place and no obstacle."""
     handles: tuple[int, ...]
     """The lattice's handles of `items`."""
     _tangent_graphs: dict[tuple[int, ...], TangentGraph] = field(default_factory=dict)
@@ -115,7 +120,7 @@ class HouseModel:
         )
 
     def tangent_graph(self, displaced: tuple[int, ...] = ()) -> TangentGraph:
-        """Any-angle ways among all furniture but some items (indices, ascending)."""
+        """Return the tangent graph among all furniture but some items (indices, ascending)."""
         graph = self._tangent_graphs.get(displaced)
         if graph is None:
             left = (item.footprint for k, item in enumerate(self.items) if k not in displaced)
@@ -127,10 +132,21 @@ class HouseModel:
         return graph
 
     def shortest_path_m(self, here: Vec2, goal: Vec2) -> float | None:
-        """Any-angle distance with all furniture in its place and no obstacle.
+        """Return the Euclidean path length with all furniture in its place and no obstacle.
 
-        Where the agent stands off the clear ground (furniture was moved away there), that of the
-        nearest clear node plus the straight distance to it.
+        An agent may stand where a piece of furniture was before it was moved away. The path then
+        begins at the nearest clear node, and the straight distance to that node is added.
+
+        Parameters
+        ----------
+        here, goal
+            Points in the plane, metres.
+
+        Returns
+        -------
+        float or None
+            Length in metres; None without a path.
+
         """
         clear = self.tangent_graph()
         if clear.can_stand(here):
@@ -153,5 +169,5 @@ def _node(point: Vec2) -> tuple[int, int]:
 
 
 def dop8_rows(items: Iterable[MovableObject]) -> Floats:
-    """Octagons of items, (n, 8)."""
+    """Return the 8-DOPs of items, (n, 8) float64, metres."""
     return np.array([item.dop8 for item in items], dtype=np.float64).reshape(-1, 8)

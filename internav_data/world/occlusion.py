@@ -1,4 +1,4 @@
-"""Shells: parts as planes for rays to meet, and the fixed points by which a thing is seen."""
+"""Occlusion shapes: convex parts as half-spaces that rays can meet, and visibility points."""
 
 from __future__ import annotations
 
@@ -14,25 +14,26 @@ if TYPE_CHECKING:
     from internav_data.records import Asset, Part, Pose
 
 MAX_POINTS: Final = 32
-"""Visibility points of an asset: all parts' centres first, then corners, evenly chosen."""
+"""Maximum number of visibility points of an asset: the centres of its parts, then corners, evenly
+chosen."""
 
 
 class OcclusionShape(NamedTuple):
-    """A thing's convex parts and visibility points.
-
-    Shapes: planes (m, 4) float64, a point p is inside a part where n . p <= d for all its rows
-    (n, d); starts (parts + 1,) int64 into planes; points (p, 3) float64, metres; owners (p,)
-    int64: the part each point belongs to, which does not hide it.
-    """
+    """An object's convex parts as half-spaces, and its visibility points."""
 
     planes: Floats
+    """Planes of all parts, (m, 4) float64: a point p is inside a part if n · p <= d holds for every
+    row (n, d) of it."""
     starts: Ints
+    """Index of each part's first plane, and m, (parts + 1,) int64."""
     points: Floats
+    """Visibility points, (p, 3) float64, metres."""
     owners: Ints
+    """Part of each point, which does not hide it, (p,) int64."""
 
 
 def _planes_of(corners: Floats) -> Floats:
-    """Planes (m, 4) of the hull of corners (n, 3), faces of several triangles once."""
+    """Return the planes (m, 4) of the convex hull of corners (n, 3), each plane once."""
     from scipy.spatial import ConvexHull  # noqa: PLC0415 - imported when used
 
     # qhull repeats a plane for each triangle of a face, equal but for the last bits.
@@ -51,14 +52,14 @@ def _box_planes(size: tuple[float, float, float]) -> Floats:
 
 
 def _part_planes(part: Part) -> Floats:
-    """Planes of a part in the asset's frame."""
+    """Return the planes (m, 4) of a part in the asset's frame."""
     if part.shape == "box":
         return moved_planes(_box_planes(part.size), rotation_matrix(part.rotation), part.centre)
     return _planes_of(part_corners(part))
 
 
 def moved_planes(planes: Floats, matrix: Floats, shift: tuple[float, float, float]) -> Floats:
-    """Turn planes (m, 4) by a matrix (3, 3) and shift them, metres."""
+    """Return planes (m, 4) turned by a matrix (3, 3) and then shifted, metres."""
     x, y, z = planes[:, 0], planes[:, 1], planes[:, 2]
     out = np.empty_like(planes)
     # Written out: a BLAS product may differ in the last bit between processors.
@@ -71,7 +72,7 @@ def moved_planes(planes: Floats, matrix: Floats, shift: tuple[float, float, floa
 
 @lru_cache(maxsize=2048)
 def occlusion_shape(asset: Asset) -> OcclusionShape:
-    """Shell in the asset's frame; cached, read-only."""
+    """Return an asset's occlusion shape in its own frame; cached, read-only."""
     planes = [_part_planes(part) for part in asset.parts]
     starts = np.cumsum([0, *(len(p) for p in planes)]).astype(np.int64)
     points, owners = _visibility_points(asset)
@@ -93,7 +94,7 @@ def _visibility_points(asset: Asset) -> tuple[Floats, Ints]:
 
 @lru_cache(maxsize=4096)
 def placed_occlusion_shape(asset: Asset, pose: Pose) -> OcclusionShape:
-    """Shell of a thing where it lies in the house; cached, read-only."""
+    """Return the occlusion shape of an object at a pose in the house; cached, read-only."""
     own = occlusion_shape(asset)
     matrix = rotation_matrix(pose.quaternion)
     planes = moved_planes(own.planes, matrix, (pose.x, pose.y, pose.z))

@@ -1,4 +1,9 @@
-"""Sight: whether the agent sees a thing within its reach (numba kernels)."""
+"""Visibility: whether the agent sees an object within its reach.
+
+An object is visible if one of its visibility points is within reach, inside the camera's view, and
+no convex part of any object near by cuts the segment from the eye to that point. Segments are
+clipped against half-spaces (Cyrus and Beck 1978). The kernels are compiled by numba.
+"""
 
 from __future__ import annotations
 
@@ -19,20 +24,21 @@ if TYPE_CHECKING:
     from internav_data.world.occlusion import OcclusionShape
 
 REACH_M: Final = AGENT.reach_m
-"""A visibility point farther from the agent's axis, in the plane, cannot be acted on."""
+"""Maximum distance in the plane from the agent's axis to a visibility point, metres."""
 CAMERA_M: Final = AGENT.camera_height_m
-"""Height of the camera on the agent's axis."""
+"""Height of the camera on the agent's axis, metres."""
 SLACK: Final = 1e-9
-"""Share of a ray: what it only touches does not hide what is behind."""
+"""Share of a segment that must lie inside a part for the part to hide what is behind it."""
 
 
 @njit(cache=True)
 def _hidden(eye: Floats, point: Floats, planes: Floats, starts: Ints, skip: int) -> bool:
-    """Whether a convex part other than `skip` obstructs the segment from the eye to a point."""
+    """Return whether a convex part other than `skip` cuts the segment from the eye to a point."""
     dx, dy, dz = point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]
     for part in range(len(starts) - 1):
         if part == skip:
             continue
+        # The segment's parameters inside all half-spaces so far.
         enter, leave = 0.0, 1.0
         for k in range(starts[part], starts[part + 1]):
             a, b, c = planes[k, 0], planes[k, 1], planes[k, 2]
@@ -55,10 +61,11 @@ def _hidden(eye: Floats, point: Floats, planes: Floats, starts: Ints, skip: int)
 def _in_view(
     eye: Floats, point: Floats, ahead_x: float, ahead_y: float, cos_down: float, sin_down: float
 ) -> bool:
-    """Whether a point lies in the camera's view, 90 degrees wide and high, and within reach."""
+    """Return whether a point lies in the camera's view, 90° wide and high, and within reach."""
     dx, dy, dz = point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]
     if dx * dx + dy * dy > REACH_M * REACH_M:
         return False
+    # The camera's axes: level ahead and to the right, then both turned down by the horizon.
     level = dx * ahead_x + dy * ahead_y
     side = dx * ahead_y - dy * ahead_x
     depth = level * cos_down - dz * sin_down
@@ -76,6 +83,7 @@ def _seen(
     planes: Floats,
     starts: Ints,
 ) -> bool:
+    """Return whether a point is in view and not hidden; the object's parts begin at `first`."""
     for k in range(len(points)):
         if _in_view(eye, points[k], *view) and not _hidden(
             eye, points[k], planes, starts, first + owners[k]
@@ -93,23 +101,28 @@ def _axis_distance(x: float, y: float, vertices: Floats, offsets: Ints) -> float
 
 
 def axis_distance(x: float, y: float, polygons: Polygons) -> float:
-    """Distance from a point of the floor to the nearest of some polygons, inf without any."""
+    """Return the distance in metres from a point of the floor to the nearest of some polygons.
+
+    Inf without any polygon.
+    """
     return float(_axis_distance(x, y, polygons.vertices, polygons.offsets))
 
 
 class CameraPose(NamedTuple):
-    """Where the camera is and looks."""
+    """Position and direction of the agent's camera."""
 
     eye: Floats
-    """(3,) metres."""
+    """Position of the eye, (3,) float64, metres."""
     ahead_x: float
     ahead_y: float
+    """With `ahead_x`, unit vector of the agent's heading in the plane."""
     cos_down: float
     sin_down: float
+    """With `cos_down`, cosine and sine of the angle below the horizontal."""
 
 
 _DOWN: Final = {
-    # Written out: a right angle's third has exact sines.
+    # Written out: thirds of a right angle have simple sines, equal on every machine.
     -30: (math.sqrt(0.75), -0.5),
     0: (1.0, 0.0),
     30: (math.sqrt(0.75), 0.5),
@@ -118,12 +131,23 @@ _DOWN: Final = {
 
 
 def camera_pose(x: float, y: float, ahead: tuple[float, float], horizon_deg: int) -> CameraPose:
-    """Return the view of an agent that stands at (x, y) and looks so far down."""
+    """Return the camera pose of an agent at (x, y), metres.
+
+    Parameters
+    ----------
+    x, y
+        Position of the agent's axis, metres.
+    ahead
+        Unit vector of the heading.
+    horizon_deg
+        Angle below the horizontal: -30, 0, 30 or 60 degrees.
+
+    """
     return CameraPose(np.array([x, y, CAMERA_M]), *ahead, *_DOWN[horizon_deg])
 
 
 class Occluders:
-    """Everything near the agent that can hide something, gathered once for several questions."""
+    """All shapes near the agent that can hide a visibility point, joined for several queries."""
 
     def __init__(self, shapes: Sequence[OcclusionShape]) -> None:
         self._shapes = shapes
@@ -138,16 +162,16 @@ class Occluders:
         self._planes: Floats = np.concatenate(planes) if planes else np.empty((0, 4))
         self._starts: Ints = np.array(counts, dtype=np.int64)
 
-    def seen(self, view: CameraPose, place: int) -> bool:
-        """Whether the thing of one of the shells is seen and within reach."""
-        shape = self._shapes[place]
+    def seen(self, view: CameraPose, index: int) -> bool:
+        """Return whether the object of one of the shapes, by index, is seen and within reach."""
+        shape = self._shapes[index]
         return bool(
             _seen(
                 view.eye,
                 (view.ahead_x, view.ahead_y, view.cos_down, view.sin_down),
                 shape.points,
                 shape.owners,
-                self._first[place],
+                self._first[index],
                 self._planes,
                 self._starts,
             )

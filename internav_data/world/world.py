@@ -1,6 +1,8 @@
-"""The world: a house, what can move in it, and the agent; one action at a time.
+"""The world: state of an episode being played, and the effect of each action on it.
 
-What each action does to a world.
+A world holds the agent, the movable objects, the hand and the goal; the house is shared
+(`HouseModel`). `World.step` looks up the behaviour of an action's kind in `BEHAVIOURS`. Objects are
+addressed by index: the house's movable furniture first, then the obstacles.
 """
 
 from __future__ import annotations
@@ -46,13 +48,13 @@ if TYPE_CHECKING:
 
 
 GOAL_M: Final = 0.2
-"""Done succeeds within this of the goal."""
+"""Maximum distance from the goal at which Done succeeds, metres."""
 REST_M: Final = 0.01
-"""What begins this much above another thing's lowest point, and not above its top, rests on it."""
+"""A rests on B if A's bottom is at least this far above B's bottom, and not above B's top (m)."""
 TOUCH_M: Final = 0.005
-"""Distance within which two objects count as touching."""
+"""Distance within which two objects count as touching, metres."""
 MAX_DROP_M: Final = 2.5
-"""No drop reaches farther: the widest gap, the largest thing that can be picked up, and room."""
+"""Bound of a drop's reach, metres: the widest gap, the largest pickable object, and room."""
 
 _STEPPED: Final = StepResult(Action.MOVE_AHEAD, success=True)
 _BLOCKED: Final = StepResult(Action.MOVE_AHEAD, success=False, reason="something is in the way")
@@ -142,11 +144,11 @@ def _pick(world: World, action: Action) -> StepResult:
 
 
 def carries(world: World, index: int) -> bool:
-    """Whether another movable thing rests on a thing, and would hang in the air without it."""
+    """Return whether another movable object rests on an object, given by its index."""
     below = world.items[index]
     for key, _ in world.near(grown(below.dop8, TOUCH_M), index):
         if key >= len(world.items):
-            break
+            break  # from here on fixed bodies
         above = world.items[key]
         if (
             below.low_m + REST_M < above.low_m <= below.high_m + TOUCH_M
@@ -201,7 +203,7 @@ BEHAVIOURS: Final[dict[ActionKind, Callable[[World, Action], StepResult]]] = {
     "done": _done,
     "wait": _wait,
 }
-"""Effect of each kind of action; one that fails leaves the world as it is."""
+"""Function by kind of action that carries an action out; a failure leaves the world as it was."""
 
 
 class World:
@@ -223,7 +225,7 @@ class World:
     items : tuple of MovableObject
         All objects that can move; replaced, never changed.
     lattice : Lattice
-        Lattice among all objects as they lie; replaced, never changed.
+        Lattice among all objects at their present poses; replaced, never changed.
     goal : (int, int)
         Lattice node to reach.
     push_model : str
@@ -231,8 +233,8 @@ class World:
     engine : str
         Name of the physics engine.
     interaction : Interaction or None
-        Interaction that goes on: begun by an earlier step and not yet ended. The twelve actions
-        end in the step that begins them.
+        Interaction in progress, begun by an earlier step and not yet ended. Each of the twelve
+        actions ends in the step that begins it.
     """
 
     __slots__ = (
@@ -267,7 +269,24 @@ class World:
         push_model: PushModel = "force",
         engine: str = DEFAULT_ENGINE,
     ) -> None:
-        """Put obstacles and an agent (node i, j and quarter turn) into a house."""
+        """Put obstacles and an agent into a house.
+
+        Parameters
+        ----------
+        model
+            Model of the house.
+        obstacles
+            Obstacles at their poses, with their own dynamics.
+        start
+            The agent's lattice node i, j and quarter turns counter-clockwise from +x.
+        goal
+            Lattice node to reach.
+        push_model
+            "force" or "kick".
+        engine
+            Name of the physics engine.
+
+        """
         extra = [MovableObject.of(body) for body in obstacles]
         self.model = model
         self.lattice = model.lattice.copy()
@@ -327,21 +346,30 @@ class World:
         )
 
     def copy(self) -> World:
-        """Return an independent world in the same state: only references are copied."""
+        """Return an independent world in the same state.
+
+        It costs little: objects and lattices are replaced, never changed, so both worlds share
+        them.
+        """
         other = object.__new__(World)
         for name in World.__slots__:
             setattr(other, name, getattr(self, name))
         return other
 
     def step(self, action: int) -> StepResult:
-        """Act. An action that fails changes nothing and its result gives the reason.
+        """Carry out an action. One that fails changes nothing; its result gives the reason.
+
+        Parameters
+        ----------
+        action
+            Number of an `Action`.
 
         Raises
         ------
         UsageError
             No action has this number.
         NotImplementedError
-            The action's kind has no behaviour here.
+            The action's kind has no row in `BEHAVIOURS`.
         """
         known = _known(action)
         behaviour = BEHAVIOURS.get(known.kind)
@@ -353,7 +381,7 @@ class World:
 
     @property
     def position(self) -> Vec2:
-        """The agent's axis, metres."""
+        """Position of the agent's axis, metres."""
         return SPACING_M * self.i, SPACING_M * self.j
 
     @property
@@ -362,39 +390,51 @@ class World:
         return range(len(self.model.items), len(self.items))
 
     def steps(self) -> int | None:
-        """Lattice distance to the goal, things as they lie; None when cut off."""
+        """Return the lattice distance to the goal, objects as they lie; None when cut off."""
         return self.lattice.distance((self.i, self.j), self.goal)
 
     def obstructed_path_m(self) -> float | None:
-        """Any-angle distance to the goal, things as they lie; None when cut off."""
+        """Return the Euclidean path length to the goal, metres, objects as they lie.
+
+        None when cut off.
+        """
         return self.path_m_between(self.position, self.goal_point)
 
     def path_m_between(self, here: Vec2, there: Vec2) -> float | None:
-        """Any-angle distance between two points, things as they lie; None when cut off."""
+        """Return the Euclidean path length between two points, metres, objects as they lie.
+
+        None if they are cut off from each other.
+        """
         graph, loose = self._loose()
         path = graph.distance(here, there, loose)
         return None if path is None else round_m(path)
 
     def path(self) -> tuple[float, NDArray[np.float64]] | None:
-        """Any-angle distance to the goal and the way's points (n, 2); None when cut off."""
+        """Return the shortest path to the goal: its length, metres, and its points (n, 2) float64.
+
+        None when cut off.
+        """
         graph, loose = self._loose()
         found = graph.length_and_path(self.position, self.goal_point, loose)
         return None if found is None else (round_m(found[0]), found[1])
 
     def _loose(self) -> tuple[TangentGraph, Polygons]:
-        """Finder of ways among what has not moved, and all else that stands in the way."""
+        """Return the tangent graph among furniture that has not moved, and all other footprints."""
         home = self.model.items
         displaced = tuple(k for k, item in enumerate(home) if self.items[k] is not item)
         loose = [self.items[k].footprint for k in (*displaced, *self.obstacles)]
         return self.model.tangent_graph(displaced), Polygons.joined(loose)
 
     def shortest_path_m(self) -> float | None:
-        """Any-angle distance to the goal without obstacles, furniture in its place."""
+        """Return the Euclidean path length to the goal without obstacles, metres.
+
+        All furniture is in its place. None when cut off.
+        """
         path = self.model.shortest_path_m(self.position, self.goal_point)
         return None if path is None else round_m(path)
 
     def target(self, *, pick: bool) -> int:
-        """Index of the closest visible thing to pick up, or to push; -1 without one."""
+        """Return the index of the closest visible object to pick up, or to push; -1 without one."""
         x, y = self.position
         round_here = dop8_of_square(x, y, REACH_M)
         near = touching(self._dop8s, round_here)
@@ -411,13 +451,25 @@ class World:
             shapes + [placed_occlusion_shape(body.asset, body.pose) for body in fixed]
         )
         view = camera_pose(x, y, HEADINGS[self.quarter], self.horizon_deg)
+        # Nearest first, ties by index: visibility is asked only until the first one is seen.
         for _, k in sorted(wanted):
             if occluders.seen(view, near.index(k)):
                 return k
         return -1
 
     def simulate_push(self, index: int, heading: int, *, agent: bool = True) -> PushResult:
-        """Answer what pushing a thing along a heading of the house (0 … 3) would do."""
+        """Return the result of a push without carrying it out.
+
+        Parameters
+        ----------
+        index
+            Index of the object to push.
+        heading
+            0, 1, 2, 3: along +x, +y, -x, -y of the house.
+        agent
+            Whether the agent's collider takes part.
+
+        """
         gap = math.inf
         if agent:
             x, y = self.position
@@ -444,13 +496,15 @@ class World:
         )
 
     def put(self, changes: Iterable[tuple[int, Pose | None]]) -> None:
-        """Lay things elsewhere, or (pose None) take them off the floor: no questions asked."""
+        """Move objects to other poses, or (pose None) off the floor, without any check."""
         lattice = self.lattice.copy()
         items, handles = list(self.items), list(self._handles)
         dop8s = self._dop8s.copy()
         for k, pose in changes:
             if items[k].pose is not None:
                 lattice.remove(handles[k])
+            # Furniture put back in its place is the model's own object again: paths need no graph
+            # without it.
             home = self.model.items[k] if k < len(self.model.items) else None
             back = home is not None and home.pose == pose
             items[k] = home if back and home is not None else items[k].moved(pose)
@@ -465,7 +519,7 @@ class World:
         return PUSH_SPECS[self.push_model]
 
     def digest(self) -> str:
-        """Return the SHA-256 (hex) of the state: equal for equal worlds, whatever their history."""
+        """Return the SHA-256 (hex) of the state: equal worlds have equal digests."""
         node = (self.i, self.j, self.quarter, self.horizon_deg, self.held, *self.goal)
         parts = [self.model.house.scene_id.encode(), self.push_model.encode(), self.engine.encode()]
         parts += [struct.pack("<7i", *node), repr(self.interaction).encode()]
@@ -481,23 +535,23 @@ class World:
         return hashlib.sha256(b"".join(struct.pack("<i", len(p)) + p for p in parts)).hexdigest()
 
     def __eq__(self, other: object) -> bool:
-        """Whether another world is in the same state."""
+        """Return whether another world is in the same state."""
         return isinstance(other, World) and self.digest() == other.digest()
 
     __hash__ = None  # type: ignore[assignment] # a world changes
 
     @property
     def goal_point(self) -> Vec2:
-        """Where the goal is, metres."""
+        """Position of the goal, metres."""
         return SPACING_M * self.goal[0], SPACING_M * self.goal[1]
 
     def body(self, index: int) -> Body:
-        """Return an item as physics takes it: geometry, pose and dynamics.
+        """Return an object as a body of physics: geometry, pose and dynamics.
 
         Raises
         ------
         UsageError
-            The item is held.
+            The object is held.
 
         """
         item = self.items[index]
@@ -508,7 +562,10 @@ class World:
         return Body(item.asset, item.pose, item.dynamics)
 
     def distance_to(self, index: int, x: float, y: float) -> float:
-        """Distance from the agent's axis to a thing's footprint (its box, where it has none)."""
+        """Return the distance from a point to an object's footprint, metres.
+
+        An object without a footprint is measured by its bounding box.
+        """
         item = self.items[index]
         if len(item.footprint):
             return axis_distance(x, y, item.footprint)
@@ -516,7 +573,10 @@ class World:
         return math.hypot(max(-west - x, 0.0, x - east), max(-south - y, 0.0, y - north))
 
     def near(self, dop8: Dop8, skip: int = -1) -> list[tuple[int, Body]]:
-        """Bodies that reach into an octagon: items by their index, then what is fixed."""
+        """Return the bodies that reach into an 8-DOP, with their keys, ascending.
+
+        The key of a movable object is its index; keys of fixed bodies follow.
+        """
         bodies = [(k, self.body(k)) for k in touching(self._dop8s, dop8) if k != skip]
         first = len(self.items)
         bodies += [(first + k, self.model.fixed[k]) for k in touching(self.model.dop8s, dop8)]
