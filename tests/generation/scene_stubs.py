@@ -8,79 +8,32 @@ import signal
 import time
 from types import SimpleNamespace
 
+import builders
+
 from internav_data.dataset import STAGING, stage_scene
-from internav_data.records import Asset, Episode, Goal, House, Obstacle, Part, Physics, Room, Start
+from internav_data.records import Physics
 from internav_data.records.errors import QuarantineError
 from internav_data.records.splits import split_of_scene
 
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-SQUARE = ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0))
-BOX = Part("box", (0.0, 0.0, 0.2), (0.4, 0.4, 0.4), UPRIGHT, (), (200, 100, 50), "paper")
-ASSET = Asset("Box_0", "Box", (0.4, 0.4, 0.4), 0.3, 0.6, False, True, True, True, (BOX,))
+ASSET = builders.crate("Box_0", (0.4, 0.4, 0.4), mass_kg=0.3, pushable=False, pickable=True)
 CATALOGUE = SimpleNamespace(assets={"Box_0": ASSET}, spawnable=(ASSET,), digest="0" * 64, version=1)
 
 
 def house(seed, scene):
-    room = Room(0, "living", SQUARE, 16.0, 2.4, "oak", "white")
-    return House(
-        scene_id=f"scene-{scene:06d}",
-        scene=scene,
-        seed=seed,
-        split=split_of_scene(scene),
-        preset="paper",
-        outline=SQUARE,
-        rooms=(room,),
-        doors=(),
-        windows=(),
-        walls=(),
-        objects=(),
-        materials=(),
-        room_graph=(),
-        area_m2=16.0,
-        assets={},
-    )
+    square = builders.rectangle(0.0, 0.0, 4.0, 4.0)
+    room = builders.room(0, square, 16.0, "living")
+    return builders.house([room], square, scene, seed=seed, split=split_of_scene(scene))
 
 
 def episode(home, index):
-    obstacle = Obstacle(
-        "Box_0",
-        "Box",
-        1.0,
-        1.0 + index / 64,
-        0.0,
-        UPRIGHT,
-        0.3,
-        0.6,
-        False,
-        True,
-        0,
-        0.1,
-        0.0,
-        None,
-    )
-    return Episode(
-        episode_id=f"{home.scene_id}/{index:04d}",
-        scene_id=home.scene_id,
-        split=home.split,
+    return builders.episode(
+        home,
+        builders.start(1, 1),
+        builders.goal(12, 2),
+        [builders.obstacle(ASSET, 1.0, 1.0 + index / 64)],
         index=index,
-        seed=home.seed,
-        room_count=1,
-        mode="blocked",
-        sealed=True,
-        rooms_on_path=1,
-        obstacle_count=1,
         shortest_path_m=3.0,
-        shortest_path_steps=12,
-        obstructed_path_m=None,
-        obstructed_path_steps=None,
-        start=Start(1, 1, 0.25, 0.25, 90, 0),
-        goal=Goal(12, 2, 3.0, 0.5, 0),
-        room_paths=((0,),),
-        room_paths_truncated=False,
         node_paths=(),
-        node_paths_truncated=False,
-        obstacles=(obstacle,),
-        expert=None,
         physics=Physics("stub", "1", 0.1, 0.0),
     )
 
@@ -91,6 +44,8 @@ def stub(payload):
     path = folder / "stub.json"
     orders = json.loads(path.read_text()) if path.exists() else {}
     journal = folder / "journal"
+    with (folder / "workers").open("a") as file:
+        file.write(f"{os.getpid()}\n")
 
     def make(scene):
         with journal.open("a") as file:

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from types import MappingProxyType
 
+import builders
 import numpy as np
+from builders import WALL_HALF_M as HALF
 from hypothesis import strategies as st
 
-from internav_data.geometry import Polygons, round_m, yaw_quaternion
-from internav_data.records import Asset, Door, House, Part, Room, SceneObject, Wall
-
-HALF = 0.06
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+from internav_data.geometry import Polygons, round_m
 
 
 def rectangle(x0, y0, x1, y1):
@@ -99,33 +96,19 @@ def random_rooms(seed, columns=4, rows=2, objects=60, size=(5.0, 7.0)):
     return Polygons.of(polygons), rectangle(0.0, 0.0, columns * width, rows * depth)
 
 
-def _table():
-    top = Part("box", (0.0, 0.0, 0.74), (1.2, 0.8, 0.04), UPRIGHT, (), (9, 9, 9), "wood")
-    return Asset("Table_0", "Table", (1.2, 0.8, 0.76), 20.0, 0.6, True, False, True, True, (top,))
-
-
 def house_of(rooms, doors, graph, walls=(), objects=(), outline=None):
     """A house record that holds what navigation reads of it."""
-    asset = _table()
-    return House(
-        scene_id="scene-000000",
-        scene=0,
-        seed=0,
-        split="train",
-        preset="paper",
-        outline=outline or ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)),
-        rooms=tuple(Room(k, "room", tuple(p), 1.0, 2.5, "oak", "white") for k, p in rooms.items()),
+    return builders.house(
+        [builders.room(k, polygon, 1.0) for k, polygon in rooms.items()],
+        outline or rectangle(0.0, 0.0, 1.0, 1.0),
         doors=tuple(doors),
-        windows=(),
         walls=tuple(walls),
         objects=tuple(
-            SceneObject(n, "Table_0", "Table", 0, x, y, 0.0, yaw_quaternion(yaw), -1, -1)
+            builders.scene_object(n, "DiningTable_0", 0, x, y, yaw_deg=yaw)
             for n, (x, y, yaw) in enumerate(objects)
         ),
-        materials=(),
         room_graph=tuple(graph),
-        area_m2=1.0,
-        assets=MappingProxyType({asset.asset_id: asset}),
+        assets=builders.by_id(builders.table(size=(1.2, 0.8, 0.76))),
     )
 
 
@@ -133,23 +116,24 @@ def graph_house(edges, count):
     """Only rooms and a graph between them: no shapes."""
     rooms = {k: rectangle(k, 0.0, k + 1.0, 1.0) for k in range(count)}
     edges = sorted({(min(e), max(e)) for e in edges})
-    doors = [Door(n, e, "single", float(n), 0.5, 90.0, 1.0, 2.1, True) for n, e in enumerate(edges)]
+    doors = [builders.door(n, e, float(n), 0.5) for n, e in enumerate(edges)]
     return house_of(rooms, doors, edges)
 
 
 def two_rooms(objects=()):
     """Interior 0..6 x 0..4 m; a wall at x = 3 with a door of 1 m in its middle."""
     low, high = -HALF, 4.0 + HALF
+    wall = builders.wall
     walls = [
-        Wall(-2 * HALF, -2 * HALF, 6 + 2 * HALF, 0.0, 0.0, 2.5),
-        Wall(-2 * HALF, 4.0, 6 + 2 * HALF, 4 + 2 * HALF, 0.0, 2.5),
-        Wall(-2 * HALF, 0.0, 0.0, 4.0, 0.0, 2.5),
-        Wall(6.0, 0.0, 6 + 2 * HALF, 4.0, 0.0, 2.5),
-        Wall(3 - HALF, 0.0, 3 + HALF, 1.5, 0.0, 2.5),
-        Wall(3 - HALF, 2.5, 3 + HALF, 4.0, 0.0, 2.5),
-        Wall(3 - HALF, 1.5, 3 + HALF, 2.5, 2.1, 2.5),
+        wall(-2 * HALF, -2 * HALF, 6 + 2 * HALF, 0.0),
+        wall(-2 * HALF, 4.0, 6 + 2 * HALF, 4 + 2 * HALF),
+        wall(-2 * HALF, 0.0, 0.0, 4.0),
+        wall(6.0, 0.0, 6 + 2 * HALF, 4.0),
+        wall(3 - HALF, 0.0, 3 + HALF, 1.5),
+        wall(3 - HALF, 2.5, 3 + HALF, 4.0),
+        builders.lintel(3 - HALF, 1.5, 3 + HALF, 2.5),
     ]
     rooms = {0: rectangle(low, low, 3.0, high), 1: rectangle(3.0, low, 6 + HALF, high)}
-    doors = [Door(0, (0, 1), "single", 3.0, 2.0, 90.0, 1.0, 2.1, True)]
+    doors = [builders.door(0, (0, 1), 3.0, 2.0)]
     outline = tuple(rectangle(low, low, 6 + HALF, high))
     return house_of(rooms, doors, [(0, 1)], walls, objects, outline)

@@ -6,10 +6,11 @@ import math
 import subprocess
 import sys
 from dataclasses import replace
-from types import MappingProxyType
+from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import UPRIGHT, crate, one_room
 
 from internav_data.catalog import catalogue
 from internav_data.episodes import build_episodes
@@ -19,62 +20,13 @@ from internav_data.physics import Body
 from internav_data.planner.cost_to_go import FAR
 from internav_data.planner.problem import EVERYTHING, PlanningProblem
 from internav_data.planner.search import expert_of_episode, replay, solve
-from internav_data.records import Asset, House, Part, Pose, Room, Wall
+from internav_data.records import Pose
 from internav_data.world import ACTION_COUNT, Action, HouseModel, World
 
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-HALF = 0.06
-HIGH = 2.6
-
-
-def block(asset_id, size, mass_kg, **flags):
-    part = Part("box", (0.0, 0.0, size[2] / 2), size, UPRIGHT, (), (150, 110, 70), "wood")
-    return Asset(
-        asset_id=asset_id,
-        type=asset_id.split("_", maxsplit=1)[0],
-        size=size,
-        mass_kg=mass_kg,
-        friction=0.6,
-        pushable=flags.get("pushable", False),
-        pickable=flags.get("pickable", False),
-        spawnable=True,
-        blocks=True,
-        parts=(part,),
-    )
-
-
-CRATE = block("Crate_0", (0.8, 0.8, 0.5), 12.0, pushable=True)
-PARCEL = block("Parcel_0", (0.8, 0.8, 0.5), 3.0, pickable=True)
-SAFE = block("Safe_0", (0.8, 0.8, 0.7), 900.0, pushable=True)
-PILLAR = block("Pillar_0", (0.8, 0.8, 1.5), 100.0)
-
-
-def room(width, depth, *inner):
-    """One room of width x depth metres; inner walls are (low x, low y, high x, high y)."""
-    sides = (
-        (-HALF, -HALF, width + HALF, HALF),
-        (-HALF, depth - HALF, width + HALF, depth + HALF),
-        (-HALF, HALF, HALF, depth - HALF),
-        (width - HALF, HALF, width + HALF, depth - HALF),
-    )
-    corners = ((0.0, 0.0), (width, 0.0), (width, depth), (0.0, depth))
-    return House(
-        scene_id="scene-000000",
-        scene=0,
-        seed=0,
-        split="train",
-        preset="paper",
-        outline=corners,
-        rooms=(Room(0, "living_room", corners, width * depth, HIGH, "oak", "white"),),
-        doors=(),
-        windows=(),
-        walls=tuple(Wall(*side, 0.0, HIGH) for side in (*sides, *inner)),
-        objects=(),
-        materials=(),
-        room_graph=(),
-        area_m2=width * depth,
-        assets=MappingProxyType({}),
-    )
+CRATE = crate("Crate_0", (0.8, 0.8, 0.5), mass_kg=12.0)
+PARCEL = crate("Parcel_0", (0.8, 0.8, 0.5), mass_kg=3.0, pushable=False, pickable=True)
+SAFE = crate("Safe_0", (0.8, 0.8, 0.7), mass_kg=900.0)
+PILLAR = crate("Pillar_0", (0.8, 0.8, 1.5), mass_kg=100.0, pushable=False)
 
 
 def at(asset, x, y):
@@ -85,10 +37,10 @@ def expert_of(model, obstacles, start, goal, **limit):
     return solve(World(model, obstacles, start, goal), **limit)
 
 
-CORRIDOR = HouseModel.of(room(6.0, 1.5))
+CORRIDOR = HouseModel.of(one_room(6.0, 1.5))
 """Three nodes wide: a block of 0.8 m in its middle leaves no way by."""
-HALL = HouseModel.of(room(6.0, 4.0))
-GAPS = HouseModel.of(room(5.0, 9.0, (2.44, 1.4, 2.56, 7.6)))
+HALL = HouseModel.of(one_room(6.0, 4.0))
+GAPS = HouseModel.of(one_room(5.0, 9.0, (2.44, 1.4, 2.56, 7.6)))
 """Two halls and a wall between them: one way past its lower end, one past its upper end."""
 
 
@@ -196,7 +148,7 @@ def test_two_parcels_need_an_empty_hand():
         assert expert.picks >= 2
         assert Action.DROP in expert.actions
     wide = [at(PARCEL, 2.5, 0.75), at(PARCEL, 2.5, 8.25)]
-    house = room(5.0, 9.0, (2.44, 1.4, 2.56, 7.6))
+    house = one_room(5.0, 9.0, (2.44, 1.4, 2.56, 7.6))
     assert expert_of(HouseModel.of(house), wide, (4, 3, 0), (16, 3)) is not None
 
 
@@ -313,13 +265,16 @@ def experts():
 
 
 def test_processes_agree(episodes):
-    code = f"import runpy; print(runpy.run_path({__file__!r})['experts']())"
+    folders = [str(folder) for folder in Path(__file__).parents[:2]]
+    code = (
+        f"import sys; sys.path[:0] = {folders}; from test_expert import experts; print(experts())"
+    )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == experts()
 
 
 def test_things_that_stand_apart_do_not_matter():
     near = [at(PARCEL, 2.5, 0.75)]
-    far = [*near, at(block("Crate_1", (0.2, 0.2, 0.5), 2.0, pushable=True), 5.6, 0.3)]
+    far = [*near, at(crate("Crate_1", (0.2, 0.2, 0.5), mass_kg=2.0), 5.6, 0.3)]
     alone = expert_of(CORRIDOR, near, (4, 3, 0), (14, 3))
     assert expert_of(CORRIDOR, far, (4, 3, 0), (14, 3)).steps == alone.steps

@@ -9,58 +9,32 @@ import statistics
 from collections import defaultdict, deque
 
 import pytest
+from builders import UPRIGHT, crate, one_room
+from builders import WALL_HALF_M as HALF
 
 from internav_data.navigation import Lattice
 from internav_data.physics import Body
 from internav_data.planner.search import solve
-from internav_data.records import Asset, House, Part, Pose, Room, Wall
+from internav_data.records import Pose
 from internav_data.world import Action, HouseModel, World
 
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-HALF = 0.06
-HIGH = 2.6
 AHEAD = ((1, 0), (0, 1), (-1, 0), (0, -1))
 ACTIONS = tuple(a for a in range(12) if a not in (Action.LOOK_DOWN, Action.LOOK_UP))
 MAX_WORLDS = 30_000
 
 
-def block(name, size, mass_kg, **flags):
-    part = Part("box", (0.0, 0.0, size[2] / 2.0), size, UPRIGHT, (), (150, 110, 70), "wood")
-    return Asset(
-        name, name, size, mass_kg, 0.6, flags.get("pushable", True), flags.get("pickable", False),
-        True, True, (part,),
-    )  # fmt: skip
+CRATE = crate("Crate_7", (0.8, 0.8, 0.5), mass_kg=12.0)
+HEAVY = crate("Chest_7", (0.8, 0.8, 0.5), mass_kg=28.0)
+LONG = crate("Bench_7", (0.4, 1.1, 0.4), mass_kg=15.0)
+PARCEL = crate("Parcel_7", (0.8, 0.8, 0.5), mass_kg=3.0, pushable=False, pickable=True)
 
 
-CRATE = block("Crate_7", (0.8, 0.8, 0.5), 12.0)
-HEAVY = block("Chest_7", (0.8, 0.8, 0.5), 28.0)
-LONG = block("Bench_7", (0.4, 1.1, 0.4), 15.0)
-PARCEL = block("Parcel_7", (0.8, 0.8, 0.5), 3.0, pushable=False, pickable=True)
-
-
-def house(width, depth, *inner):
-    """One room; inner walls are (low x, low y, high x, high y)."""
-    sides = (
-        (-HALF, -HALF, width + HALF, HALF),
-        (-HALF, depth - HALF, width + HALF, depth + HALF),
-        (-HALF, HALF, HALF, depth - HALF),
-        (width - HALF, HALF, width + HALF, depth - HALF),
-    )
-    corners = ((0.0, 0.0), (width, 0.0), (width, depth), (0.0, depth))
-    return House(
-        scene_id="scene-000000", scene=0, seed=0, split="train", preset="paper", outline=corners,
-        rooms=(Room(0, "living_room", corners, width * depth, HIGH, "oak", "white"),), doors=(),
-        windows=(), walls=tuple(Wall(*side, 0.0, HIGH) for side in (*sides, *inner)), objects=(),
-        materials=(), room_graph=(), area_m2=width * depth, assets={},
-    )  # fmt: skip
-
-
-CORRIDOR = HouseModel.of(house(6.0, 1.5))
+CORRIDOR = HouseModel.of(one_room(6.0, 1.5))
 """Three nodes wide."""
-WIDE = HouseModel.of(house(5.0, 2.25))
-DOOR = HouseModel.of(house(5.0, 3.0, (2.44, HALF, 2.56, 1.0), (2.44, 2.0, 2.56, 3.0 - HALF)))
+WIDE = HouseModel.of(one_room(5.0, 2.25))
+DOOR = HouseModel.of(one_room(5.0, 3.0, (2.44, HALF, 2.56, 1.0), (2.44, 2.0, 2.56, 3.0 - HALF)))
 """Two rooms and a gap of 1 m between them."""
-BEND = HouseModel.of(house(3.5, 3.5, (1.5, HALF, 3.5 - HALF, 2.0)))
+BEND = HouseModel.of(one_room(3.5, 3.5, (1.5, HALF, 3.5 - HALF, 2.0)))
 """A corridor round a corner."""
 
 CASES = {

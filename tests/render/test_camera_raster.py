@@ -2,6 +2,7 @@
 
 import math
 
+import builders
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -11,7 +12,7 @@ from internav_data import generate_house
 from internav_data.catalog import catalogue, part_triangles
 from internav_data.geometry import yaw_quaternion
 from internav_data.navigation import Lattice
-from internav_data.records import Part, Pose
+from internav_data.records import Pose
 from internav_data.render.asset_mesh import flat_faces, model_of
 from internav_data.render.camera import Camera, CameraView, StaticScene, camera_axes
 from internav_data.render.rasterise import fill, scan
@@ -97,10 +98,8 @@ def test_the_nearer_face_wins_whichever_comes_first():
 
 @pytest.mark.parametrize(("shape", "faces"), [("box", 6), ("cylinder", 18)])
 def test_flat_faces_are_joined(shape, faces):
-    part = Part(
-        shape, (0.1, 0.2, 0.3), (0.4, 0.5, 0.6), yaw_quaternion(20.0), (), (1, 2, 3), "wood"
-    )
-    assert len(flat_faces(*part_triangles(part))) == faces
+    turned = builders.part(shape, (0.1, 0.2, 0.3), (0.4, 0.5, 0.6), yaw_quaternion(20.0))
+    assert len(flat_faces(*part_triangles(turned))) == faces
 
 
 def test_models_are_closed_and_as_large_as_their_meshes():

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import scenery
-from scenery import ASSETS, Grid, obstacle, small_scenes, thing
+from builders import scene_object
+from scenery import ASSETS, Grid, obstacle, small_scenes
 
 from internav_data.episodes.outcomes import outcomes_of
 from internav_data.physics import Body, get_engine, settle
@@ -64,7 +65,7 @@ def played(house, episode, model="force"):
 
 def crowded():
     """A safe and a pot before the door, and furniture where the pot goes when it is pushed."""
-    things = (thing(0, "Table_1", 0, 1.0, 0.6), thing(1, "Box_2", 0, 3.4, 2.7))
+    things = (scene_object(0, "Table_1", 0, 1.0, 0.6), scene_object(1, "Box_2", 0, 3.4, 2.7))
     house = Grid(2, 1).house(2, things)
     pot = obstacle("Pot_1", 3.4, 2.1)
     safe = obstacle("Safe_1", 3.4, 1.4)

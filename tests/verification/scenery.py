@@ -7,68 +7,23 @@ from collections import deque
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
+import builders
+from builders import WALL_HALF_M as HALF_WALL
+from builders import crate, part
+
 from internav_data.dataset import Identity, assemble, open_staging, stage_scene
-from internav_data.records import (
-    Asset,
-    Door,
-    Episode,
-    Goal,
-    House,
-    Material,
-    NodePath,
-    Obstacle,
-    Part,
-    Physics,
-    Pose,
-    Room,
-    SceneObject,
-    Start,
-    Wall,
+from internav_data.records import Asset, NodePath, Physics, Pose
+
+ASSETS = builders.by_id(
+    crate("Box_1", (0.6, 0.6, 0.5), mass_kg=8.0),
+    crate("Box_2", (0.3, 0.4, 0.6), mass_kg=8.0),
+    crate("Bar_1", (1.2, 0.2, 0.7), mass_kg=8.0),
+    builders.asset("Drum_1", part("cylinder", (0.0, 0.0, 0.3), (0.5, 0.5, 0.6)), mass_kg=8.0),
+    crate("Pot_1", (0.4, 0.4, 0.4), mass_kg=3.0, pickable=True),
+    crate("Safe_1", (0.6, 0.6, 0.9), mass_kg=300.0),
+    builders.table("Table_1", (1.4, 0.8, 0.75), inset_m=0.03, mass_kg=8.0, spawnable=False),
+    crate("Cupboard_1", (1.0, 0.5, 1.8), mass_kg=8.0, spawnable=False),
 )
-
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-HALF_WALL = 0.06
-DOOR = 1.0
-
-
-def part(shape, centre, size):
-    return Part(shape, centre, size, UPRIGHT, (), (120, 90, 60), "wood")
-
-
-def asset(asset_id, size, parts=None, *, mass=8.0, spawnable=True, pickable=False):
-    parts = parts or (part("box", (0.0, 0.0, size[2] / 2), size),)
-    return Asset(
-        asset_id, asset_id.split("_")[0], size, mass, 0.6, True, pickable, spawnable, True, parts
-    )
-
-
-def table(asset_id, width, depth, height):
-    legs = [
-        part(
-            "box",
-            (x * (width - 0.06) / 2, y * (depth - 0.06) / 2, height / 2 - 0.02),
-            (0.06, 0.06, height - 0.04),
-        )
-        for x in (-1, 1)
-        for y in (-1, 1)
-    ]
-    top = part("box", (0.0, 0.0, height - 0.02), (width, depth, 0.04))
-    return asset(asset_id, (width, depth, height), (*legs, top), spawnable=False)
-
-
-ASSETS = {
-    a.asset_id: a
-    for a in (
-        asset("Box_1", (0.6, 0.6, 0.5)),
-        asset("Box_2", (0.3, 0.4, 0.6)),
-        asset("Bar_1", (1.2, 0.2, 0.7)),
-        asset("Drum_1", (0.5, 0.5, 0.6), (part("cylinder", (0.0, 0.0, 0.3), (0.5, 0.5, 0.6)),)),
-        asset("Pot_1", (0.4, 0.4, 0.4), mass=3.0, pickable=True),
-        asset("Safe_1", (0.6, 0.6, 0.9), mass=300.0),
-        table("Table_1", 1.4, 0.8, 0.75),
-        asset("Cupboard_1", (1.0, 0.5, 1.8), spawnable=False),
-    )
-}
 
 
 @dataclass(frozen=True)
@@ -83,48 +38,23 @@ class Grid:
         lines_x = [k * self.side - HALF_WALL for k in range(self.columns + 1)]
         lines_y = [k * self.side - HALF_WALL for k in range(self.rows + 1)]
         rooms = tuple(
-            Room(
+            builders.room(
                 self.number(c, r),
-                "living",
-                (
-                    (lines_x[c], lines_y[r]),
-                    (lines_x[c + 1], lines_y[r]),
-                    (lines_x[c + 1], lines_y[r + 1]),
-                    (lines_x[c], lines_y[r + 1]),
-                ),
+                builders.rectangle(lines_x[c], lines_y[r], lines_x[c + 1], lines_y[r + 1]),
                 self.side**2,
-                2.6,
-                "oak",
-                "white",
             )
             for r in range(self.rows)
             for c in range(self.columns)
         )
         doors, walls = self._doors_and_walls(lines_x, lines_y)
-        outline = (
-            (lines_x[0], lines_y[0]),
-            (lines_x[-1], lines_y[0]),
-            (lines_x[-1], lines_y[-1]),
-            (lines_x[0], lines_y[-1]),
-        )
-        return House(
-            scene_id=f"scene-{scene:06d}",
-            scene=scene,
-            seed=0,
-            split="train",
-            preset="paper",
-            outline=outline,
-            rooms=rooms,
-            doors=tuple(doors),
-            windows=(),
-            walls=tuple(walls),
+        return builders.house(
+            rooms,
+            builders.rectangle(lines_x[0], lines_y[0], lines_x[-1], lines_y[-1]),
+            scene,
+            doors=doors,
+            walls=walls,
             objects=tuple(things),
-            materials=(
-                Material("oak", (120, 90, 60), "planks"),
-                Material("white", (250,) * 3, "plain"),
-            ),
             room_graph=tuple(sorted(d.rooms for d in doors)),
-            area_m2=self.side**2 * len(rooms),
             assets=ASSETS,
         )
 
@@ -139,12 +69,12 @@ class Grid:
                 middle = (lines_y[r] + lines_y[r + 1]) / 2
                 if inner:
                     pair = (self.number(c - 1, r), self.number(c, r))
-                    doors.append(Door(len(doors), pair, "single", x, middle, 90.0, DOOR, 2.1, True))
+                    doors.append(builders.door(len(doors), pair, x, middle))
                 for low, high in self._pieces(lines_y[r], lines_y[r + 1], middle, inner):
-                    walls.append(Wall(x - HALF_WALL, low, x + HALF_WALL, high, 0.0, 2.6))
+                    walls.append(builders.wall(x - HALF_WALL, low, x + HALF_WALL, high))
                 if inner:
                     walls.append(
-                        Wall(x - HALF_WALL, middle - 0.5, x + HALF_WALL, middle + 0.5, 2.1, 2.6)
+                        builders.lintel(x - HALF_WALL, middle - 0.5, x + HALF_WALL, middle + 0.5)
                     )
         for r, y in enumerate(lines_y):
             for c in range(self.columns):
@@ -152,12 +82,12 @@ class Grid:
                 middle = (lines_x[c] + lines_x[c + 1]) / 2
                 if inner:
                     pair = (self.number(c, r - 1), self.number(c, r))
-                    doors.append(Door(len(doors), pair, "single", middle, y, 0.0, DOOR, 2.1, True))
+                    doors.append(builders.door(len(doors), pair, middle, y, 0.0))
                 for low, high in self._pieces(lines_x[c], lines_x[c + 1], middle, inner):
-                    walls.append(Wall(low, y - HALF_WALL, high, y + HALF_WALL, 0.0, 2.6))
+                    walls.append(builders.wall(low, y - HALF_WALL, high, y + HALF_WALL))
                 if inner:
                     walls.append(
-                        Wall(middle - 0.5, y - HALF_WALL, middle + 0.5, y + HALF_WALL, 2.1, 2.6)
+                        builders.lintel(middle - 0.5, y - HALF_WALL, middle + 0.5, y + HALF_WALL)
                     )
         return doors, walls
 
@@ -167,32 +97,8 @@ class Grid:
         return ((low, middle - 0.5), (middle + 0.5, high)) if inner else ((low, high),)
 
 
-def thing(number, asset_id, room, x, y, *, yaw_deg=0.0, group=-1):
-    half = math.radians(yaw_deg) / 2
-    turn = (0.0, 0.0, round(math.sin(half), 6), round(math.cos(half), 6))
-    return SceneObject(number, asset_id, asset_id.split("_")[0], room, x, y, 0.0, turn, group, -1)
-
-
 def obstacle(asset_id, x, y, *, yaw_deg=0.0):
-    half = math.radians(yaw_deg) / 2
-    turn = (0.0, 0.0, round(math.sin(half), 6), round(math.cos(half), 6))
-    a = ASSETS[asset_id]
-    return Obstacle(
-        asset_id,
-        a.type,
-        x,
-        y,
-        0.0,
-        turn,
-        a.mass_kg,
-        a.friction,
-        a.pushable,
-        a.pickable,
-        0,
-        0.1,
-        0.0001,
-        None,
-    )
+    return builders.obstacle(ASSETS[asset_id], x, y, yaw_deg=yaw_deg, penetration_m=0.0001)
 
 
 def _rectangle(a: Asset, pose: Pose):
@@ -324,29 +230,21 @@ def episode(house, index, start, goal, obstacles, *, shortest_path_m, obstructed
         doors = [door_of[min(a, b), max(a, b)] for a, b in pairwise(path)]
         points = (ends[0], *((d.x, d.y) for d in doors), ends[1])
         node_paths.append(NodePath(tuple(d.door_id for d in doors), points))
-    return Episode(
-        episode_id=f"{house.scene_id}/{index:04d}",
-        scene_id=house.scene_id,
-        split=house.split,
+    return builders.episode(
+        house,
+        builders.start(*start, yaw, rooms[0]),
+        builders.goal(*goal, rooms[1]),
+        obstacles,
         index=index,
-        seed=0,
-        room_count=len(house.rooms),
         mode="blocked" if (house.scene + index) % 2 == 0 else "lengthened",
         sealed=obstructed_path_m is None,
         rooms_on_path=len(paths[0]),
-        obstacle_count=len(obstacles),
         shortest_path_m=shortest_path_m,
         shortest_path_steps=brute_steps(house, start, goal),
         obstructed_path_m=obstructed_path_m,
         obstructed_path_steps=brute_steps(house, start, goal, obstacles),
-        start=Start(*start, *ends[0], yaw, rooms[0]),
-        goal=Goal(*goal, *ends[1], rooms[1]),
         room_paths=paths,
-        room_paths_truncated=False,
         node_paths=tuple(node_paths),
-        node_paths_truncated=False,
-        obstacles=tuple(obstacles),
-        expert=None,
         physics=Physics("bullet", "3.2.7", 0.1, 0.0001),
     )
 
@@ -376,9 +274,9 @@ def small_scenes():
 def _scene(number):
     split = {0: "val", 1: "test"}.get(number, "train")
     things = (
-        thing(0, "Table_1", 0, 1.0, 0.6),
-        thing(1, "Cupboard_1", 1, 6.0, 3.5),
-        thing(2, "Box_1", 1, 6.5, 0.5, yaw_deg=45.0),
+        builders.scene_object(0, "Table_1", 0, 1.0, 0.6),
+        builders.scene_object(1, "Cupboard_1", 1, 6.0, 3.5),
+        builders.scene_object(2, "Box_1", 1, 6.5, 0.5, yaw_deg=45.0),
     )
     house = replace(Grid(2, 1).house(number, things), split=split)
     start, goal = (4, 8), (28, 8)

@@ -2,15 +2,18 @@
 
 import ast
 import math
+import re
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
+from builders import scene_object
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenery import ASSETS, Grid, brute_steps, obstacle, taut, thing
+from scenery import ASSETS, Grid, brute_steps, obstacle, taut
 from shapely import box
 
 import internav_data.verification
@@ -32,27 +35,48 @@ from internav_data.verification.visibility_graph import (
 
 HERE = Path(internav_data.verification.__file__).parent
 FORBIDDEN = (
-    "catalog", "camp", "envs", "episodes", "evaluation", "generation", "geometry", "houses",
+    "camp", "catalog", "envs", "episodes", "evaluation", "generation", "geometry", "houses",
     "navigation", "physics", "planner", "records.agent", "render", "views", "world",
 )  # fmt: skip
+SHARED = ("physics", "world")
+"""What `replay` alone may import: physics is a pure function, and the world asks it."""
 
 
-PHYSICS = ("internav_data.physics", "internav_data.world")
-"""What is shared by design, and where alone: physics is a pure function."""
+def imported(path):
+    """Names that a file imports by any statement; ours in strings that are a name or an import."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield from re.findall(r"(?:^|import |from )(internav_data(?:\.\w+)+)", node.value)
 
 
-def test_nothing_of_the_generator_is_imported():
-    for path in HERE.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
-            names = []
-            if isinstance(node, ast.ImportFrom):
-                names = [node.module or ""]
-            elif isinstance(node, ast.Import):
-                names = [alias.name for alias in node.names]
-            for name in names:
-                if path.parent.name == "replay" and name.startswith(PHYSICS):
-                    continue
-                assert not name.startswith(tuple(f"internav_data.{f}" for f in FORBIDDEN)), path
+def within(name, rooms):
+    return any(f"{name}.".startswith(f"internav_data.{room}.") for room in rooms)
+
+
+@pytest.mark.parametrize("path", sorted(HERE.rglob("*.py")), ids=lambda path: path.stem)
+def test_nothing_of_the_generator_is_imported(path):
+    rooms = set(FORBIDDEN) - set(SHARED if path.parent.name == "replay" else ())
+    names = set(imported(path))
+    assert names, "each has an import of ours"
+    assert [name for name in names if within(name, rooms)] == []
+
+
+def test_contracts_name_every_module_and_every_room():
+    project = tomllib.loads((HERE.parents[1] / "pyproject.toml").read_text())
+    contracts = {c["name"].split(":")[0]: c for c in project["tool"]["importlinter"]["contracts"]}
+    proof = contracts["Proof by other means"]
+    replay = contracts["Replay asks physics and the world again, and nothing else"]
+    own = {f"internav_data.verification.{p.stem}" for p in HERE.glob("*.py")}
+    assert set(proof["source_modules"]) == own - {"internav_data.verification.__init__"}
+    above = {"internav_data.camp", "internav_data.evaluation"}  # forbidden by the layers
+    rooms = {f"internav_data.{room}" for room in FORBIDDEN} - above
+    assert set(proof["forbidden_modules"]) == rooms
+    assert set(replay["forbidden_modules"]) == rooms - {f"internav_data.{r}" for r in SHARED}
 
 
 # shapes
@@ -126,7 +150,8 @@ def furnished(*things):
 
 def test_steps_are_those_of_a_brute_force():
     house = furnished(
-        thing(0, "Table_1", 0, 1.5, 2.5, yaw_deg=30.0), thing(1, "Drum_1", 1, 6.0, 2.0)
+        scene_object(0, "Table_1", 0, 1.5, 2.5, yaw_deg=30.0),
+        scene_object(1, "Drum_1", 1, 6.0, 2.0),
     )
     layout = CheckedLayout(house, Shapes(ASSETS))
     for x, y, yaw in ((2.5, 2.0, 90.0), (3.3, 2.2, 75.0), (5.0, 1.5, 15.0)):
@@ -154,7 +179,7 @@ def test_exact_ties_are_free():
 def test_lattice_is_that_of_the_generator(spots):
     house = furnished(
         *(
-            thing(k, "Bar_1", 0, round(x, 4), round(y, 4), yaw_deg=15.0 * turn)
+            scene_object(k, "Bar_1", 0, round(x, 4), round(y, 4), yaw_deg=15.0 * turn)
             for k, (x, y, turn) in enumerate(spots)
         )
     )
@@ -207,7 +232,7 @@ def test_gap_as_wide_as_the_disc_is_open():
     )
 )
 def test_ways_are_those_of_the_generator(spots):
-    house = furnished(thing(0, "Table_1", 0, 1.5, 2.5, yaw_deg=30.0))
+    house = furnished(scene_object(0, "Table_1", 0, 1.5, 2.5, yaw_deg=30.0))
     layout = CheckedLayout(house, Shapes(ASSETS))
     placed = [
         obstacle("Bar_1", round(x, 4), round(y, 4), yaw_deg=15.0 * turn) for x, y, turn in spots
@@ -231,7 +256,9 @@ def test_ways_are_those_of_the_generator(spots):
 @settings(deadline=None, max_examples=30)
 @given(st.tuples(st.integers(1, 31), st.integers(1, 31), st.integers(1, 31), st.integers(1, 31)))
 def test_portals_bound_from_below(nodes):
-    house = Grid(2, 2).house(3, (thing(0, "Table_1", 0, 1.5, 2.5), thing(1, "Bar_1", 3, 6.0, 6.0)))
+    house = Grid(2, 2).house(
+        3, (scene_object(0, "Table_1", 0, 1.5, 2.5), scene_object(1, "Bar_1", 3, 6.0, 6.0))
+    )
     layout = CheckedLayout(house, Shapes(ASSETS))
     a, b = (0.25 * nodes[0], 0.25 * nodes[1]), (0.25 * nodes[2], 0.25 * nodes[3])
     if not (

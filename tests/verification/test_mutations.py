@@ -4,7 +4,7 @@ import json
 from dataclasses import replace
 
 import pytest
-import scenery
+from builders import crate, scene_object
 from scenery import ASSETS, obstacle, small_scenes, write_dataset
 
 from internav_data.dataset import read_manifest, write_manifest
@@ -326,7 +326,7 @@ def test_asset_of_another_mass(tmp_path, scenes):
 
 
 def test_asset_of_another_shape(tmp_path, scenes):
-    assets = {**ASSETS, "Box_2": scenery.asset("Box_2", (0.3, 0.3, 0.6))}
+    assets = {**ASSETS, "Box_2": crate("Box_2", (0.3, 0.3, 0.6), mass_kg=8.0)}
     assert "episode.obstructed-path-m" in predicates(judged(tmp_path, scenes, assets))
 
 
@@ -438,23 +438,23 @@ def test_house_says_something_untrue(tmp_path, scenes, case):
 def test_room_cut_off_by_furniture(tmp_path, scenes):
     house = scenes[0][0]
     barrier = [
-        scenery.thing(3 + k, "Bar_1", 1, 4.9, 0.61 + 1.21 * k, yaw_deg=90.0) for k in range(3)
+        scene_object(3 + k, "Bar_1", 1, 4.9, 0.61 + 1.21 * k, yaw_deg=90.0) for k in range(3)
     ]
-    barrier.append(scenery.thing(6, "Box_2", 1, 4.9, 3.83))
+    barrier.append(scene_object(6, "Box_2", 1, 4.9, 3.83))
     findings = judged(tmp_path, change_house(scenes, 0, objects=(*house.objects[:1], *barrier)))
     assert "house.reachable" in predicates(findings), findings.summary()
 
 
 def test_things_of_a_group_may_interlock(tmp_path, scenes):
     house = scenes[0][0]
-    beside = scenery.thing(3, "Box_2", 0, 1.0, 0.5, group=1)
+    beside = scene_object(3, "Box_2", 0, 1.0, 0.5, group=1)
     together = (replace(house.objects[0], group=1), *house.objects[1:], beside)
     assert judged(tmp_path, change_house(scenes, 0, objects=together)).ok
 
 
 def test_things_may_hang_on_walls(tmp_path, scenes):
     house = scenes[0][0]
-    picture = scenery.thing(3, "Box_2", 0, 0.16, 2.5)
+    picture = scene_object(3, "Box_2", 0, 0.16, 2.5)
     hung = (*house.objects, replace(picture, z=1.9))
     assert judged(tmp_path, change_house(scenes, 0, objects=hung)).ok
 

@@ -9,7 +9,8 @@ from dataclasses import replace
 import physical
 import pytest
 import scenery
-from scenery import ASSETS, Grid, brute_steps, thing, write_dataset
+from builders import asset, part, scene_object
+from scenery import ASSETS, Grid, brute_steps, write_dataset
 
 import internav_data.world.world
 from internav_data.navigation import Lattice
@@ -191,9 +192,9 @@ def test_settled_otherwise(scenes, case):
 
 def test_what_topples_was_not_settled(scenes):
     # A tray on one leg in its corner covers what the box covers, and cannot stand.
-    tray = scenery.part("box", (0.0, 0.0, 0.59), (0.3, 0.4, 0.02))
-    leg = scenery.part("box", (0.14, 0.19, 0.29), (0.02, 0.02, 0.58))
-    assets = {**ASSETS, "Box_2": scenery.asset("Box_2", (0.3, 0.4, 0.6), (tray, leg))}
+    tray = part("box", (0.0, 0.0, 0.59), (0.3, 0.4, 0.02))
+    leg = part("box", (0.14, 0.19, 0.29), (0.02, 0.02, 0.58))
+    assets = {**ASSETS, "Box_2": asset("Box_2", tray, leg, mass_kg=8.0)}
     assert "physics.settle-refused" in found_in(scenes, 1, 1, assets)
 
 
@@ -341,9 +342,7 @@ def test_what_leans_through_a_window_is_not_in_the_wall(scenes):
     sill, lintel = replace(wall, z_max=0.9), replace(wall, z_min=2.1)
     walls = tuple(w for w in house.walls if w is not wall)
     x, y = (wall.x_min + wall.x_max) / 2, (wall.y_min + wall.y_max) / 2
-    board = scenery.asset(
-        "Board", (0.4, 0.4, 0.04), (scenery.part("box", (0.0,) * 3, (0.4, 0.4, 0.04)),)
-    )
+    board = asset("Board", part("box", (0.0,) * 3, (0.4, 0.4, 0.04)))
     assets = {**ASSETS, "Board": board}
     for through, sills in ((house, 0), (replace(house, walls=(*walls, sill, lintel)), 1)):
         scene = CheckedScene(CheckedLayout(through, Shapes(assets)), FORCE)
@@ -354,8 +353,8 @@ def test_what_leans_through_a_window_is_not_in_the_wall(scenes):
 
 def test_what_carries_something_is_not_picked_up(scenes):
     house, episodes = scenes[2]
-    tall = scenery.part("box", (0.0, 0.0, 0.602), (0.3, 0.4, 0.396))
-    assets = {**ASSETS, "Bar_1": scenery.asset("Bar_1", (0.3, 0.4, 0.6), (tall,))}
+    tall = part("box", (0.0, 0.0, 0.602), (0.3, 0.4, 0.396))
+    assets = {**ASSETS, "Bar_1": asset("Bar_1", tall, size=(0.3, 0.4, 0.6), mass_kg=8.0)}
 
     def at(asset_id, x):
         return MovableObject.of(Body.of(assets[asset_id], Pose(x, 2.0, 0.0, (0.0, 0.0, 0.0, 1.0))))
@@ -370,8 +369,8 @@ def test_what_carries_something_is_not_picked_up(scenes):
 
 
 def test_furniture_that_was_moved_is_no_longer_where_it_stood():
-    bar = thing(0, "Bar_1", 0, 3.5, 1.94, yaw_deg=90.0)
-    house = Grid(2, 1).house(2, (bar, thing(1, "Table_1", 0, 1.0, 0.6)))
+    bar = scene_object(0, "Bar_1", 0, 3.5, 1.94, yaw_deg=90.0)
+    house = Grid(2, 1).house(2, (bar, scene_object(1, "Table_1", 0, 1.0, 0.6)))
     scene = CheckedScene(CheckedLayout(house, Shapes(ASSETS)), FORCE)
     items = scene.model.items
     assert [item.asset.asset_id for item in items] == ["Bar_1"]

@@ -2,20 +2,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from builders import asset, box
 
 from internav_data.catalog import OBSTACLES, catalogue
-from internav_data.records import Asset, Part
 from internav_data.records.errors import UsageError
 from internav_data.views.asset_sheet import draw_asset_sheet, draw_assets, write_asset_sheet
 
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-
 
 def boxes(*parts):
-    made = tuple(
-        Part("box", centre, size, UPRIGHT, (), colour, "wood") for centre, size, colour in parts
-    )
-    return Asset("Thing_01", "Thing", (1.0, 1.0, 1.0), 1.0, 0.5, True, False, True, True, made)
+    made = (box(*one) for one in parts)
+    return asset("Thing_01", *made)
 
 
 def red(image):

@@ -2,12 +2,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from builders import UPRIGHT, asset, box, part
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import MultiPoint, Polygon
 
 from internav_data.geometry import transform, yaw_quaternion
-from internav_data.records import Asset, Part, Pose
+from internav_data.records import Pose
 from internav_data.views.canvas import OVERSAMPLING, Canvas
 from internav_data.views.captions import with_caption
 from internav_data.views.silhouettes import shaded, silhouettes
@@ -86,13 +87,12 @@ def test_long_captions_are_broken_and_nothing_is_cut_off():
 @settings(max_examples=30, deadline=None)
 @given(st.floats(0.0, 360.0), st.floats(-3.0, 3.0), st.tuples(*[st.floats(0.05, 2.0)] * 3))
 def test_an_outline_is_the_hull_of_the_projected_corners(yaw, x, size):
-    part = Part("box", (0.1, -0.2, 0.5), size, (0.0, 0.0, 0.0, 1.0), (), (100, 90, 80), "wood")
-    asset = Asset("Box_0", "Box", size, 1.0, 0.6, False, True, True, True, (part,))
+    one = box((0.1, -0.2, 0.5), size)
     pose = Pose(x, 1.0, 0.0, yaw_quaternion(yaw))
-    (outline,) = silhouettes(asset, pose)
+    (outline,) = silhouettes(asset("Box_0", one), pose)
     half = np.array(size) / 2.0
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
-    corners = transform(signs * half + np.array(part.centre), pose)
+    corners = transform(signs * half + np.array(one.centre), pose)
     hull = MultiPoint(corners[:, :2]).convex_hull
     assert Polygon(outline.plan).symmetric_difference(hull).area < 1e-4
     assert outline.top_m == pytest.approx(0.5 + size[2] / 2.0)
@@ -102,9 +102,8 @@ def test_an_outline_is_the_hull_of_the_projected_corners(yaw, x, size):
 def test_a_leaning_face_is_darker_on_the_far_side_from_the_light():
     roof = ((-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (-1.0, 1.0, 0.0), (1.0, 1.0, 0.0))
     ridge = ((0.0, -1.0, 1.0), (0.0, 1.0, 1.0))
-    part = Part("hull", (0, 0, 0), (2, 2, 1), (0, 0, 0, 1), (*roof, *ridge), (90, 90, 90), "wood")
-    asset = Asset("Box_1", "Box", (2, 2, 1), 1.0, 0.6, False, True, True, True, (part,))
-    (outline,) = silhouettes(asset, Pose(0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 1.0)))
+    hull = part("hull", (0, 0, 0), (2, 2, 1), corners=(*roof, *ridge))
+    (outline,) = silhouettes(asset("Roof_0", hull), Pose(0.0, 0.0, 0.0, UPRIGHT))
     west = [s for f, s in zip(outline.faces, outline.shades, strict=True) if f[:, 0].mean() < 0]
     east = [s for f, s in zip(outline.faces, outline.shades, strict=True) if f[:, 0].mean() > 0]
     assert min(west) > max(east)
