@@ -109,7 +109,13 @@ def lived(
     episodes = load_dataset(dataset, "train")
     size, count = config.network.image_size, config.ppo.num_envs
     env = InterNavVectorEnv(
-        count, episodes, size, autoreset=False, copy=False, ids=agent.wants_ids, max_steps=MAX_STEPS
+        count,
+        episodes,
+        size,
+        autoreset=False,
+        copy=False,
+        sensors=agent.sensors,
+        max_steps=MAX_STEPS,
     )
     return agent, env, Collector(env, agent)
 

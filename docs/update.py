@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -90,6 +91,36 @@ def room_types() -> str:
     return f"- Types: {', '.join(sorted(ROOM_TYPES))}. Up to 40 rooms."
 
 
+def sensors() -> str:
+    """Return the table of sensors."""
+    from gymnasium import spaces  # noqa: PLC0415 - seconds
+
+    from internav_data.envs.sensors import SENSORS  # noqa: PLC0415
+
+    size = 987  # stands for S: no bound or channel count is the same number
+    rows = []
+    for sensor in SENSORS.values():
+        space = sensor.space(size)
+        if isinstance(space, spaces.Box):
+            bounds = _bounds(space.low.ravel().tolist()), _bounds(space.high.ravel().tolist())
+        else:
+            bounds = "0", str(int(space.n) - 1)  # type: ignore[attr-defined] # a Discrete
+        shape = f"{space.shape} ".replace(str(size), "S") if space.shape else ""
+        key = f"| `{sensor.name}` | {shape}{space.dtype}"
+        rows.append(" | ".join([key, sensor.unit, *bounds, f"{sensor.description} |"]))
+    head = ["| key | shape, type | unit | min | max | |", "|---|---|---|---|---|---|"]
+    return "\n".join([*head, *rows]).replace("|  |", "| |")
+
+
+def _bounds(values: list[float]) -> str:
+    """Write bounds: one for all elements, or one each."""
+    words = []
+    for value in dict.fromkeys(values):
+        number = "π" if math.isclose(abs(value), math.pi, abs_tol=1e-6) else f"{abs(value):.0f}"
+        words.append(f"−{number}" if value < 0 else number)  # noqa: RUF001 - minus
+    return ", ".join(words)
+
+
 def commands() -> str:
     """Return the commands as a table."""
     rows = [f"| `internav-gen {name}` | {text} |" for name, text in COMMANDS.items()]
@@ -112,8 +143,12 @@ def updated() -> dict[Path, str]:
     return {
         readme: replaced(readme.read_text(encoding="utf-8"), "commands", commands()),
         configuration: replaced(configuration.read_text(encoding="utf-8"), "settings", settings()),
-        environment: replaced(environment.read_text(encoding="utf-8"), "actions", actions()),
         plans: replaced(plans.read_text(encoding="utf-8"), "room types", room_types()),
+        environment: replaced(
+            replaced(environment.read_text(encoding="utf-8"), "actions", actions()),
+            "sensors",
+            sensors(),
+        ),
         training: replaced(written, "training settings", training_settings()),
     }
 

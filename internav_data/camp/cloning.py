@@ -270,5 +270,5 @@ def _demonstrations(trainer: Trainer) -> tuple[range, Environments, Demonstratio
     config, agent = trainer.config, trainer.agent
     own = trainer.ranks.share(config.cloning.num_envs, "cloning.num_envs")
     tasks = ("interactive",) * len(own)
-    env = trainer.data.environments(config, tasks, ids=agent.wants_ids)
+    env = trainer.data.environments(config, tasks, agent.sensors)
     return own, env, Demonstrations(env, agent, experts_of(trainer.data.episodes()))

@@ -68,21 +68,26 @@ class TrainingData:
         return found
 
     def of_stage(
-        self, stage: TrainingStage, config: CampConfig, own: range, *, ids: bool
+        self, stage: TrainingStage, config: CampConfig, own: range, sensors: Sequence[str]
     ) -> Environments:
         """Return those environments of a stage whose numbers are in `own`."""
         tasks = stage.tasks[own.start : own.stop] or ("interactive",) * len(own)
-        return self.environments(config, tasks, ids=ids, single_room=stage.single_room)
+        return self.environments(config, tasks, sensors, single_room=stage.single_room)
 
     def environments(
-        self, config: CampConfig, tasks: Sequence[str], *, ids: bool, single_room: bool = False
+        self,
+        config: CampConfig,
+        tasks: Sequence[str],
+        sensors: Sequence[str],
+        *,
+        single_room: bool = False,
     ) -> Environments:
         """Return environments of the training split, a task each."""
         from internav_data.envs.make import make_vector  # noqa: PLC0415 - the camera's kernels
 
         env: Any = make_vector(
             len(tasks), self.episodes(single_room=single_room), min(config.run.workers, len(tasks)),
-            autoreset=False, copy=False, ids=ids, task=tuple(tasks),
+            autoreset=False, copy=False, sensors=sensors, task=tuple(tasks),
             image_size=config.network.image_size, max_steps=config.run.max_steps,
             failed_done_reward=config.data.failed_done_reward,
             house_cache_size=config.data.house_cache_size,
@@ -95,8 +100,7 @@ class TrainingData:
         episodes = load_dataset(self.path, "val", self._where or None)
         if not limit or not len(episodes):
             return None
-        size, ids = config.network.image_size, agent.wants_ids
-        policy = AgentPolicy(method, agent, size, greedy=False, ids=ids)
+        policy = AgentPolicy(method, agent, config.network.image_size, greedy=False)
         settings = EvaluationConfig(
             batch=min(config.ppo.num_envs, limit),
             workers=config.run.workers,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.evaluation.archive import About
 from internav_data.evaluation.evaluate import episode_generator
 from internav_data.evaluation.reference_policies import REFERENCE_POLICIES, reference_policy
@@ -60,8 +61,6 @@ class AgentPolicy:
         That it was trained with.
     greedy
         The most probable option and action, rather than drawn ones.
-    ids
-        It wants instance masks too: privileged input (`nie`).
     """
 
     def __init__(
@@ -71,9 +70,9 @@ class AgentPolicy:
         image_size: int,
         *,
         greedy: bool,
-        ids: bool = False,
     ) -> None:
-        self.name, self.image_size, self.ids = name, image_size, ids
+        self.name, self.image_size = name, image_size
+        self.sensors = getattr(agent, "sensors", DEFAULT_SENSORS)
         self._agent, self._greedy = agent, greedy
         self._seed = 0
         self._state: dict[str, Any] = {}
@@ -159,12 +158,12 @@ def candidate(
     agent = _loaded(Path(who))
     about = replace(_facts(agent, about), greedy=greedy, without_intent=without_intent)
     about = replace(about, name=row_name(about))
-    size, ids = agent_config(agent, "network", "image_size", 64), getattr(agent, "wants_ids", False)
+    size = agent_config(agent, "network", "image_size", 64)
     if without_intent:
         from internav_data.camp.agents import without_intent as cut  # noqa: PLC0415 - torch
 
         agent = cut(agent)
-    return EvaluatedPolicy(AgentPolicy(about.name, agent, size, greedy=greedy, ids=ids), about)
+    return EvaluatedPolicy(AgentPolicy(about.name, agent, size, greedy=greedy), about)
 
 
 def reference_policies_beside(dataset: Dataset[Episode]) -> list[str]:

@@ -149,7 +149,7 @@ class Trainer:
         """Make a stage's environments and optimiser, as they were in the checkpoint if there is
         one."""  # noqa: D205, D209 - one sentence
         own = self.own
-        env = self.data.of_stage(stage, self.config, own, ids=self.agent.wants_ids)
+        env = self.data.of_stage(stage, self.config, own, self.agent.sensors)
         learner: Agent = self.agent
         if stage.tasks:
             tasks = stage.tasks[own.start : own.stop]

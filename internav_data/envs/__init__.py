@@ -15,6 +15,7 @@ from internav_data.core.lazy import lazy_imports
 if TYPE_CHECKING:
     from internav_data.envs.auxiliary import AuxiliaryStart, auxiliary_starts
     from internav_data.envs.processes import InterNavProcesses
+    from internav_data.envs.sensors import Sensor
     from internav_data.envs.single import InterNavEnv
     from internav_data.envs.slot import EpisodeSnapshot
     from internav_data.envs.vector import InterNavVectorEnv
@@ -25,6 +26,7 @@ __all__ = [
     "InterNavEnv",
     "InterNavProcesses",
     "InterNavVectorEnv",
+    "Sensor",
     "auxiliary_starts",
     "register",
 ]
@@ -50,6 +52,7 @@ __getattr__, __dir__ = lazy_imports(
     {
         "auxiliary": ["AuxiliaryStart", "auxiliary_starts"],
         "processes": ["InterNavProcesses"],
+        "sensors": ["Sensor"],
         "single": ["InterNavEnv"],
         "slot": ["EpisodeSnapshot"],
         "vector": ["InterNavVectorEnv"],

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from internav_data.envs.tasks import InteractiveNavigation, TaskConfig, TaskStep
-from internav_data.geometry.headings import HEADINGS
-from internav_data.navigation import SPACING_M
 from internav_data.records.errors import UsageError
 from internav_data.render.camera import CameraView
 from internav_data.world import ACTION_COUNT, Action, World
@@ -167,12 +164,3 @@ class EpisodeRun:
             90.0 * world.quarter,
             world.horizon_deg,
         )
-
-    def point_goal(self) -> tuple[float, float]:
-        """Return the goal from the agent: metres and bearing in (-pi, pi], left positive."""
-        world = self.world
-        east, north = world.goal[0] - world.i, world.goal[1] - world.j
-        # Whole numbers: a goal right behind has bearing pi, never -pi.
-        c, s = (int(part) for part in HEADINGS[world.quarter])
-        ahead, left = c * east + s * north, c * north - s * east
-        return SPACING_M * math.hypot(east, north), math.atan2(left, ahead)

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from gymnasium.vector import VectorEnv
 
+from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.envs.slot import EpisodeSnapshot, check_options, task_names
-from internav_data.envs.spaces import layout
+from internav_data.envs.spaces import buffer_shapes
 from internav_data.envs.vector import (
     OPTIONS,
     InterNavVectorEnv,
@@ -29,15 +30,18 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.dataset import Dataset
+    from internav_data.envs.sensors import Sensor
     from internav_data.envs.types import Observations, Stepped
     from internav_data.records import Episode
 
 
-def _arrays(memory: dict[str, Any], count: int, size: int, *, ids: bool) -> Observations:
-    """See shared memory as the buffers of a batch."""
+def _arrays(
+    memory: dict[str, Any], count: int, size: int, sensors: Sequence[str | Sensor]
+) -> Observations:
+    """Return views of shared memory as the buffers of a batch."""
     return {
         name: np.frombuffer(memory[name], dtype).reshape(shape)
-        for name, (shape, dtype) in layout(count, size, ids=ids).items()
+        for name, (shape, dtype) in buffer_shapes(count, size, sensors).items()
     }
 
 
@@ -50,7 +54,7 @@ def _serve(
 ) -> None:
     """Do what the pipe says until it says no more: one of the processes."""
     try:
-        whole = _arrays(memory, count, arguments["image_size"], ids=arguments["ids"])
+        whole = _arrays(memory, count, arguments["image_size"], arguments["sensors"])
         own = {name: array[rows[0] : rows[1]] for name, array in whole.items()}
         env = InterNavVectorEnv(rows[1] - rows[0], copy=False, buffers=own, **arguments)
         pipe.send((True, None))
@@ -97,7 +101,7 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
 
     Parameters
     ----------
-    num_envs, dataset, image_size, autoreset, copy, ids, **arguments
+    num_envs, dataset, image_size, autoreset, copy, sensors, **arguments
         As `InterNavVectorEnv` has them; a loaded dataset is opened again in each process.
     workers
         Processes; at most one for each environment.
@@ -115,22 +119,22 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
         *,
         autoreset: bool = True,
         copy: bool = True,
-        ids: bool = False,
+        sensors: Sequence[str | Sensor] = DEFAULT_SENSORS,
         context: str = "spawn",
         **arguments: Any,  # noqa: ANN401 - those of `InterNavVectorEnv`
     ) -> None:
         if not 1 <= workers <= num_envs:
             raise UsageError(f"workers: expected 1 … {num_envs} (num_envs), got {workers}")
-        declare_spaces(self, num_envs, image_size, autoreset=autoreset, ids=ids)
+        declare_spaces(self, num_envs, image_size, sensors, autoreset=autoreset)
         self._copy = copy
         start = multiprocessing.get_context(context)
         memory = {
             name: start.RawArray("B", math.prod(shape) * np.dtype(dtype).itemsize)
-            for name, (shape, dtype) in layout(num_envs, image_size, ids=ids).items()
+            for name, (shape, dtype) in buffer_shapes(num_envs, image_size, sensors).items()
         }
-        self._buffers = _arrays(memory, num_envs, image_size, ids=ids)
+        self._buffers = _arrays(memory, num_envs, image_size, sensors)
         given = dict(arguments, dataset=dataset, image_size=image_size, autoreset=autoreset)
-        given["ids"], tasks = ids, task_names(arguments, num_envs)
+        given["sensors"], tasks = sensors, task_names(arguments, num_envs)
         bounds = [num_envs * k // workers for k in range(workers + 1)]
         self._rows = list(itertools.pairwise(bounds))
         self._counts = [high - low for low, high in self._rows]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import gymnasium
 import numpy as np
 
+from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.envs.slot import Arguments, EnvSlot, EpisodeSnapshot, check_options, step_info
 from internav_data.envs.spaces import ObservationBuffer, observation_space
 from internav_data.records.errors import UsageError
@@ -14,11 +15,13 @@ from internav_data.render.camera import Camera
 from internav_data.world import ACTION_COUNT, Action
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
 
     from internav_data.dataset import Dataset
+    from internav_data.envs.sensors import Sensor
     from internav_data.records import Episode
 
 RENDER_SIZE = 300
@@ -38,8 +41,8 @@ class InterNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
         Pixels a side of `rgb` and `depth`.
     render_mode
         None or "rgb_array".
-    ids
-        Observe which instance each pixel shows, too: privileged input.
+    sensors
+        Sensors to observe: names in `internav_data.envs.sensors.SENSORS`, or one's own `Sensor`.
     **arguments
         See `Arguments`.
 
@@ -59,16 +62,16 @@ class InterNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
         image_size: int = 64,
         render_mode: str | None = None,
         *,
-        ids: bool = False,
+        sensors: Sequence[str | Sensor] = DEFAULT_SENSORS,
         **arguments: Unpack[Arguments],
     ) -> None:
         if render_mode not in {None, "rgb_array"}:
             raise UsageError(f"render_mode: expected None or 'rgb_array', got {render_mode!r}")
         self.render_mode = render_mode
-        self.observation_space = observation_space(image_size, ids=ids)
+        self.observation_space = observation_space(image_size, sensors)
         self.action_space = gymnasium.spaces.Discrete(ACTION_COUNT)
         (self._slot,) = EnvSlot.make(1, dataset, arguments)
-        self._buffer = ObservationBuffer.of(Camera(image_size), 1, ids=ids)
+        self._buffer = ObservationBuffer.of(Camera(image_size), 1, sensors)
         self._large: Camera | None = None
 
     def reset(

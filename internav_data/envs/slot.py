@@ -36,7 +36,7 @@ class Arguments(TypedDict, total=False):
     house_cache_size: int
 
 
-_RENAMED: Final = {"houses_kept": "house_cache_size"}
+_RENAMED: Final = {"houses_kept": "house_cache_size", "ids": "sensors, 'ids' among them"}
 """Arguments of earlier versions, and their names today."""
 _MAX_ACTIONS: Final = 100_000
 """Number of actions of a snapshot that are read: more are no episode."""

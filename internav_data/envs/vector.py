@@ -8,6 +8,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.envs.slot import Arguments, EnvSlot, EpisodeSnapshot, check_options, step_info
 from internav_data.envs.spaces import ObservationBuffer, observation_space
 from internav_data.records.errors import UsageError
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     from internav_data.core.typing import Bools
     from internav_data.dataset import Dataset
+    from internav_data.envs.sensors import Sensor
     from internav_data.envs.types import Observations, Stepped
     from internav_data.records import Episode
 
@@ -29,13 +31,18 @@ OPTIONS = ("episode_id", "actions", "start", "reset_mask")
 
 
 def declare_spaces(
-    env: VectorEnv[Any, Any, Any], count: int, size: int, *, autoreset: bool, ids: bool = False
+    env: VectorEnv[Any, Any, Any],
+    count: int,
+    size: int,
+    sensors: Sequence[str | Sensor],
+    *,
+    autoreset: bool,
 ) -> None:
     """Give a vector environment its spaces and say how it resets."""
     from gymnasium import spaces  # noqa: PLC0415 - a short name in a short place
 
     env.num_envs = count
-    env.single_observation_space = observation_space(size, ids=ids)
+    env.single_observation_space = observation_space(size, sensors)
     env.single_action_space = spaces.Discrete(ACTION_COUNT)
     env.observation_space = batch_space(env.single_observation_space, count)
     env.action_space = batch_space(env.single_action_space, count)
@@ -64,7 +71,7 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
     ----------
     num_envs
         How many.
-    dataset, image_size, ids, **arguments
+    dataset, image_size, sensors, **arguments
         As `InterNavEnv` has them.
     autoreset
         False: whoever is done is to be reset by `reset(options={"reset_mask": …})`.
@@ -82,17 +89,17 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         *,
         autoreset: bool = True,
         copy: bool = True,
-        ids: bool = False,
+        sensors: Sequence[str | Sensor] = DEFAULT_SENSORS,
         buffers: Observations | None = None,
         **arguments: Unpack[Arguments],
     ) -> None:
         self.slots = EnvSlot.make(num_envs, dataset, arguments)
-        declare_spaces(self, num_envs, image_size, autoreset=autoreset, ids=ids)
+        declare_spaces(self, num_envs, image_size, sensors, autoreset=autoreset)
         camera = Camera(image_size)
         if buffers is None:
-            self._buffer = ObservationBuffer.of(camera, num_envs, ids=ids)
+            self._buffer = ObservationBuffer.of(camera, num_envs, sensors)
         else:
-            self._buffer = ObservationBuffer(camera, dict(buffers))
+            self._buffer = ObservationBuffer(camera, sensors, buffers)
         self._autoreset, self._copy = autoreset, copy
         self._done = np.zeros(num_envs, np.bool_)
 

@@ -39,7 +39,9 @@ class Policy(Protocol):
 
     name: str
     image_size: int
-    """Pixels a side that it wants to see. One that has `ids = True` sees instance masks too."""
+    """Size of the pictures, pixels a side."""
+    sensors: Sequence[str]
+    """Names of the sensors that it takes; see `internav_data.envs.sensors`."""
 
     def begin(self, count: int, seed: int) -> None:
         """Take `count` seats; all that is random derives from `seed` and the episode."""
@@ -132,10 +134,9 @@ def evaluate(
         )
     numbers = chosen(len(dataset), settings.limit)
     count = min(settings.batch, len(numbers))
-    masks = {"ids": True} if getattr(policy, "ids", False) else {}
     env = make_vector(
         count, dataset, min(settings.workers, count), image_size=policy.image_size,
-        autoreset=False, copy=False, max_steps=settings.max_steps, **masks,
+        sensors=policy.sensors, autoreset=False, copy=False, max_steps=settings.max_steps,
     )  # fmt: skip
     try:
         policy.begin(count, settings.seed)

@@ -72,7 +72,8 @@ class ScriptedPolicy:
         The actions for an episode; Done follows where they end without it.
     """
 
-    image_size = 1  # it does not look
+    image_size = 1
+    sensors: Sequence[str] = ()
 
     def __init__(self, name: str, plan: ActionPlanner) -> None:
         self.name = name
@@ -97,6 +98,7 @@ class RandomPolicy:
 
     name = "random"
     image_size = 1
+    sensors: Sequence[str] = ()
 
     def __init__(self) -> None:
         self._seed = 0

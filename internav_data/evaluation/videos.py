@@ -30,7 +30,7 @@ class _Noting:
 
     def __init__(self, policy: Policy) -> None:
         self.name, self.image_size = policy.name, policy.image_size
-        self.ids = getattr(policy, "ids", False)
+        self.sensors = policy.sensors
         self._player = policy
         self.steps: list[list[Note]] = []
 

@@ -128,12 +128,19 @@ def test_draws_follow_their_distribution():
 
 def test_a_real_environment_is_lived_in(houses, config):
     """The contract with `internav_data.envs`: copies or not, hand-backs, resets by mask."""
+    from internav_data.envs.sensors import SENSORS
     from internav_data.envs.vector import InterNavVectorEnv
 
     lived = []
     for copied in (True, False):
         env = InterNavVectorEnv(
-            4, houses, image_size=16, autoreset=False, copy=copied, max_steps=15, ids=True
+            4,
+            houses,
+            image_size=16,
+            autoreset=False,
+            copy=copied,
+            max_steps=15,
+            sensors=tuple(SENSORS),
         )
         for method in ("camp", "nie"):
             agent = make_agent(method, config(agent={"initial_interaction_probability": 0.3}))

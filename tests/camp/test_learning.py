@@ -63,7 +63,7 @@ def rollouts_needed(agent, env, settings):
 def test_a_box_is_pushed_a_thing_picked_up_and_a_block_gone_round(method, settings):
     """Nine of ten of the last 300 episodes: no kind can be left out, each is a third of them."""
     agent = make_agent(method, settings)
-    rollouts_needed(agent, Mixed(ENVIRONMENTS, ids=agent.wants_ids), settings)
+    rollouts_needed(agent, Mixed(ENVIRONMENTS, ids="ids" in agent.sensors), settings)
 
 
 class Forgetful(PPOAgent):

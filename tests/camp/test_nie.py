@@ -97,5 +97,5 @@ def test_nobody_in_sight_changes_nothing(agent):
 
 
 def test_masks_are_needed(agent):
-    with pytest.raises(UsageError, match="ids=True"):
+    with pytest.raises(UsageError, match="sensors="):
         agent.sighted({"depth": torch.zeros(1)})

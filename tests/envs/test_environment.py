@@ -12,12 +12,14 @@ import internav_data.envs
 from internav_data.dataset import load_dataset
 from internav_data.envs import EpisodeSnapshot, InterNavVectorEnv
 from internav_data.envs.order import EpisodeOrder
+from internav_data.envs.sensors import SENSORS
 from internav_data.envs.source import FIELDS_KEPT, LoadedHouses, open_source
 from internav_data.generation import generate, load_config
 from internav_data.navigation import TangentGraph
 from internav_data.records.errors import CorruptDataError, UsageError
 from internav_data.world import Action, HouseModel, World
 
+EVERY = tuple(SENSORS)
 WEIGHTS = np.array([8, 1.5, 1.5, 0.3, 0.3, 1, 1, 1, 1, 1.5, 1.5, 0.4])
 
 
@@ -225,6 +227,7 @@ def test_options_that_cannot_be_meant(small, options, message):
         ({"image_size": 0}, "image_size"),
         ({"colour": 1}, "no argument 'colour'"),
         ({"houses_kept": 9}, "is now called house_cache_size"),
+        ({"ids": True}, "is now called sensors"),
         ({"filters": [("room_count", ">", 99)]}, "no episodes"),
         ({"push_model": "shove"}, "push_model"),
         ({"episodes_per_house": 0}, "episodes_per_house"),
@@ -284,7 +287,7 @@ def test_many_are_the_same_as_each_alone(small):
 
 
 def test_instance_ids_are_seen_by_who_asks_for_them(small):
-    plain, told = many(small, 2), many(small, 2, ids=True)
+    plain, told = many(small, 2), many(small, 2, sensors=EVERY)
     (seen, _), (more, _) = plain.reset(seed=3), told.reset(seed=3)
     assert "ids" not in seen
     assert told.single_observation_space.contains({name: v[0] for name, v in more.items()})
@@ -293,9 +296,9 @@ def test_instance_ids_are_seen_by_who_asks_for_them(small):
     assert ids.shape == (2, 16, 16)
     assert {-1, -3} <= set(ids.ravel().tolist()), "floor and walls"
     assert ids.max() > 0, "and things"
-    alone = make(small, ids=True, image_size=16)
+    alone = make(small, sensors=EVERY, image_size=16)
     same(alone.reset(seed=3)[0]["ids"], ids[0])
-    processes = many(small, 2, ids=True, workers=2)
+    processes = many(small, 2, sensors=EVERY, workers=2)
     try:
         same(processes.reset(seed=3)[0]["ids"], ids)
     finally:

@@ -2,6 +2,7 @@
 
 import pytest
 
+from internav_data.envs.sensors import point_goal
 from internav_data.envs.tasks import interaction_reward
 from internav_data.records.errors import UsageError
 
@@ -132,7 +133,7 @@ def test_the_goal_is_seen_from_the_agent(hand_run):
     run = hand_run(divided=True)
     bearings = []
     for _ in range(4):
-        distance, bearing = run.point_goal()
+        distance, bearing = point_goal(run.world)
         assert distance == pytest.approx(3.0)
         bearings.append(bearing)
         run.step(LEFT)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from internav_data.dataset import load_dataset
+from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.envs.single import InterNavEnv
 from internav_data.evaluation.evaluate import EvaluationConfig, chosen, episode_generator, evaluate
 from internav_data.evaluation.reference_policies import (
@@ -20,6 +21,7 @@ class Looking(RandomPolicy):
     """Draws as `RandomPolicy` does, and ends where what it sees is bright: pictures matter."""
 
     image_size = 16
+    sensors = DEFAULT_SENSORS
 
     def act(self, observations):
         bright = observations["rgb"].reshape(len(observations["rgb"]), -1).mean(axis=1)

@@ -124,7 +124,7 @@ def test_logs_are_read_forgivingly(tmp_path):
 
 def test_videos_show_the_episodes_that_were_played(played_data, played, settings, tmp_path):
     class Telling:
-        name, image_size = "telling", 1
+        name, image_size, sensors = "telling", 1, ()
 
         def __init__(self):
             self._inner = reference_policy("random", played_data)

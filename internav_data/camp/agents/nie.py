@@ -18,6 +18,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from internav_data.camp.agents.flat import PPOAgent
+from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import ACTION_COUNT, HORIZONS_DEG
 
@@ -32,9 +33,9 @@ _NOWHERE: Final = 1e6
 
 
 class NIEAgent(PPOAgent):
-    """`ppo` with a neural interaction engine; environments are made with `ids=True`."""
+    """`ppo` with a neural interaction engine; it observes instance ids, privileged input."""
 
-    wants_ids = True
+    sensors = (*DEFAULT_SENSORS, "ids")
 
     def __init__(self, config: CampConfig) -> None:
         super().__init__(config, extra=SUMMARY)
@@ -102,7 +103,9 @@ class NIEAgent(PPOAgent):
             The observations have no instance ids.
         """
         if "ids" not in seen:
-            raise UsageError("nie needs instance masks: make the environments with ids=True")
+            raise UsageError(
+                f"nie needs instance masks: make the environments with sensors={list(self.sensors)}"
+            )
         steps, count, size, _ = seen["ids"].shape
         ids = seen["ids"].reshape(steps * count, -1).long().clamp(min=0)  # 1 and up are objects
         points = _points(seen["depth"].reshape(steps * count, size, size), seen["horizon"])

@@ -15,6 +15,7 @@ import torch
 from torch import Tensor, nn
 
 from internav_data.camp.networks import EpisodeSegments
+from internav_data.envs.sensors import DEFAULT_SENSORS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -90,8 +91,8 @@ class Evaluated:
 class Agent(nn.Module, ABC):
     """A learner; see `internav_data.camp.agents` for how one's own joins."""
 
-    wants_ids: ClassVar[bool] = False
-    """Whether it is to see instances, too ("ids"): privileged input."""
+    sensors: ClassVar[tuple[str, ...]] = DEFAULT_SENSORS
+    """Names of the sensors that it takes; see `internav_data.envs.sensors`."""
 
     @property
     def device(self) -> torch.device:
