@@ -1,4 +1,4 @@
-"""House to episodes."""
+"""Episodes of a house: start, goal, obstacles on the path, outcomes and an expert."""
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
-"""House to episodes: start, goal and obstacles, what each interaction would do, and an expert.
+"""Generation of episodes: start and goal, obstacles on the path, an expert, and outcomes.
 
-Every predicate is judged on stored values.
+An episode is drawn again until its mode's condition holds and an expert is found, at most
+`max_redraws` times. Poses are rounded before a predicate is judged, so that the stored values alone
+decide, for the generator and the validator alike.
 """
 
 from __future__ import annotations
@@ -41,17 +43,18 @@ if TYPE_CHECKING:
     from internav_data.records import Asset, Expert, House, Outcome, Redraw
 
 PAIRS = 64
-"""Pairs of nodes drawn for one start and goal; most are far enough apart."""
+"""Maximum number of pairs of nodes drawn for one start and goal; most are far enough apart."""
 QUARTER_TURNS = (0, 90, 180, 270)
+"""Headings of the agent at the start, degrees counter-clockwise from +x."""
 
 
 @dataclass(frozen=True, slots=True)
 class EpisodeBatch:
-    """Episodes of a house, and how often something was drawn again for them."""
+    """Episodes of a house, with the number of draws that were discarded for them."""
 
     episodes: tuple[Episode, ...]
     redraws: Mapping[str, int]
-    """By reason (a `Redraw`); reasons that did not occur are left out."""
+    """Number of discarded draws by reason (a `Redraw`); absent reasons did not occur."""
 
 
 def build_episodes(
@@ -63,20 +66,21 @@ def build_episodes(
     first: int = 0,
     attempt: int = 0,
 ) -> tuple[Episode, ...]:
-    """Make the episodes first … first + count - 1 of a house.
+    """Build the episodes first … first + count - 1 of a house.
 
-    Each is a pure function of the house, its index and the attempt: none depends on the others.
+    Each episode is a pure function of the house, its index, the pool, the settings and the attempt;
+    none depends on the others.
 
     Parameters
     ----------
     house
         A furnished house.
     count, first
-        How many episodes, and the index of the first.
+        Number of episodes, and the index of the first.
     pool
         Assets to draw obstacles from, in a fixed order.
     config
-        Settings; the calibrated defaults where None.
+        Settings; None for the calibrated defaults.
     attempt
         Sub-seed: 0 unless an earlier attempt at the scene failed.
 
@@ -85,7 +89,7 @@ def build_episodes(
     UsageError
         No physics engine has the config's name.
     QuarantineError
-        An episode cannot be made within the stated bounds.
+        An episode cannot be made within the bounds of the settings.
 
     """
     batch = build_batch(house, count, pool, config, first=first, attempt=attempt)
@@ -101,7 +105,10 @@ def build_batch(
     first: int = 0,
     attempt: int = 0,
 ) -> EpisodeBatch:
-    """Make episodes as `build_episodes` does, and say how often something was drawn again."""
+    """Build episodes and count the discarded draws.
+
+    Parameters and errors as in `build_episodes`.
+    """
     config = config or EpisodeConfig()
     site = SpawnSite.of(house)
     redraws: Counter[Redraw] = Counter()
@@ -114,13 +121,17 @@ def build_batch(
 
 
 def mode_of(scene: int, index: int) -> Mode:
-    """Blocked and lengthened by turns, so that any part of the data holds both evenly."""
+    """Return the mode of an episode by its index.
+
+    The modes alternate, so that every part of a dataset holds both evenly.
+    """
     return "blocked" if (scene + index) % 2 == 0 else "lengthened"
 
 
 def _build_episode(
     site: SpawnSite, index: int, pool: Sequence[Asset], config: EpisodeConfig, attempt: int
 ) -> tuple[Episode, Counter[Redraw]]:
+    """Draw until an episode is complete; return it and the reasons of the discarded draws."""
     house = site.house
     again: Counter[Redraw] = Counter()
     for draw in range(config.max_redraws):
@@ -143,7 +154,8 @@ def _draw(
     config: EpisodeConfig,
     key: tuple[int, int, int, int],
 ) -> Episode | Redraw:
-    """Draw a start, a goal and obstacles: an episode, or why to draw again."""
+    """Draw a start, a goal and obstacles: return an episode, or the reason to draw again."""
+    # Two streams per draw: the obstacles' many numbers do not shift those of the start's heading.
     seed = site.house.seed
     place = generator(seed, Purpose.EPISODE, *key)
     draft = _draw_endpoints(site, mode_of(site.house.scene, index), config, place)
@@ -160,7 +172,7 @@ def _draw(
         config.push_model,
         config.engine,
     )
-    # The expert comes first: what it cannot solve needs no outcomes.
+    # The expert comes first: an episode without one is discarded and needs no outcomes.
     expert = solve(world)
     if expert is None and not config.keep_unsolvable:
         return "no expert"
@@ -170,10 +182,10 @@ def _draw(
 def _draw_endpoints(
     site: SpawnSite, mode: Mode, config: EpisodeConfig, rng: Generator
 ) -> EpisodeDraft | None:
-    """Draw a start and a goal, in two rooms where there are two; None if all are too close.
+    """Draw a start and a goal, in different rooms if the house has two; None if all are too close.
 
-    Rooms first, then a node in each: were nodes drawn at once, large rooms would be in most pairs
-    and long room paths rare.
+    Rooms are drawn first, then a node in each: if nodes were drawn at once, large rooms would be in
+    most pairs and long room paths rare.
     """
     rooms = np.unique(site.rooms)
     if len(rooms) < min(2, len(site.house.rooms)):
@@ -197,7 +209,7 @@ def _begin(
     second: int,
     shortest_path_m: float,
 ) -> EpisodeDraft | None:
-    """Gather what is known about a start and a goal before anything is spawned."""
+    """Gather the facts about a start and a goal before any obstacle is spawned."""
     start, goal = _node(site, first), _node(site, second)
     here, there = _point(start), _point(goal)
     shortest_path_steps = site.lattice.distance(start, goal)
@@ -234,7 +246,7 @@ def _point(node: tuple[int, int]) -> tuple[float, float]:
 
 
 def _recorded(draft: EpisodeDraft, index: int, world: World, expert: Expert | None) -> Episode:
-    """Write down a finished way; its predicates are judged on the rounded poses."""
+    """Turn a finished draft into an episode; its predicates are judged on the rounded poses."""
     house, obstructed_path_m = draft.site.house, world.obstructed_path_m()
     outcomes = outcomes_of(world, (draft.steps, obstructed_path_m))
     return Episode(

@@ -1,4 +1,4 @@
-"""How episodes are made: every figure of the algorithm that a user may change."""
+"""Settings of the generation of episodes: the figures of the algorithm that users may change."""
 
 from __future__ import annotations
 
@@ -22,26 +22,28 @@ class EpisodeConfig:
         "sideways_m": "lateral_std_m",
         "spots": "max_spawn_tries",
     }
-    """Present names of keys of earlier versions, for the error that refuses these."""
+    """Present names of keys of earlier versions, for the error that refuses an old one."""
 
     max_obstacles: tuple[ObstacleCount, ObstacleCount, ObstacleCount] = (4, 9, 16)
-    """Most obstacles in houses of 1-2, 3-5 and 6-10 rooms; then start and goal are drawn anew."""
+    """Maximum number of obstacles in houses of 1-2, 3-5 and 6-10 rooms; where they do not suffice,
+    start and goal are drawn anew."""
     lateral_std_m: Annotated[float, Bounds(0.0)] = 0.40
-    """Standard deviation of an obstacle's distance from the way, metres."""
+    """Standard deviation of an obstacle's distance from the path, metres."""
     gap_m: Annotated[float, Bounds(0.0)] = 0.01
-    """Least distance between an obstacle and everything else when it is spawned, metres."""
+    """Minimum distance of an obstacle from all other objects when it is spawned, metres."""
     min_shortest_path_m: Annotated[float, Bounds(0.0, exclusive=True)] = 2.0
-    """Least any-angle distance from start to goal without obstacles, metres."""
+    """Minimum Euclidean path length from start to goal without obstacles, metres."""
     max_spawn_tries: Annotated[int, Bounds(1)] = 200
-    """Spots tried for the obstacles of one start and goal."""
+    """Maximum number of spots tried for the obstacles of one start and goal."""
     max_redraws: Annotated[int, Bounds(1)] = 50
-    """Starts and goals tried for one episode."""
+    """Maximum number of starts and goals tried for one episode."""
     keep_unsolvable: bool = False
     """Keep episodes for which the expert finds no plan, their `expert` null; else draw again."""
     push_model: PushModel = "force"
-    """Of outcomes, expert and environments: 200 N up to 2 m/s, or 2 m/s at once for every mass."""
+    """Push of outcomes, expert and environments: `force`, 200 N up to 2 m/s, or `kick`, 2 m/s at
+    once for every mass."""
     engine: str = DEFAULT_ENGINE
-    """Physics engine in which obstacles settle and are pushed, in outcomes and environments too."""
+    """Physics engine of settling, outcomes, expert and environments; `bullet` is the only one."""
     unseen_assets: bool = False
     """Each split draws its obstacles from its own share of the assets (2/3, 1/6, 1/6)."""
 
@@ -65,7 +67,7 @@ class EpisodeConfig:
                 )
 
     def max_obstacles_for(self, room_count: int) -> int:
-        """Most obstacles for a house of that many rooms."""
+        """Return the maximum number of obstacles in a house with a number of rooms."""
         few, some, many = self.max_obstacles
         if room_count <= 2:  # noqa: PLR2004 - the classes of Table 2
             return few

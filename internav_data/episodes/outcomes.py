@@ -1,7 +1,8 @@
-"""Outcomes: what each interaction with each obstacle would do, everything else as it stands.
+"""Outcomes: the effect of each interaction with each obstacle, all other objects as they stand.
 
-The counterfactual table of an episode: every obstacle, pushed in each of the four directions of
-the house or picked up, without the agent in the way.
+They are the potential outcomes (Rubin 1974) of five interventions at the start of an episode: each
+obstacle pushed in one of the four directions of the house, or picked up, without the agent in the
+way.
 """
 
 from __future__ import annotations
@@ -21,27 +22,29 @@ if TYPE_CHECKING:
     from internav_data.world import World
 
 PUSHES: Final = ("push_east", "push_north", "push_west", "push_south")
-"""Headings 0 to 3: along +x, +y, -x and -y of the house."""
+"""Actions of outcomes by heading 0 to 3: along +x, +y, -x and -y of the house."""
 PICK: Final = "pick"
+"""Action of outcomes in which the obstacle is picked up."""
 
 Distances = tuple[int | None, float | None]
-"""Steps on the lattice and metres any-angle to the goal; None where it is cut off."""
+"""Lattice distance to the goal in steps and Euclidean path length in metres; None if cut off."""
 
 
 def outcomes_of(world: World, before: Distances | None = None) -> tuple[tuple[Outcome, ...], ...]:
-    """Return the outcomes of every obstacle of a world as it stands, in the obstacles' order.
+    """Return the outcomes of every obstacle of a world, in the obstacles' order.
 
-    Five for each obstacle: `PUSHES` in order, then `PICK`. A failed one leaves the distances as
-    they are; its reason says why: "not pushable", "not pickable", what `push` says, or "something
-    rests on it".
+    There are five for each obstacle: `PUSHES` in order, then `PICK`. A failed one leaves the
+    distances as they are; its reason is "not pushable", "not pickable", a reason of `PushResult` or
+    "something rests on it".
 
     Parameters
     ----------
     world
-        An episode at its start: distances are those from where its agent stands to its goal. It
-        is not changed.
+        World of an episode at its start; it is not changed. Distances are those from its agent
+        to its goal.
     before
-        Those distances, steps and metres, where they are known already.
+        Those distances before any interaction, if they are known already.
+
     """
     before = before or (world.steps(), world.obstructed_path_m())
     return tuple(
@@ -55,14 +58,18 @@ def outcomes_of(world: World, before: Distances | None = None) -> tuple[tuple[Ou
 
 
 class _Lifted:
-    """The world without one of its things, which no push of that thing alone can better."""
+    """A world without one of its objects, from which distances after its pushes are derived.
+
+    No push that moves this object alone can give shorter distances. Where the path of this world
+    keeps clear of the pushed object, it still is the shortest: most outcomes need no new path.
+    """
 
     def __init__(self, world: World, index: int) -> None:
         self._world, self._index = world, index
 
     @cached_property
     def distances(self) -> Distances:
-        """Steps and any-angle way to the goal."""
+        """Distances to the goal without the object."""
         there = self._there
         return there.steps(), None if self._path is None else self._path[0]
 
@@ -77,14 +84,14 @@ class _Lifted:
         return self._there.path()
 
     def laid(self, pose: Pose) -> Distances:
-        """Distances once the thing lies somewhere and nothing else has moved."""
+        """Return the distances with the object at a pose and all others as before."""
         best_steps, best_path_m = self.distances
         if best_steps is None and best_path_m is None:
             return None, None
         there = self._there.copy()
         there.put([(self._index, pose)])
         steps = None if best_steps is None else there.steps()
-        # A way that the thing leaves free is still the shortest one.
+        # A path that the object leaves free is still the shortest one.
         if self._path is None or keeps_clear(self._path[1], there.items[self._index].footprint):
             return steps, best_path_m
         return steps, there.obstructed_path_m()

@@ -1,4 +1,4 @@
-"""A house as episodes see it: what all its episodes share, worked out once."""
+"""Spawn site: the parts of a furnished house that all its episodes share, computed once."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class SpawnSite:
-    """A furnished house with its lattice, its ways and the nodes where agents can be put."""
+    """A furnished house with its lattice, its paths and the nodes where an agent can stand."""
 
     house: House
     model: HouseModel
-    """What the worlds of its episodes share."""
+    """Model that the worlds of all episodes share."""
     footprints: Polygons
-    """All that stands in the house, walls first."""
+    """Footprints of all walls and furniture, walls first, metres."""
     lattice: Lattice
-    """The stage's: of the house without obstacles. Never changed: copy it."""
+    """Lattice of `model`, without obstacles. Never changed: copy it."""
     tangent_graph: TangentGraph
-    """The stage's, all furniture in its place."""
+    """Tangent graph of `model`, all furniture in its place."""
     nodes: NDArray[np.int64]
-    """Free nodes of the largest component, shape (n, 2), in order of i, then j."""
+    """Free nodes (i, j) of the largest component, (n, 2) int64, in order of i, then j."""
     rooms: NDArray[np.int64]
-    """Room of each node, shape (n,)."""
+    """Room of each node, (n,) int64."""
     _paths_between: dict[tuple[Vec2, Vec2], tuple[Vec2, ...]] = field(default_factory=dict)
     _room_paths: dict[tuple[int, int], tuple[tuple[tuple[int, ...], ...], bool]] = field(
         default_factory=dict
@@ -42,10 +42,11 @@ class SpawnSite:
 
     @staticmethod
     def of(house: House) -> SpawnSite:
-        """Work out what the episodes of a house share."""
+        """Prepare a house for episodes."""
         model = HouseModel.of(house)
         lattice = model.lattice
         components = lattice.components()
+        # One component, the largest: without obstacles its nodes reach each other.
         sizes = np.bincount(components[components >= 0].ravel(), minlength=1)
         nodes = np.argwhere(components == int(np.argmax(sizes)))
         return SpawnSite(
@@ -59,7 +60,10 @@ class SpawnSite:
         )
 
     def path_between(self, first: Vec2, second: Vec2) -> tuple[Vec2, ...]:
-        """Points of the any-angle way in the house without obstacles; () when there is none."""
+        """Return the points of the shortest path between two points, metres, without obstacles.
+
+        () without a path.
+        """
         key = (first, second)
         if key not in self._paths_between:
             path = self.tangent_graph.path(first, second)
@@ -69,7 +73,7 @@ class SpawnSite:
         return self._paths_between[key]
 
     def room_paths(self, first: int, second: int) -> tuple[tuple[tuple[int, ...], ...], bool]:
-        """All room paths between two rooms, and whether there were more than are listed."""
+        """Return the room paths between two rooms, and whether the list was cut at its bound."""
         key = (first, second)
         if key not in self._room_paths:
             self._room_paths[key] = room_paths(self.house, first, second)

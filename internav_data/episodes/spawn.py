@@ -1,4 +1,4 @@
-"""Spawning: obstacles on the way until it is blocked or longer (paper, section 5.1)."""
+"""Spawning: obstacles on the path until it is blocked or longer (paper, section 5.1)."""
 
 from __future__ import annotations
 
@@ -34,23 +34,26 @@ if TYPE_CHECKING:
     from internav_data.records import Asset, Mode, NodePath, Vec2
 
 YAW_STEP_DEG = 15
+"""Step of the headings at which obstacles stand, degrees."""
 NEAR_M = 0.5
-"""What is farther away than this cannot be touched while a thing settles."""
+"""Distance beyond which a settling object can touch nothing, metres."""
 
 
 @dataclass(frozen=True, slots=True)
 class Spawned:
-    """An obstacle at rest: its footprint is the one that a reader of the file will derive."""
+    """An obstacle at rest."""
 
     asset: Asset
     settled: SettleResult
     segment: int
+    """Segment of the node path on which it was spawned, 0 at the start."""
     footprint: Polygons
+    """Footprint at the rounded pose, as a reader of the file derives it, metres."""
 
 
 @dataclass(slots=True)
 class EpisodeDraft:
-    """One attempt: a start, a goal, and the obstacles so far."""
+    """An episode in the making: a start, a goal and the obstacles so far."""
 
     site: SpawnSite
     config: EpisodeConfig
@@ -64,15 +67,16 @@ class EpisodeDraft:
     node_paths: tuple[NodePath, ...]
     node_paths_truncated: bool
     lattice: Lattice
-    """With the obstacles so far."""
+    """Lattice with the obstacles so far."""
     shortest_path_m: float
     shortest_path_steps: int
     steps: int | None
+    """Lattice distance among the obstacles so far; None when cut off."""
     obstacles: list[Spawned] = field(default_factory=list)
 
     @property
     def done(self) -> bool:
-        """Whether the mode's condition holds."""
+        """Whether the condition of the mode holds."""
         if self.mode == "blocked":
             return self.steps is None
         return self.steps is not None and self.steps > self.shortest_path_steps
@@ -80,17 +84,26 @@ class EpisodeDraft:
 
 @lru_cache(maxsize=16384)
 def _standing(asset: Asset, yaw_deg: int) -> Polygons:
-    """Footprint of an upright asset at the origin: screens spots before the exact test."""
+    """Return the footprint of an upright asset at the origin, for a test before the exact one."""
     return footprint(asset, Pose(0.0, 0.0, 0.0, yaw_quaternion(yaw_deg)))
 
 
 def spawn(draft: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> bool:
-    """Put obstacles on a way until its mode's condition holds.
+    """Put obstacles on the paths of a draft until the condition of its mode holds.
+
+    Parameters
+    ----------
+    draft
+        Episode in the making; obstacles are added to it.
+    pool
+        Assets to draw from.
+    rng
+        Source of random numbers.
 
     Returns
     -------
     bool
-        False when the spots or the obstacles ran out: draw a new start and goal.
+        Whether the condition holds; False if tries or obstacles ran out.
 
     """
     limit = draft.config.max_obstacles_for(len(draft.site.house.rooms))
@@ -104,9 +117,9 @@ def spawn(draft: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> bool:
 
 
 def _try_spot(draft: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> None:
-    """Draw an asset and a spot, and keep it where nothing speaks against it.
+    """Draw an asset and a spot, and add the obstacle if it fits.
 
-    Each spot takes the same number of draws, whatever becomes of it.
+    Each try takes the same number of random numbers, whether it succeeds or not.
     """
     asset = pool[int(rng.integers(len(pool)))]
     path = draft.node_paths[int(rng.integers(len(draft.node_paths)))]
@@ -117,6 +130,7 @@ def _try_spot(draft: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> Non
     if spot is None:
         return
     pose = Pose(round_m(spot[0]), round_m(spot[1]), 0.0, yaw_quaternion(yaw_deg))
+    # Cheapest test first: upright footprint, then physics, then the footprint at the rounded rest.
     gap = draft.config.gap_m
     standing = _standing(asset, yaw_deg)
     shifted = Polygons(standing.vertices + np.array([pose.x, pose.y]), standing.offsets)
@@ -134,7 +148,7 @@ def _try_spot(draft: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> Non
 def _spot(
     site: SpawnSite, first: Vec2, second: Vec2, along: float, lateral: float
 ) -> tuple[float, float] | None:
-    """Point at a share of the way's length, moved sideways within its room."""
+    """Return the point at a share of a path's length, moved sideways; None if in another room."""
     points = site.path_between(first, second)
     left = along * sum(math.dist(a, b) for a, b in pairwise(points))
     for a, b in pairwise(points):
@@ -149,7 +163,7 @@ def _spot(
 
 
 def _distance(draft: EpisodeDraft, polygons: Polygons, stop_at: float) -> float:
-    """Distance to the house and to the other obstacles, at most `stop_at`."""
+    """Return the distance to the house and the other obstacles, metres, at most `stop_at`."""
     near = clearance(polygons, draft.site.footprints, stop_at)
     for other in draft.obstacles:
         near = min(near, clearance(polygons, other.footprint, stop_at))
@@ -157,7 +171,7 @@ def _distance(draft: EpisodeDraft, polygons: Polygons, stop_at: float) -> float:
 
 
 def _place(draft: EpisodeDraft, spawned: Spawned) -> None:
-    """Keep an obstacle unless it stands over start or goal or cuts a way to be lengthened."""
+    """Add an obstacle unless it covers start or goal, or cuts off a path to be lengthened."""
     handle = draft.lattice.add(spawned.footprint)
     free = draft.lattice.free
     steps = draft.lattice.distance(draft.start, draft.goal)
@@ -170,7 +184,7 @@ def _place(draft: EpisodeDraft, spawned: Spawned) -> None:
 
 
 def _near(draft: EpisodeDraft, here: Polygons) -> list[Body]:
-    """Things, obstacles and walls near a spot, as fixed bodies."""
+    """Return the furniture, obstacles and walls near a footprint, as fixed bodies."""
     house = draft.site.house
     bodies = [
         Body.of(house.assets[thing.asset_id], thing.pose, moves=False)
