@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from numpy.random import Generator
 
-    from internav_data.houses.plan import FloorGrid, WallSegment
+    from internav_data.houses.plan import FloorGrid, RoomEdge, WallSegment
 
 JAMB_CM = 10
 """Least distance of an opening from the centre line of a wall that meets its own."""
@@ -86,9 +86,9 @@ def spans(grid: FloorGrid, segment: WallSegment) -> list[WallSpan]:
     return out
 
 
-def possible_doors(grid: FloorGrid, width_cm: int) -> dict[tuple[int, int], list[WallSpan]]:
+def possible_doors(grid: FloorGrid, width_cm: int) -> dict[RoomEdge, list[WallSpan]]:
     """Where doors of at least a width can be, by pair of rooms (ascending), longest span first."""
-    out: dict[tuple[int, int], list[WallSpan]] = {}
+    out: dict[RoomEdge, list[WallSpan]] = {}
     for segment in grid.segments:
         if OUTSIDE in {segment.before, segment.after} or segment.length < width_cm:
             continue
@@ -102,7 +102,7 @@ def possible_doors(grid: FloorGrid, width_cm: int) -> dict[tuple[int, int], list
 
 
 def _ensuite(
-    types: Sequence[str], edges: Sequence[tuple[int, int]], rng: Generator
+    types: Sequence[str], edges: Sequence[RoomEdge], rng: Generator
 ) -> tuple[int, int] | None:
     """Of several bathrooms, one may belong to a bedroom: (bathroom, bedroom)."""
     bathrooms = [k for k, name in enumerate(types) if name == "bathroom"]
@@ -118,13 +118,14 @@ def _ensuite(
 
 def door_tree(
     types: Sequence[str],
-    edges: Sequence[tuple[int, int]],
+    edges: Sequence[RoomEdge],
     rng: Generator,
-    jitter: float = 0.6,
-) -> tuple[list[tuple[int, int]], float] | None:
-    """Join all rooms by the least unusual doors (Kruskal); None where they cannot be joined.
+    jitter: float,
+) -> list[RoomEdge] | None:
+    """Join all rooms by the least unusual doors; None where they cannot be joined.
 
-    `jitter` is how much of a door's cost is chance. Returns the doors and their summed cost.
+    Kruskal's minimum spanning tree (1956) over `edges`, the pairs of rooms that can have a door.
+    Each door costs `door_cost` plus a random part of up to `jitter`.
     """
     ensuite = _ensuite(types, edges, rng)
     weighted = []
@@ -134,26 +135,24 @@ def door_tree(
             cost += 40.0
         weighted.append((cost, a, b))
     group = list(range(len(types)))
-    chosen: list[tuple[int, int]] = []
-    total = 0.0
+    chosen: list[RoomEdge] = []
     for _, a, b in sorted(weighted):
         if group[a] != group[b]:
             old, new = group[a], group[b]
             group = [new if g == old else g for g in group]
             chosen.append((a, b))
-            total += door_cost(types[a], types[b])
     if len(chosen) != len(types) - 1:
         return None
-    return chosen, total
+    return chosen
 
 
 def loop_doors(
     types: Sequence[str],
-    edges: Sequence[tuple[int, int]],
-    tree: Sequence[tuple[int, int]],
+    edges: Sequence[RoomEdge],
+    tree: Sequence[RoomEdge],
     share: float,
     rng: Generator,
-) -> list[tuple[int, int]]:
+) -> list[RoomEdge]:
     """Further doors that make ways round: between public rooms, and from bedroom to bathroom."""
     out: list[tuple[int, int]] = []
     for a, b in sorted(set(edges) - set(tree)):

@@ -1,7 +1,12 @@
-"""From a seed to a house."""
+"""Houses by stages over a draft: rooms, floor plan, doors, windows, furniture.
+
+`build_house(seed, scene, config, catalogue)` runs `STAGES` over a `HouseDraft` and writes the
+record: each stage is one function of the draft, with random numbers of its own.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from internav_data.geometry import round_m
@@ -13,16 +18,17 @@ from internav_data.houses.plan_file import load_floor_plan
 from internav_data.houses.programme import programme
 from internav_data.houses.standards import CEILING_CM
 from internav_data.houses.walls import build_walls
-from internav_data.records import Door, FloorPlanStream, House, Purpose, Room, Window, generator
+from internav_data.records import Door, FloorPlanStream, House, Purpose, Room, SceneKey, Window
 from internav_data.records.splits import split_of_scene
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from internav_data.catalog import Catalogue
     from internav_data.houses.config import HouseConfig
     from internav_data.houses.plan import Corner, FloorPlan, Opening
-    from internav_data.records import Vec2
+    from internav_data.houses.programme import RoomSpec
+    from internav_data.records import SceneObject, Vec2
 
 
 def _metres(corners: Sequence[Corner]) -> tuple[Vec2, ...]:
@@ -83,12 +89,90 @@ def _rooms(
     )
 
 
-def _ceiling_cm(seed: int, scene: int, attempt: int) -> int:
+def _ceiling_cm(key: SceneKey) -> int:
     """Draw a height for the whole house: mostly 2.5 to 2.8 m."""
-    rng = generator(seed, Purpose.FLOOR_PLAN, scene, attempt, draw=FloorPlanStream.CEILING)
+    rng = key.generator(Purpose.FLOOR_PLAN, draw=FloorPlanStream.CEILING)
     low, high = CEILING_CM
     draw = float(rng.random())
     return 5 * round((low + (high - low) * draw * draw) / 5)
+
+
+@dataclass(slots=True)
+class HouseDraft:
+    """A house while it is built: each of `STAGES` sets the fields that the later ones read."""
+
+    key: SceneKey
+    config: HouseConfig
+    catalogue: Catalogue
+    rooms: tuple[RoomSpec, ...] = field(init=False, repr=False)
+    """Set by `draw_rooms`: types, areas and standards; empty for a user's floor plan."""
+    plan: FloorPlan = field(init=False, repr=False)
+    """Set by `draw_plan`."""
+    ceiling_cm: int = field(init=False, repr=False)
+    """Set by `draw_plan`."""
+    doors: tuple[Opening, ...] = field(init=False, repr=False)
+    """Set by `place_doors`."""
+    windows: tuple[Opening, ...] = field(init=False, repr=False)
+    """Set by `place_windows`."""
+    objects: tuple[SceneObject, ...] = field(init=False, repr=False)
+    """Set by `place_furniture`."""
+
+
+def draw_rooms(draft: HouseDraft) -> None:
+    """Choose the rooms' types and wanted areas, unless the user gave a floor plan."""
+    own = draft.config.floor_plan is not None
+    draft.rooms = () if own else programme(draft.key, draft.config)
+
+
+def draw_plan(draft: HouseDraft) -> None:
+    """Lay out the rooms and decide which of them doors join; draw the ceiling's height."""
+    path = draft.config.floor_plan
+    draft.plan = (
+        choose_floor_plan(draft.key, draft.config, draft.rooms)
+        if path is None
+        else load_floor_plan(path)
+    )
+    draft.ceiling_cm = draft.plan.ceiling_cm or _ceiling_cm(draft.key)
+
+
+def place_doors(draft: HouseDraft) -> None:
+    """Place the doors of the plan, those of loops and the entrance; or the user's doors."""
+    draft.doors = (
+        tuple(draw_doors(draft.key, draft.config, draft.plan))
+        if draft.config.floor_plan is None
+        else draft.plan.doors
+    )
+
+
+def place_windows(draft: HouseDraft) -> None:
+    """Place windows in the outer walls beside the doors; or the user's windows."""
+    draft.windows = draft.plan.windows or ()
+    if draft.plan.windows is None and draft.config.windows:
+        drawn = draw_windows(draft.key, draft.plan, draft.doors, draft.ceiling_cm)
+        draft.windows = tuple(drawn)
+
+
+def place_furniture(draft: HouseDraft) -> None:
+    """Furnish room by room, clear of doors and windows."""
+    draft.objects = furnish(
+        draft.key,
+        draft.plan,
+        (*draft.doors, *draft.windows),
+        draft.ceiling_cm / 100.0,
+        draft.config.furnishing,
+        draft.catalogue,
+    )
+
+
+STAGES: tuple[Callable[[HouseDraft], None], ...] = (
+    draw_rooms,
+    draw_plan,
+    place_doors,
+    place_windows,
+    place_furniture,
+)
+"""Stages of a draft, in order. Each has random numbers of its own: a stage that draws more or
+fewer of them changes no other."""
 
 
 def build_house(
@@ -100,65 +184,36 @@ def build_house(
     ------
     UsageError
         For a configuration that cannot be meant.
-
+    QuarantineError
+        When no floor plan keeps the standards.
     """
-    if config.floor_plan is not None:
-        config.check()
-        floor_plan = load_floor_plan(config.floor_plan)
-    else:
-        specs = programme(seed, scene, config, attempt)
-        floor_plan = choose_floor_plan(seed, scene, config, specs, attempt)
-    ceiling_cm = floor_plan.ceiling_cm or _ceiling_cm(seed, scene, attempt)
-    doors = list(floor_plan.doors)
-    if config.floor_plan is None:
-        doors = draw_doors(floor_plan, config, seed, scene, attempt)
-    windows = list(floor_plan.windows or ())
-    if floor_plan.windows is None and config.windows:
-        windows = draw_windows(floor_plan, doors, ceiling_cm, seed, scene, attempt)
-    return _assembled(
-        floor_plan, doors, windows, ceiling_cm, (seed, scene, attempt), config, catalogue
-    )
+    config.check()
+    draft = HouseDraft(SceneKey(seed, scene, attempt), config, catalogue)
+    for stage in STAGES:
+        stage(draft)
+    return _finished(draft)
 
 
-def _assembled(
-    floor_plan: FloorPlan,
-    doors: Sequence[Opening],
-    windows: Sequence[Opening],
-    ceiling_cm: int,
-    key: tuple[int, int, int],
-    config: HouseConfig,
-    catalogue: Catalogue,
-) -> House:
-    seed, scene, attempt = key
-    grid, types = floor_plan.grid, floor_plan.types
-    openings = [*doors, *windows]
-    surfaces, materials = draw_materials(types, seed, scene, attempt)
-    things = furnish(
-        grid,
-        types,
-        openings,
-        ceiling_cm / 100.0,
-        config.furnishing,
-        catalogue,
-        seed,
-        scene,
-        attempt,
-    )
-    used = sorted({thing.asset_id for thing in things})
+def _finished(draft: HouseDraft) -> House:
+    """Turn a draft on centimetres into the record in metres, with its walls and surfaces."""
+    plan, grid = draft.plan, draft.plan.grid
+    count = len(plan.types)
+    surfaces, materials = draw_materials(draft.key, plan.types)
+    used = sorted({thing.asset_id for thing in draft.objects})
     return House(
-        scene_id=f"scene-{scene:06d}",
-        scene=scene,
-        seed=seed,
-        split=split_of_scene(scene),
-        preset=config.preset,
-        outline=_metres(grid.polygon(frozenset(range(len(types))))),
-        rooms=_rooms(floor_plan, surfaces, ceiling_cm),
-        doors=tuple(_door(k, o) for k, o in enumerate(doors)),
-        windows=tuple(_window(k, o) for k, o in enumerate(windows)),
-        walls=build_walls(grid, openings, ceiling_cm),
-        objects=things,
+        scene_id=f"scene-{draft.key.scene:06d}",
+        scene=draft.key.scene,
+        seed=draft.key.seed,
+        split=split_of_scene(draft.key.scene),
+        preset=draft.config.preset,
+        outline=_metres(grid.polygon(frozenset(range(count)))),
+        rooms=_rooms(plan, surfaces, draft.ceiling_cm),
+        doors=tuple(_door(k, o) for k, o in enumerate(draft.doors)),
+        windows=tuple(_window(k, o) for k, o in enumerate(draft.windows)),
+        walls=build_walls(grid, (*draft.doors, *draft.windows), draft.ceiling_cm),
+        objects=draft.objects,
         materials=materials,
-        room_graph=tuple(sorted({o.rooms for o in doors if o.open})),
-        area_m2=round_m(sum(grid.area_cm2(room) for room in range(len(types))) / 1e4),
-        assets={asset_id: catalogue.assets[asset_id] for asset_id in used},
+        room_graph=tuple(sorted({o.rooms for o in draft.doors if o.open})),
+        area_m2=round_m(sum(grid.area_cm2(room) for room in range(count)) / 1e4),
+        assets={asset_id: draft.catalogue.assets[asset_id] for asset_id in used},
     )

@@ -1,13 +1,13 @@
-"""Does it fit? Boxes in a room, tested in numba: no overlap, doors clear, every way still open.
+"""Tests of fit in numba: boxes of furniture in a room, no overlap, doors clear, floor passable.
 
-All tests use the bounding boxes of things and a square instead of the agent's disc. What passes
-here passes the exact lattice too: bounding boxes hold the true footprints and the square holds the
-disc, and no box inflated by 0.2 m is thinner than the 0.25 m between two nodes.
+All tests use the bounding boxes of items and a square instead of the agent's disc. A pose that
+passes here passes the exact lattice too: bounding boxes hold the true footprints and the square
+holds the disc, and no box inflated by 0.2 m is thinner than the 0.25 m between two nodes.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -19,14 +19,51 @@ if TYPE_CHECKING:
     from internav_data.core.typing import Bools, Floats, Ints
 
 GAP_M = 0.02
-"""Least distance between things of different groups."""
+"""Smallest distance between items of different groups."""
 FROM_WALL_M = 0.005
-"""Least distance between a thing and a wall."""
+"""Smallest distance between an item and a wall."""
+
+
+class GroupBoxes(NamedTuple):
+    """Boxes of a furniture group in its own frame: x0, y0, x1, y1, z0, z1 in metres."""
+
+    items: Floats
+    """(k, 6) float64: bounding boxes of the items."""
+    blocking: Bools
+    """(k,) bool: the items that the agent's disc keeps clear of."""
+    fronts: Floats
+    """(q, 6) float64: boxes before the items that stay clear."""
+
+
+class RoomBoxes(NamedTuple):
+    """Boxes of a room: x0, y0, x1, y1, z0, z1 in metres."""
+
+    inner: Floats
+    """(4,) float64: the room's bounding box between wall faces."""
+    solids: Floats
+    """(n, 6) float64: placed items, and walls inside the bounding box."""
+    keep_out: Floats
+    """(m, 6) float64: boxes that stay clear of items."""
+
+
+class FreeNodes(NamedTuple):
+    """Lattice nodes of a room that are free for the agent's disc, and what must remain of them."""
+
+    free: Bools
+    """(nx, ny) bool, changed in place as items are placed."""
+    origin: Ints
+    """(2,) int64: lattice indices of `free[0, 0]`."""
+    door_cells: Ints
+    """(doors, 2) int64: indices in `free` of one node at each door."""
+    min_free: int
+    """Smallest allowed number of free nodes joined to the doors."""
+    min_joined: float
+    """Smallest allowed share of the free nodes that are joined to the doors."""
 
 
 @njit(cache=True)
 def turn_box(box: Floats, x: float, y: float, turn: int, out: Floats) -> None:
-    """Write a box (x0, y0, x1, y1, z0, z1), turned by quarter turns and moved to (x, y)."""
+    """Turn a box (6,) by quarter turns about the origin, move it by (x, y) m, write it to `out`."""
     if turn == 0:
         out[0], out[1], out[2], out[3] = box[0], box[1], box[2], box[3]
     elif turn == 1:
@@ -43,9 +80,12 @@ def turn_box(box: Floats, x: float, y: float, turn: int, out: Floats) -> None:
 
 
 @njit(cache=True)
-def hits(box: Floats, boxes: Floats, count: int, gap: float) -> bool:
-    """Whether a box comes nearer than a gap (in plan) to one of some boxes at its height."""
-    for k in range(count):
+def hits(box: Floats, boxes: Floats, gap: float) -> bool:
+    """Return whether a box (6,) comes nearer than a gap in plan to one of boxes (n, 6).
+
+    Only boxes that overlap it in height count. Coordinates and gap are metres.
+    """
+    for k in range(len(boxes)):
         other = boxes[k]
         if (
             box[0] < other[2] + gap
@@ -61,9 +101,9 @@ def hits(box: Floats, boxes: Floats, count: int, gap: float) -> bool:
 
 @njit(cache=True)
 def any_overlap(first: Floats, second: Floats, gap: float) -> bool:
-    """Whether boxes (n, 6) come nearer than a gap in plan to others at the same height.
+    """Return whether boxes (n, 6) come nearer than a gap (m) in plan to others at the same height.
 
-    What lies on a box does not touch it: heights may meet.
+    A box that lies on another does not touch it: heights may meet.
     """
     lifted = np.empty(6)
     for k in range(len(first)):
@@ -71,7 +111,7 @@ def any_overlap(first: Floats, second: Floats, gap: float) -> bool:
         # A tenth of a millimetre forgives the last bits of heights.
         lifted[4] += 1e-4
         lifted[5] -= 1e-4
-        if hits(lifted, second, len(second), gap):
+        if hits(lifted, second, gap):
             return True
     return False
 
@@ -88,7 +128,11 @@ def _within(box: Floats, inner: Floats, gap: float) -> bool:
 
 @njit(cache=True)
 def mark_blocked(free: Bools, origin: Ints, box: Floats) -> None:
-    """Mark the nodes that a box takes from the agent."""
+    """Clear the nodes of `free` (nx, ny) that a box (6,) takes from the agent.
+
+    A square of the disc's radius stands for the disc: the nodes on the box's rounded corners are
+    taken too.
+    """
     if box[4] >= HIGHEST_M or box[5] <= LOWEST_M:
         return
     reach = CLEARANCE_M
@@ -103,7 +147,7 @@ def mark_blocked(free: Bools, origin: Ints, box: Floats) -> None:
 
 @njit(cache=True)
 def flood_fill(free: Bools, start_i: int, start_j: int) -> Bools:
-    """Nodes joined to a start, over four neighbours."""
+    """Return the nodes (nx, ny) that are joined to a start over four neighbours, as bool."""
     seen = np.zeros_like(free)
     if not free[start_i, start_j]:
         return seen
@@ -125,8 +169,18 @@ def flood_fill(free: Bools, start_i: int, start_j: int) -> Bools:
 
 
 @njit(cache=True)
-def doors_connected(free: Bools, door_cells: Ints, min_free: int, share: float) -> bool:
-    """Whether all doors are joined and enough of the free nodes with them."""
+def doors_connected(free: Bools, door_cells: Ints, min_free: int, min_joined: float) -> bool:
+    """Return whether all doors are joined, and enough of the free nodes with them.
+
+    Parameters
+    ----------
+    free
+        (nx, ny) bool: nodes free for the disc.
+    door_cells
+        (doors, 2) int64: one node at each door.
+    min_free, min_joined
+        Smallest number of joined nodes, and their smallest share of the free ones.
+    """
     total = 0
     for i in range(free.shape[0]):
         for j in range(free.shape[1]):
@@ -143,83 +197,67 @@ def doors_connected(free: Bools, door_cells: Ints, min_free: int, share: float) 
     for i in range(free.shape[0]):
         for j in range(free.shape[1]):
             count += seen[i, j]
-    return count >= min_free and count >= share * total
+    return count >= min_free and count >= min_joined * total
 
 
 @njit(cache=True)
-def _is_free(
-    moved: Floats,
-    inner: Floats,
-    solids: Floats,
-    solid_count: int,
-    keep_out_boxes: Floats,
-    keep_out_count: int,
-) -> bool:
-    """Whether boxes lie in the room, apart from what stands there and what must stay clear."""
+def _is_free(moved: Floats, room: RoomBoxes) -> bool:
+    """Return whether boxes (k, 6) lie in the room, apart from its solids and keep-out boxes."""
     for k in range(len(moved)):
         if (
-            not _within(moved[k], inner, FROM_WALL_M)
-            or hits(moved[k], solids, solid_count, GAP_M)
-            or hits(moved[k], keep_out_boxes, keep_out_count, 0.0)
+            not _within(moved[k], room.inner, FROM_WALL_M)
+            or hits(moved[k], room.solids, GAP_M)
+            or hits(moved[k], room.keep_out, 0.0)
         ):
             return False
     return True
 
 
 @njit(cache=True)
-def _stays_connected(
-    moved: Floats,
-    blocking: Bools,
-    free: Bools,
-    origin: Ints,
-    door_cells: Ints,
-    min_free: int,
-    share: float,
-) -> bool:
-    trial = free.copy()
-    for k in range(len(moved)):
-        if blocking[k]:
-            mark_blocked(trial, origin, moved[k])
-    return doors_connected(trial, door_cells, min_free, share)
+def _fronts_clear(fronts: Floats, x: float, y: float, turn: int, room: RoomBoxes) -> bool:
+    """Return whether the boxes before a group, moved to a pose, are in the room and empty."""
+    box = np.empty(6)
+    for k in range(len(fronts)):
+        turn_box(fronts[k], x, y, turn, box)
+        if not _within(box, room.inner, 0.0) or hits(box, room.solids, 0.0):
+            return False
+    return True
 
 
 @njit(cache=True)
-def first_fit(
-    poses: Floats,
-    items: Floats,
-    blocking: Bools,
-    fronts: Floats,
-    inner: Floats,
-    solids: Floats,
-    solid_count: int,
-    keep_out_boxes: Floats,
-    keep_out_count: int,
-    free: Bools,
-    origin: Ints,
-    door_cells: Ints,
-    min_free: int,
-    share: float,
-) -> int:
-    """Index of the first spot where a group fits, -1 for none.
+def _stays_connected(moved: Floats, blocking: Bools, nodes: FreeNodes) -> bool:
+    """Return whether the room stays passable with boxes (k, 6) in it."""
+    trial = nodes.free.copy()
+    for k in range(len(moved)):
+        if blocking[k]:
+            mark_blocked(trial, nodes.origin, moved[k])
+    return doors_connected(trial, nodes.door_cells, nodes.min_free, nodes.min_joined)
 
-    Shapes: spots (m, 3): x, y, quarter turns; items (k, 6) and fronts (q, 6) in the group's frame;
-    inner (4,): the room's bounding box between wall faces; solids and keeps (n, 6): what stands in
-    the room (its inner walls too) and what must stay clear; free (nx, ny); anchors (doors, 2).
+
+@njit(cache=True)
+def first_fit(poses: Floats, group: GroupBoxes, room: RoomBoxes, nodes: FreeNodes) -> int:
+    """Return the index of the first pose at which a group fits, -1 for none.
+
+    Parameters
+    ----------
+    poses
+        (m, 3) float64: x and y in metres, quarter turns; the preferred pose first.
+    group
+        Boxes of the group in its own frame.
+    room
+        Boxes of the room. The cheap tests against them come first.
+    nodes
+        Free nodes of the room: the flood fill over them is the expensive test.
     """
-    box = np.empty(6)
-    moved = np.empty_like(items)
+    moved = np.empty_like(group.items)
     for m in range(len(poses)):
         x, y, turn = poses[m, 0], poses[m, 1], int(poses[m, 2])
-        for k in range(len(items)):
-            turn_box(items[k], x, y, turn, moved[k])
-        if not _is_free(moved, inner, solids, solid_count, keep_out_boxes, keep_out_count):
-            continue
-        good = True
-        for k in range(len(fronts)):
-            turn_box(fronts[k], x, y, turn, box)
-            if not _within(box, inner, 0.0) or hits(box, solids, solid_count, 0.0):
-                good = False
-                break
-        if good and _stays_connected(moved, blocking, free, origin, door_cells, min_free, share):
+        for k in range(len(moved)):
+            turn_box(group.items[k], x, y, turn, moved[k])
+        if (
+            _is_free(moved, room)
+            and _fronts_clear(group.fronts, x, y, turn, room)
+            and _stays_connected(moved, group.blocking, nodes)
+        ):
             return m
     return -1

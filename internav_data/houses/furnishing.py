@@ -8,15 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from internav_data.geometry import yaw_quaternion
-from internav_data.houses.choice import clear_area_m2
 from internav_data.houses.faces import WallFace, poses_along, wall_faces
-from internav_data.houses.fitting import (
-    first_fit,
-    mark_blocked,
-    turn_box,
-)
+from internav_data.houses.fitting import FreeNodes, RoomBoxes, first_fit, mark_blocked, turn_box
 from internav_data.houses.pieces import BACK_GAP_M
-from internav_data.houses.plan import clear_size_m
+from internav_data.houses.plan import clear_area_m2, clear_size_m
 from internav_data.houses.standards import DOOR_CLEAR_CM, HALF_WALL_CM
 from internav_data.records.agent import CLEARANCE_M, SPACING_M
 
@@ -28,10 +23,12 @@ if TYPE_CHECKING:
 
     from internav_data.core.typing import Floats
     from internav_data.houses.pieces import Group
-    from internav_data.houses.plan import FloorGrid, Opening
+    from internav_data.houses.plan import FloorGrid, FloorPlan, Opening
 
 CAPACITY = 160
-"""Most boxes in one room."""
+"""Largest number of boxes in one room."""
+LARGEST_GROUP = 24
+"""Largest number of boxes in one group: a room with less space than that counts as full."""
 MIN_FREE = 0.45
 """Share of an empty room's nodes that furniture leaves to the agent."""
 JOINED = 0.93
@@ -45,69 +42,58 @@ WINDOW_DEPTH_M = 0.45
 
 @dataclass(slots=True)
 class RoomState:
-    """A room while it is furnished (metres)."""
+    """A room while it is furnished; metres."""
 
     room: int
     type: str
     inner: Floats
+    """(4,) float64: x0, y0, x1, y1 of the bounding box between wall faces."""
     area_m2: float
-    """Between the wall faces."""
+    """Area between the wall faces."""
     short_m: float
     """Shorter side of the largest rectangle in the room, between wall faces."""
     wall_faces: tuple[WallFace, ...]
-    solids: Floats
-    keep_out_boxes: Floats
-    free: NDArray[np.bool_]
-    origin: NDArray[np.int64]
-    door_cells: NDArray[np.int64]
-    min_free: int
-    joined: float
+    nodes: FreeNodes
+    solids: Floats = field(default_factory=lambda: np.zeros((CAPACITY, 6)))
+    """(CAPACITY, 6) float64, of which `solid_count` are set."""
+    keep_out: Floats = field(default_factory=lambda: np.zeros((CAPACITY, 6)))
+    """(CAPACITY, 6) float64, of which `keep_out_count` are set."""
     solid_count: int = 0
     keep_out_count: int = 0
     placed: list[tuple[Group, float, float, int]] = field(default_factory=list)
+    """Groups in the room with x, y and quarter turns."""
 
     def add_solid(self, box: Floats) -> None:
-        """Let a box stand in the room."""
+        """Let a box (6,) stand in the room."""
         self.solids[self.solid_count] = box
         self.solid_count += 1
 
     def add_keep_out(self, box: Floats) -> None:
-        """Keep a box clear of things."""
-        self.keep_out_boxes[self.keep_out_count] = box
+        """Keep a box (6,) clear of items."""
+        self.keep_out[self.keep_out_count] = box
         self.keep_out_count += 1
 
     def place(self, group: Group, poses: Floats) -> bool:
-        """Put a group at the first spot (x, y, quarter turns) where it fits, if there is one."""
-        full = CAPACITY - 24
+        """Put a group at the first pose where it fits; return whether there is one.
+
+        `poses` is (m, 3) float64: x and y in metres, quarter turns.
+        """
+        full = CAPACITY - LARGEST_GROUP
         if len(poses) == 0 or self.solid_count > full or self.keep_out_count > full:
             return False
-        items, blocking = group.boxes, group.blocking
-        m = first_fit(
-            poses,
-            items,
-            blocking,
-            group.fronts,
-            self.inner,
-            self.solids,
-            self.solid_count,
-            self.keep_out_boxes,
-            self.keep_out_count,
-            self.free,
-            self.origin,
-            self.door_cells,
-            self.min_free,
-            self.joined,
-        )
+        solids, keep_out = self.solids[: self.solid_count], self.keep_out[: self.keep_out_count]
+        boxes = group.kernel_boxes
+        m = first_fit(poses, boxes, RoomBoxes(self.inner, solids, keep_out), self.nodes)
         if m < 0:
             return False
         x, y, turn = float(poses[m, 0]), float(poses[m, 1]), int(poses[m, 2])
         box = np.empty(6)
-        for k in range(len(items)):
-            turn_box(items[k], x, y, turn, box)
+        for k in range(len(boxes.items)):
+            turn_box(boxes.items[k], x, y, turn, box)
             self.add_solid(box)
-            if blocking[k]:
-                mark_blocked(self.free, self.origin, box)
-        for front in group.fronts:
+            if boxes.blocking[k]:
+                mark_blocked(self.nodes.free, self.nodes.origin, box)
+        for front in boxes.fronts:
             turn_box(front, x, y, turn, box)
             self.add_keep_out(box)
         self.placed.append((group, x, y, turn))
@@ -200,68 +186,87 @@ def _door_cell(opening: Opening, side: int, origin: NDArray[np.int64]) -> tuple[
 
 
 def room_state(
-    grid: FloorGrid, room: int, name: str, openings: Sequence[Opening], ceiling_m: float
+    plan: FloorPlan, room: int, openings: Sequence[Opening], ceiling_m: float
 ) -> RoomState:
-    """Return an empty room with its doors' and windows' clear boxes."""
-    cells = grid.cells[room]
-    i0, i1 = min(i for i, _ in cells), max(i for i, _ in cells) + 1
-    j0, j1 = min(j for _, j in cells), max(j for _, j in cells) + 1
-    half = HALF_WALL_CM / 100.0
-    inner = np.array(
-        [
-            grid.xs[i0] / 100.0 + half,
-            grid.ys[j0] / 100.0 + half,
-            grid.xs[i1] / 100.0 - half,
-            grid.ys[j1] / 100.0 - half,
-        ]
-    )
+    """Return an empty room, with keep-out boxes before its doors and windows."""
+    grid = plan.grid
+    inner = _inner_box(grid, room)
+    mine = [(o, _side_of(grid, room, o)) for o in openings if room in o.rooms]
+    doors = [(o, side) for o, side in mine if o.kind is not None]
     origin = np.floor(inner[:2] / SPACING_M).astype(np.int64)
-    shape = np.ceil(inner[2:] / SPACING_M).astype(np.int64) - origin + 1
-    reach = CLEARANCE_M
-    xs = (origin[0] + np.arange(shape[0])) * SPACING_M
-    ys = (origin[1] + np.arange(shape[1])) * SPACING_M
-    free = ((xs >= inner[0] + reach) & (xs <= inner[2] - reach))[:, None] & (
-        (ys >= inner[1] + reach) & (ys <= inner[3] - reach)
-    )[None, :]
-    mine = [o for o in openings if room in o.rooms]
-    doors = [o for o in mine if o.kind is not None]
-    sides = [_side_of(grid, room, o) for o in doors]
-    door_cells = [_door_cell(o, side, origin) for o, side in zip(doors, sides, strict=True)]
+    free = _free_nodes(inner, origin)
+    solids = _other_rooms(grid, room, ceiling_m)
+    for box in solids:
+        mark_blocked(free, origin, box)
+    count = int(free.sum())
+    small = count < SMALL_NODES
+    cells = [_door_cell(o, side, origin) for o, side in doors]
+    nodes = FreeNodes(
+        free,
+        origin,
+        np.array(cells, dtype=np.int64).reshape(-1, 2),
+        int((MIN_FREE_SMALL if small else MIN_FREE) * count),
+        JOINED_SMALL if small else JOINED,
+    )
     state = RoomState(
         room,
-        name,
+        plan.types[room],
         inner,
         clear_area_m2(grid, room),
         clear_size_m(grid.main_rectangle(room))[0],
-        wall_faces(grid.polygon(frozenset({room})), mine),
-        np.zeros((CAPACITY, 6)),
-        np.zeros((CAPACITY, 6)),
-        np.ascontiguousarray(free),
-        origin,
-        np.array(door_cells, dtype=np.int64).reshape(-1, 2),
-        0,
-        JOINED,
+        wall_faces(grid.polygon(frozenset({room})), [o for o, _ in mine]),
+        nodes,
     )
-    for i in range(i0, i1):
-        for j in range(j0, j1):
+    for box in solids:
+        state.add_solid(box)
+    for o, side in doors:
+        state.add_keep_out(_box_beside(o, side, DOOR_CLEAR_CM, 0.0, o.top / 100.0))
+    for o, side in mine:
+        if o.kind is None:
+            depth = WINDOW_DEPTH_M * 100.0
+            state.add_keep_out(_box_beside(o, side, depth, o.bottom / 100.0, o.top / 100.0))
+    return state
+
+
+def _inner_box(grid: FloorGrid, room: int) -> Floats:
+    """Bounding box (4,) of a room between its wall faces: x0, y0, x1, y1 in metres."""
+    columns, rows = zip(*grid.cells[room], strict=True)
+    half = HALF_WALL_CM / 100.0
+    return np.array(
+        [
+            grid.xs[min(columns)] / 100.0 + half,
+            grid.ys[min(rows)] / 100.0 + half,
+            grid.xs[max(columns) + 1] / 100.0 - half,
+            grid.ys[max(rows) + 1] / 100.0 - half,
+        ]
+    )
+
+
+def _free_nodes(inner: Floats, origin: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Lattice nodes (nx, ny), from `origin` on, on which the disc is clear of the outer walls."""
+    shape = np.ceil(inner[2:] / SPACING_M).astype(np.int64) - origin + 1
+    xs = (origin[0] + np.arange(shape[0])) * SPACING_M
+    ys = (origin[1] + np.arange(shape[1])) * SPACING_M
+    in_x = (xs >= inner[0] + CLEARANCE_M) & (xs <= inner[2] - CLEARANCE_M)
+    in_y = (ys >= inner[1] + CLEARANCE_M) & (ys <= inner[3] - CLEARANCE_M)
+    return np.ascontiguousarray(in_x[:, None] & in_y[None, :])
+
+
+def _other_rooms(grid: FloorGrid, room: int, ceiling_m: float) -> list[Floats]:
+    """Boxes (6,) of the cells in a room's bounding box that are not its own, walls included.
+
+    An L-shaped room is a rectangle in which the missing corner is solid.
+    """
+    columns, rows = zip(*grid.cells[room], strict=True)
+    half = HALF_WALL_CM / 100.0
+    out: list[Floats] = []
+    for i in range(min(columns), max(columns) + 1):
+        for j in range(min(rows), max(rows) + 1):
             if grid.owner[i][j] != room:
                 x0, x1 = grid.xs[i] / 100.0 - half, grid.xs[i + 1] / 100.0 + half
                 y0, y1 = grid.ys[j] / 100.0 - half, grid.ys[j + 1] / 100.0 + half
-                box = np.array([x0, y0, x1, y1, 0.0, ceiling_m])
-                state.add_solid(box)
-                mark_blocked(state.free, origin, box)
-    for o, side in zip(doors, sides, strict=True):
-        state.add_keep_out(_box_beside(o, side, DOOR_CLEAR_CM, 0.0, o.top / 100.0))
-    for o in mine:
-        if o.kind is None:
-            depth = WINDOW_DEPTH_M * 100.0
-            side = _side_of(grid, room, o)
-            state.add_keep_out(_box_beside(o, side, depth, o.bottom / 100.0, o.top / 100.0))
-    nodes = int(state.free.sum())
-    small = nodes < SMALL_NODES
-    state.min_free = int((MIN_FREE_SMALL if small else MIN_FREE) * nodes)
-    state.joined = JOINED_SMALL if small else JOINED
-    return state
+                out.append(np.array([x0, y0, x1, y1, 0.0, ceiling_m]))
+    return out
 
 
 def quarter_quaternion(turn: int) -> tuple[float, float, float, float]:

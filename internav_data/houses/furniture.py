@@ -10,14 +10,15 @@ from internav_data.houses.group_makers import GROUP_MAKERS
 from internav_data.houses.groups import RoomContext
 from internav_data.houses.pieces import Picker, consistent
 from internav_data.houses.room_types import ROOM_TYPES
-from internav_data.records import Purpose, SceneObject, generator
+from internav_data.records import Purpose, SceneObject
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from internav_data.catalog import Catalogue
-    from internav_data.houses.plan import FloorGrid, Opening
+    from internav_data.houses.plan import FloorPlan, Opening
     from internav_data.houses.room_types import FurnitureRule
+    from internav_data.records import SceneKey
 
 CERTAIN = 1.0
 """Rules of this share are what a room cannot do without."""
@@ -26,23 +27,20 @@ MAX_GROUPS = 4
 
 
 def furnish(
-    grid: FloorGrid,
-    types: Sequence[str],
+    key: SceneKey,
+    floor_plan: FloorPlan,
     openings: Sequence[Opening],
     ceiling_m: float,
     density: float,
     catalogue: Catalogue,
-    seed: int,
-    scene: int,
-    attempt: int,
 ) -> tuple[SceneObject, ...]:
     """Return the things of a house, by room and group."""
     objects: list[SceneObject] = []
-    for room, name in enumerate(types):
-        state = room_state(grid, room, name, openings, ceiling_m)
+    for room in range(len(floor_plan.types)):
+        state = room_state(floor_plan, room, openings, ceiling_m)
         # Each room has numbers of its own: another room's luck does not change it.
-        rng = generator(seed, Purpose.FURNITURE, scene, attempt, draw=room)
-        _furnish_room(state, frozenset(types), Picker(catalogue, rng), density)
+        rng = key.generator(Purpose.FURNITURE, draw=room)
+        _furnish_room(state, frozenset(floor_plan.types), Picker(catalogue, rng), density)
         objects += _scene_objects(state, len(objects), _groups(objects))
     return tuple(objects)
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from internav_data.houses.room_types import ROOM_TYPES
-from internav_data.records import Material, Purpose, generator
+from internav_data.records import Material, Purpose
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from internav_data.records import RGB
+    from internav_data.records import RGB, SceneKey
 
 _FLOORS: Mapping[str, tuple[RGB, str]] = {
     "oak planks": (
@@ -51,14 +51,14 @@ def _names(table: Mapping[str, tuple[RGB, str]], patterns: set[str]) -> list[str
 
 
 def draw_materials(
-    types: Sequence[str], seed: int, scene: int, attempt: int
+    key: SceneKey, types: Sequence[str]
 ) -> tuple[list[tuple[str, str]], tuple[Material, ...]]:
     """Return (floor, wall) by room and the materials they name, in order of their names.
 
     A house has one kind of planks for its dry rooms and one kind of tiles for the others; walls
     share a colour, and single rooms have their own.
     """
-    rng = generator(seed, Purpose.MATERIALS, scene, attempt)
+    rng = key.generator(Purpose.MATERIALS)
 
     def one(names: Sequence[str]) -> str:
         return names[int(float(rng.random()) * len(names))]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from internav_data.houses.access import JAMB_CM, WallSpan, loop_doors, possible_doors, spans
+from internav_data.houses.access import JAMB_CM, WallSpan, loop_doors, spans
 from internav_data.houses.plan import Opening
 from internav_data.houses.room_types import ROOM_PAIRS, ROOM_TYPES, type_pair
 from internav_data.houses.standards import MIN_DOOR_CM
-from internav_data.records import OUTSIDE, Purpose, generator
+from internav_data.records import OUTSIDE, Purpose
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from internav_data.houses.config import HouseConfig
     from internav_data.houses.plan import FloorGrid, FloorPlan
-    from internav_data.records import DoorKind
+    from internav_data.records import DoorKind, SceneKey
 
 
 def _kind(types: tuple[str, str], config: HouseConfig, rng: Generator) -> tuple[DoorKind, int]:
@@ -50,18 +50,15 @@ def _placed(span: WallSpan, width: int, rng: Generator) -> int:
     return span.low + int(spare * where)
 
 
-def draw_doors(
-    floor_plan: FloorPlan, config: HouseConfig, seed: int, scene: int, attempt: int
-) -> list[Opening]:
+def draw_doors(key: SceneKey, config: HouseConfig, floor_plan: FloorPlan) -> list[Opening]:
     """Doors of the tree and of the loops, and the entrance, in order of their rooms."""
-    rng = generator(seed, Purpose.DOORS, scene, attempt)
+    rng = key.generator(Purpose.DOORS)
     grid, types = floor_plan.grid, floor_plan.types
-    possible = possible_doors(grid, MIN_DOOR_CM[config.preset])
-    loops = loop_doors(types, sorted(possible), floor_plan.tree, config.loops, rng)
+    loops = loop_doors(types, sorted(floor_plan.spans), floor_plan.tree, config.loops, rng)
     out: list[Opening] = []
     for a, b in sorted([*floor_plan.tree, *loops]):
         kind, width = _kind((types[a], types[b]), config, rng)
-        span = possible[a, b][0]
+        span = floor_plan.spans[a, b][0]
         if span.length < width:
             kind, width = _fitting(span.length, config)
         width = min(width, span.length // 2 * 2)
@@ -104,15 +101,10 @@ def _entrance(
 
 
 def draw_windows(
-    floor_plan: FloorPlan,
-    doors: Sequence[Opening],
-    ceiling_cm: int,
-    seed: int,
-    scene: int,
-    attempt: int,
+    key: SceneKey, floor_plan: FloorPlan, doors: Sequence[Opening], ceiling_cm: int
 ) -> list[Opening]:
     """Windows in the outer walls, more of them where people stay."""
-    rng = generator(seed, Purpose.WINDOWS, scene, attempt)
+    rng = key.generator(Purpose.WINDOWS)
     grid, out = floor_plan.grid, []
     for segment in grid.segments:
         if OUTSIDE not in {segment.before, segment.after}:

@@ -12,13 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from internav_data.geometry import asset_corners
-from internav_data.houses.fitting import any_overlap, turn_box
+from internav_data.houses.fitting import GroupBoxes, any_overlap, turn_box
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.random import Generator
-    from numpy.typing import NDArray
 
     from internav_data.catalog import Catalogue
     from internav_data.core.typing import Floats
@@ -71,14 +70,12 @@ class Group:
         return out
 
     @cached_property
-    def blocking(self) -> NDArray[np.bool_]:
-        """Which items stand in the agent's way."""
-        return np.array([item.asset.blocks for item in self.items])
-
-    @cached_property
-    def fronts(self) -> Floats:
-        """Boxes to keep clear, (n, 6)."""
-        return np.array([(*c, 0.03, 1.8) for c in self.clear]).reshape(-1, 6)
+    def kernel_boxes(self) -> GroupBoxes:
+        """Boxes of the group as the kernels take them."""
+        blocking = np.array([item.asset.blocks for item in self.items])
+        # From a rug's thickness to the agent's height.
+        fronts = np.array([(*c, 0.03, 1.8) for c in self.clear]).reshape(-1, 6)
+        return GroupBoxes(self.boxes, blocking, fronts)
 
     @property
     def left(self) -> float:

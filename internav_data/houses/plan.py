@@ -6,21 +6,25 @@ rooms tile their outline by construction: there are no overlaps and no gaps to c
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from internav_data.houses.standards import DOOR_HEIGHT_CM, WALL_CM
+from internav_data.houses.standards import DOOR_HEIGHT_CM, HALF_WALL_CM, WALL_CM
 from internav_data.records import OUTSIDE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    from internav_data.houses.access import WallSpan
     from internav_data.records import DoorKind
 
 Rect = tuple[int, int, int, int]
 """x_min, y_min, x_max, y_max in centimetres, centre line to centre line."""
 Corner = tuple[int, int]
+"""x, y in centimetres."""
+RoomEdge = tuple[int, int]
+"""Two rooms that a door joins or may join, ascending."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,26 +196,41 @@ def _without_straight(path: list[Corner]) -> tuple[Corner, ...]:
 
 @dataclass(frozen=True, slots=True)
 class FloorPlan:
-    """Rooms on the grid and the doors that are certain.
+    """Rooms on the grid and the pairs of rooms that doors join.
 
     A user's plan brings its own doors and windows (see `internav_data.houses.plan_file`).
     """
 
     types: tuple[str, ...]
     grid: FloorGrid
-    tree: tuple[tuple[int, int], ...]
+    tree: tuple[RoomEdge, ...]
     """Pairs of rooms to be joined by a door, so that all rooms can be reached."""
-    score: float
-    """Lower is more like a home."""
+    spans: Mapping[RoomEdge, Sequence[WallSpan]] = field(default_factory=dict)
+    """Stretches of wall where a door is possible, by pair of rooms; empty for a user's plan."""
+    score_terms: Mapping[str, float] = field(default_factory=dict)
+    """Weighted penalties by name (see `internav_data.houses.plan_score`)."""
     doors: tuple[Opening, ...] = ()
     """A user's own doors; empty where they are to be drawn."""
     windows: tuple[Opening, ...] | None = None
     """A user's own windows; None where they are to be drawn."""
     ceiling_cm: int | None = None
-    """A user's own height."""
+    """A user's own height; None where it is to be drawn."""
+
+    @property
+    def score(self) -> float:
+        """Sum of the penalties: the lower, the more like a home."""
+        return sum(self.score_terms.values())
 
 
 def clear_size_m(rect: Rect) -> tuple[float, float]:
     """Shorter and longer side between the wall faces of a rectangle of centre lines, metres."""
     sides = sorted((rect[2] - rect[0] - WALL_CM, rect[3] - rect[1] - WALL_CM))
     return sides[0] / 100.0, sides[1] / 100.0
+
+
+def clear_area_m2(grid: FloorGrid, room: int) -> float:
+    """Area of a room between its wall faces, m²."""
+    # Half a wall off all around, but a rectilinear polygon has four more outer corners than inner
+    # ones, at which the strips overlap.
+    around = sum(s.length for s in grid.segments if room in {s.before, s.after})
+    return (grid.area_cm2(room) - HALF_WALL_CM * around + 4 * HALF_WALL_CM**2) / 1e4

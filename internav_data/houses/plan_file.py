@@ -114,7 +114,6 @@ def _parsed(text: str, suffix: str) -> FloorPlan:
         types,
         grid,
         tree,
-        score=0.0,
         doors=tuple(doors),
         windows=tuple(windows) if "windows" in data else None,
         ceiling_cm=_ceiling(data),

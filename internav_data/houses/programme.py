@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from internav_data.houses.quota import SHARES, room_count
 from internav_data.houses.room_types import ROOM_TYPES, RoomStandard
-from internav_data.records import ProgrammeStream, Purpose, generator
+from internav_data.records import ProgrammeStream, Purpose
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from numpy.random import Generator
 
     from internav_data.houses.config import HouseConfig
+    from internav_data.records import SceneKey
 
 PAPER_AREA_M2 = 25.0
 """Area a room in the paper preset, measured on ProcTHOR's houses: 26, 47, 67, 103 … m²."""
@@ -120,20 +121,20 @@ def _areas(standards: list[RoomStandard], config: HouseConfig, rng: Generator) -
     return [a + 0.24 * math.sqrt(a) + 0.02 for a in areas]
 
 
-def programme(seed: int, scene: int, config: HouseConfig, attempt: int) -> tuple[RoomSpec, ...]:
+def programme(key: SceneKey, config: HouseConfig) -> tuple[RoomSpec, ...]:
     """Return the rooms of one house.
 
     The number of rooms is the same in every attempt: the quota must not depend on what failed.
     """
     request = config.check()
-    rng = generator(seed, Purpose.PROGRAMME, scene, attempt, episode=ProgrammeStream.ROOMS)
+    rng = key.generator(Purpose.PROGRAMME, episode=ProgrammeStream.ROOMS)
     if request.programme:
         types = list(request.programme)
     else:
         shares = SHARES
         if request.counts:
             shares = {count: SHARES[count] for count in request.counts}
-        types = _room_types(rng, room_count(seed, scene, shares), config.min_hall_rooms())
+        types = _room_types(rng, room_count(key.seed, key.scene, shares), config.min_hall_rooms())
     standards = _standards(types, config, rng)
     areas = _areas(standards, config, rng)
     return tuple(

@@ -8,10 +8,12 @@ from statistics import mean, median
 import pytest
 
 from internav_data.houses import HouseConfig, build_house
-from internav_data.houses.choice import choose_floor_plan
+from internav_data.houses.choice import choose_floor_plan, plan_candidate, scored_plan
+from internav_data.houses.layouts import row_layout
+from internav_data.houses.plan_score import PLAN_SCORE
 from internav_data.houses.programme import programme
 from internav_data.houses.room_types import ROOM_TYPES
-from internav_data.houses.standards import MIN_DOOR_CM
+from internav_data.records import Purpose, SceneKey, generator
 
 
 def test_realistic_minima_hold_in_every_house(sample, oracle):
@@ -59,38 +61,45 @@ def test_paper_houses_have_the_areas_of_procthor(assets):
 def test_odd_programmes_have_a_plan(preset, rooms):
     config = HouseConfig(preset=preset, rooms=rooms)
     for scene in range(3):
-        specs = programme(0, scene, config, 0)
-        assert len(choose_floor_plan(0, scene, config, specs, 0).types) == len(specs)
+        key = SceneKey(0, scene)
+        specs = programme(key, config)
+        assert len(choose_floor_plan(key, config, specs).types) == len(specs)
+
+
+def chosen(scene, **levers):
+    """The floor plan of one scene."""
+    key, config = SceneKey(0, scene), HouseConfig(**levers)
+    return choose_floor_plan(key, config, programme(key, config))
 
 
 def test_candidates_make_plans_better():
     def score(candidates):
-        config = HouseConfig(rooms="7", candidates=candidates)
-        return mean(
-            choose_floor_plan(0, k, config, programme(0, k, config, 0), 0).score for k in range(15)
-        )
+        return mean(chosen(k, rooms="7", candidates=candidates).score for k in range(15))
 
     assert score(24) < score(1)
 
 
-def test_the_plain_row_serves_every_programme(oracle):
-    from internav_data.houses.choice import score_floor_plan
-    from internav_data.houses.layouts import row_layout
-    from internav_data.houses.plan import FloorGrid
-    from internav_data.records import Purpose, generator
+def test_a_score_can_be_printed_term_by_term():
+    plans = [chosen(scene, rooms="7", candidates=2) for scene in range(8)]
+    names = [term.name for term in PLAN_SCORE]
+    assert len(set(names)) == len(names)
+    for plan in plans:
+        assert list(plan.score_terms) == names
+        assert plan.score == sum(plan.score_terms.values())
+        assert min(plan.score_terms.values()) >= 0.0
+    for name in names:
+        # Every penalty can be low and, but for the rarest, occurs.
+        assert min(plan.score_terms[name] for plan in plans) < 8.0, name
 
+
+def test_the_plain_row_serves_every_programme():
     for preset in ("paper", "realistic"):
         for scene in range(60):
             config = HouseConfig(preset=preset)
-            specs = programme(2, scene, config, 0)
-            layout = row_layout(specs)
-            grid = FloorGrid.of([layout[k] for k in range(len(specs))])
-            rng = generator(0, Purpose.FLOOR_PLAN)
-            width = MIN_DOOR_CM[preset]
-            assert score_floor_plan(grid, specs, width, rng, lenient=True) is not None, (
-                preset,
-                scene,
-            )
+            specs = programme(SceneKey(2, scene), config)
+            candidate = plan_candidate(row_layout(specs), specs, config, lenient=True)
+            plan = scored_plan(candidate, generator(0, Purpose.FLOOR_PLAN))
+            assert plan is not None, (preset, scene)
 
 
 def test_bathrooms_are_not_the_way_through_where_avoidable(sample):
