@@ -108,7 +108,7 @@ def stages_of(camera: Camera, view: CameraView) -> dict[str, float]:
     assert scratch is not None
     axes = camera_axes(view.yaw_deg, view.horizon_deg)
     eye = np.array((view.x, view.y, view.z))
-    structure, props, middle = view.scenery.structure, view.props, camera.size / 2.0
+    structure, props, middle = view.scene.structure, view.props, camera.size / 2.0
     images = (out.rgb[0], out.depth[0], out.ids[0])
     moved = (props.models, props.poses, props.present)
     portals = True

@@ -2,9 +2,9 @@
 
     python benchmarks/compare.py [--scenes 7] [--episodes 20] [--seed 0] [--out FILE]
 
-Both make the same number of episodes in the same houses in one process, what a house needs once
-included; what a process needs once (`internav_start_s`) is told apart. Then each judges the
-obstacle sets of the other: lattice steps must be equal, any-angle ways agree within 1 % (the
+Both make the same number of episodes in the same houses in one process; the preparation of a house
+counts, that of a process (`internav_start_s`) is reported apart. Then each judges the
+obstacle sets of the other: lattice steps must be equal, Euclidean paths agree within 1 % (the
 baseline's grown corners are polygons, so a gap a few millimetres too narrow is open to it).
 Exits 1 if they don't.
 """
@@ -65,7 +65,7 @@ def main() -> int:
 
 
 def _start(house: House, pool: tuple[Asset, ...], config: EpisodeConfig) -> None:
-    """Do what a worker does once in its life: load kernels, let every asset fall alone."""
+    """Prepare a process as a worker is prepared: load kernels, settle every asset alone."""
     build_episodes(house, 2, pool, config)
     for asset in pool:
         settle(Body.of(asset, Pose(0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 1.0))), math.inf, tuple)
@@ -82,9 +82,9 @@ def _row(
 ) -> dict[str, Any]:
     ours, our_s = _timed(lambda: build_episodes(house, count, pool, config))
     rng = np.random.default_rng([seed, house.scene])
-    most = config.most_obstacles(len(house.rooms))
-    site, house_s = _timed(lambda: naive.SpawnSite.of(house))
-    theirs, their_s = _timed(lambda: naive.build_episodes(site, count, pool, most, rng))
+    limit = config.max_obstacles_for(len(house.rooms))
+    site, house_s = _timed(lambda: naive.SharedHouse.of(house))
+    theirs, their_s = _timed(lambda: naive.build_episodes(site, count, pool, limit, rng))
     checked = [
         *(_theirs_on(site, e) for e in ours),
         *(_ours_on(SpawnSite.of(house), e) for e in theirs),
@@ -98,27 +98,27 @@ def _row(
         "obstacles_internav": sum(e.obstacle_count for e in ours),
         "obstacles_baseline": sum(len(e.obstacles) for e in theirs),
         "steps_differ": sum(not steps for steps, _ in checked),
-        "ways_differ": sum(not ways for _, ways in checked),
+        "paths_differ": sum(not paths for _, paths in checked),
         "checked": len(checked),
     }
     print(json.dumps(row), file=sys.stderr)
     return row
 
 
-def _theirs_on(site: naive.SpawnSite, episode: Episode) -> tuple[bool, bool]:
+def _theirs_on(site: naive.SharedHouse, episode: Episode) -> tuple[bool, bool]:
     """Let the baseline judge one of our episodes."""
     assets = catalogue().assets
     shapes = [
         shapely.union_all(naive.plan_of(assets[o.asset_id], o.pose)) for o in episode.obstacles
     ]
     start, goal = (episode.start.i, episode.start.j), (episode.goal.i, episode.goal.j)
-    steps, way = naive.judge(site, start, goal, shapes)
+    steps, path = naive.judge(site, start, goal, shapes)
     clear = naive.steps_between(site.grid, start, goal)
-    ways = _near(way, episode.obstructed_path_m) and _near(
+    paths = _near(path, episode.obstructed_path_m) and _near(
         naive.length(site.sight.path(naive._metres(start), naive._metres(goal)) or []),
         episode.shortest_path_m,
     )
-    return steps == episode.obstructed_path_steps and clear == episode.shortest_path_steps, ways
+    return steps == episode.obstructed_path_steps and clear == episode.shortest_path_steps, paths
 
 
 def _ours_on(site: SpawnSite, episode: naive.NaiveEpisode) -> tuple[bool, bool]:
@@ -129,12 +129,12 @@ def _ours_on(site: SpawnSite, episode: naive.NaiveEpisode) -> tuple[bool, bool]:
         lattice.add(shape)
     steps = lattice.distance(episode.start, episode.goal)
     ends = naive._metres(episode.start), naive._metres(episode.goal)
-    way = site.tangent_graph.distance(*ends, Polygons.joined(shapes))
+    path = site.tangent_graph.distance(*ends, Polygons.joined(shapes))
     clear = site.lattice.distance(episode.start, episode.goal)
-    ways = _near(way, episode.obstructed_path_m) and _near(
+    paths = _near(path, episode.obstructed_path_m) and _near(
         site.tangent_graph.distance(*ends), episode.shortest_path_m
     )
-    return steps == episode.obstructed_path_steps and clear == episode.shortest_path_steps, ways
+    return steps == episode.obstructed_path_steps and clear == episode.shortest_path_steps, paths
 
 
 def _near(first: float | None, second: float | None) -> bool:
@@ -147,7 +147,7 @@ def _summary(rows: list[dict[str, Any]], episodes: int, start_s: float) -> dict[
     our_s, their_s = (sum(row[k] for row in rows) for k in ("internav_s", "baseline_s"))
     total = len(rows) * episodes
     checked = sum(row["checked"] for row in rows)
-    differing = sum(row["ways_differ"] for row in rows)
+    differing = sum(row["paths_differ"] for row in rows)
     return {
         "benchmark": "compare",
         "python": platform.python_version(),
@@ -160,7 +160,7 @@ def _summary(rows: list[dict[str, Any]], episodes: int, start_s: float) -> dict[
         "target": 20.0,
         "checked": checked,
         "steps_differ": sum(row["steps_differ"] for row in rows),
-        "ways_differ": differing,
+        "paths_differ": differing,
         # Gaps within a millimetre of the disc's width are open to one and shut to the other.
         "agree": all(row["steps_differ"] == 0 for row in rows) and differing <= checked * 0.02,
         "rows": rows,

@@ -1,11 +1,11 @@
-"""How many steps a second environments make, on one core; JSON out.
+"""Environment steps/s on one core; JSON out.
 
     python benchmarks/envs.py DATASET [--image-size 64] [--num-envs 16] [--seconds 6] [--out FILE]
 
 `navigation`: MoveAhead, rotations and looks as an agent walks (in the shares 12:3:3:1:1);
 `uniform`: all twelve, so that an episode lasts a dozen steps; `uniform_no_done`: eleven;
-`uniform_again`: the same steps once more, as in a later epoch. Models and houses are prepared
-before the clock runs, new goals' distance fields are not, and no push is known at first. Targets:
+`uniform_again`: the same steps once more, as in a later epoch. Models and houses are loaded before
+the clock starts, distance fields of new goals are not, and the result cache is cold. Targets:
 3,000 navigation steps/s with 64x64 RGB-D, 1,500 under uniform actions.
 """
 
@@ -53,16 +53,16 @@ def warm(env: InterNavVectorEnv) -> float:
 
 
 def rate(
-    env: InterNavVectorEnv, name: str, seconds: float, most: float = math.inf
+    env: InterNavVectorEnv, name: str, seconds: float, max_steps: float = math.inf
 ) -> dict[str, float]:
-    """Count steps a second of processor time, `most` of them, episodes begun included."""
+    """Count steps a second of processor time, `max_steps` of them, episodes begun included."""
     rng = np.random.default_rng(0)
     plan = rng.choice(12, size=(4096, env.num_envs), p=weights(name))
     env.reset(seed=0)
     for row in plan[:8]:
         env.step(row)
     begin, wall, steps, ends = time.process_time(), time.perf_counter(), 0, 0
-    while time.perf_counter() - wall < seconds and steps < most:
+    while time.perf_counter() - wall < seconds and steps < max_steps:
         *_, terminated, truncated, _ = env.step(plan[steps // env.num_envs % len(plan)])
         steps += env.num_envs
         ends += int((terminated | truncated).sum())
@@ -106,8 +106,8 @@ def main() -> None:
     }
     for name in SHARES:
         result[name] = rate(env, name, args.seconds)
-    most = result["uniform"]["steps"]
-    result["uniform_again"] = rate(env, "uniform", args.seconds, most)
+    max_steps = result["uniform"]["steps"]
+    result["uniform_again"] = rate(env, "uniform", args.seconds, max_steps)
     result["reset_ms"] = resets(args.dataset, args.image_size, min(2.0, args.seconds))
     text = json.dumps(result, indent=2)
     if args.out:

@@ -1,4 +1,4 @@
-"""How fast and how good the expert is. JSON out.
+"""Duration of the expert's search and length of its plans. JSON out.
 
     python benchmarks/expert.py [--scenes 30] [--episodes-per-scene 10] [--small 20] [--out FILE]
 

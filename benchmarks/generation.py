@@ -1,14 +1,13 @@
-"""How fast datasets are made, in how much memory and space: JSON on stdout.
+"""Rate, memory and size of generated datasets: JSON on stdout.
 
     python benchmarks/generation.py --scenes 40 --episodes-per-scene 50 --practice 240
 
 One worker and two make the same dataset in one run, so that the ratio is fair on any machine.
-Each episode is settled, labelled with outcomes and solved by an expert. Before each run all pushes
-that the machine has kept are set aside: `practice` makes other scenes first, with nothing known,
-and the runs begin with what it has left, that is, with most of what things do alone but nothing of
-the runs' own scenes. Fewer episodes a scene are slower: a house takes 20 ms to build and more to
-prepare, for all its episodes. Targets: 40 episodes/s on two cores (167 once all is done), two
-workers 1.8 times one, under 1 GB a worker and flat, under 1 kB an episode.
+Each episode is settled, labelled with outcomes and solved by an expert. Every run begins with the
+same result cache: `practice` generates other scenes from a cold one, so that it holds most free
+pushes and no push of the runs' own scenes. Fewer episodes a scene are slower: a house takes 20 ms
+to build and more to prepare, for all its episodes. Targets: 40 episodes/s on two cores (167 later),
+two workers 1.8 times one, under 1 GB a worker and constant, under 1 kB an episode.
 """
 
 from __future__ import annotations

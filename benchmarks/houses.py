@@ -1,4 +1,4 @@
-"""What the houses are like, beside real homes, ProcTHOR and the paper's Table 2.
+"""Statistics of houses, beside real homes, ProcTHOR and the paper's Table 2.
 
 python benchmarks/houses.py [--scenes 300] [--out houses.json] [--set scale_large=1.05 ...]
 """
@@ -35,7 +35,7 @@ MEASURED = {
         },
         "area by type (ProcTHOR, m2)": {"kitchen": 27, "living": 23, "bedroom": 28, "bathroom": 16},
         "lattice distance by class (Table 2, m)": {"1-2": 5.45, "3-5": 9.92, "6-10": 14.67},
-        "rooms on the way by class (Table 2)": {"1-2": 1.44, "3-5": 2.50, "6-10": 3.29},
+        "rooms on path by class (Table 2)": {"1-2": 1.44, "3-5": 2.50, "6-10": 3.29},
     },
     "realistic": {
         "area by type (real, m2)": {
@@ -88,8 +88,8 @@ def room_steps(house: House, a: int, b: int) -> int | None:
     return steps
 
 
-def ways(house: House, rng: np.random.Generator, draws: int = 12) -> list[tuple[float, int]]:
-    """Random lattice ways between rooms (inside one for one-room houses): metres, rooms."""
+def paths(house: House, rng: np.random.Generator, draws: int = 12) -> list[tuple[float, int]]:
+    """Return metres and rooms of random lattice paths between rooms (inside one-room houses)."""
     lattice = Lattice.of(house)
     components = lattice.components()
     labels, counts = np.unique(components[components >= 0], return_counts=True)
@@ -139,9 +139,9 @@ def survey(config: HouseConfig, scenes: int, seed: int) -> Result:
             table["things on the floor by type"][room.type].append(standing)
             table["doors a room by type"][room.type].append(degree)
             table["L-shaped share by type"][room.type].append(len(room.polygon) > 4)
-        for metres, passed in ways(house, rng):
+        for metres, passed in paths(house, rng):
             table["lattice distance by class (m)"][size_class(rooms)].append(metres)
-            table["rooms on the way by class"][size_class(rooms)].append(passed)
+            table["rooms on path by class"][size_class(rooms)].append(passed)
     return {
         name: {
             str(key): {

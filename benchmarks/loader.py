@@ -1,7 +1,7 @@
-"""How fast a dataset is read: JSON on stdout.
+"""Rates of reading a dataset: JSON on stdout.
 
-    python benchmarks/loader.py                 # a look-alike dataset, made first
-    python benchmarks/loader.py --dataset DIR   # one of yours
+    python benchmarks/loader.py                 # a synthetic dataset, generated first
+    python benchmarks/loader.py --dataset DIR   # your own
 
 Targets: a million episodes/s scanning columns, 5,000 records/s as dataclasses, a random record in
 5 ms cold and 0.5 ms from a cached row group, under 800 bytes an episode on disk.

@@ -1,10 +1,10 @@
-"""Whether memory grows with episodes and steps, pushes among them. JSON out.
+"""Growth of memory with episodes and steps, pushes among them. JSON out.
 
     python benchmarks/memory.py DATASET [--resets 10000] [--steps 1000000] [--out FILE]
 
 One environment of 16x16 pixels, all twelve actions but Done in a walker's shares. Caches fill up
-first: `grown_mib` is what came on top after the first half. Target: 64 MiB at most, whatever the
-counts. `--clear` empties the caches of physics and sight at the end and tells what they held.
+first: `grown_mib` is the growth in the second half. Target: 64 MiB at most, whatever the counts.
+`--clear` empties the caches of physics and visibility at the end and prints their sizes.
 """
 
 from __future__ import annotations

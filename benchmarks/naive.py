@@ -1,10 +1,10 @@
-"""The baseline: episodes as one would write them with networkx, shapely and plain pybullet.
+"""Baseline: episodes as one would write them with networkx, shapely and plain pybullet.
 
 The same algorithm as `internav_data.episodes` and the same definitions (exact distances, Bullet
-settles every obstacle), written by someone who knows these libraries: what can be shared is worked
-out once a house, shapely is called on whole arrays, trees are queried instead of scanned, graphs
-are edited instead of rebuilt. What it lacks is only what this project is about: kernels compiled
-for the purpose, and physics that is solved once and reused.
+settles every obstacle), written with care for these libraries: data that episodes share is
+computed once a house, shapely is called on arrays, trees are queried instead of scanned, graphs are
+edited instead of rebuilt. It lacks only compiled kernels, and physics that is solved once and
+reused.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from internav_data.records import Pose
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from naive_bullet import SettleSolution
+    from naive_bullet import SettledPose
 
     from internav_data.records import Asset, House
 
@@ -73,7 +73,7 @@ def standing(asset: Asset, yaw_deg: int) -> shapely.Geometry:
 
 
 def grown(geometry: shapely.Geometry) -> shapely.Geometry:
-    """Where the centre of the agent's disc cannot be."""
+    """Return the positions at which the agent's disc touches a geometry."""
     return geometry.buffer(CLEARANCE, quad_segs=ROUND)
 
 
@@ -189,8 +189,8 @@ def _reflex_corners(floor: shapely.Geometry) -> tuple[np.ndarray, np.ndarray, np
 
 
 @dataclass
-class Site:
-    """What all episodes of a house share."""
+class SharedHouse:
+    """Data of a house that its episodes share."""
 
     house: House
     blockers: list[shapely.Polygon]
@@ -204,11 +204,11 @@ class Site:
     rooms: dict[int, Any]
     room_graph: nx.Graph
     sight: Sight
-    ways: dict[tuple[Point, Point], list[Point] | None] = field(default_factory=dict)
+    paths: dict[tuple[Point, Point], list[Point] | None] = field(default_factory=dict)
 
     @staticmethod
-    def of(house: House) -> Site:
-        """Work out what the episodes of a house share."""
+    def of(house: House) -> SharedHouse:
+        """Compute the data of a house that its episodes share."""
         blockers = [
             shapely.box(w.x_min, w.y_min, w.x_max, w.y_max)
             for w in house.walls
@@ -245,7 +245,7 @@ class Site:
         rooms = {r.room_id: shapely.Polygon(r.polygon) for r in house.rooms}
         for polygon in rooms.values():
             shapely.prepare(polygon)
-        return Site(
+        return SharedHouse(
             house=house,
             blockers=blockers,
             tree=tree,
@@ -261,18 +261,18 @@ class Site:
         )
 
     def room_of(self, x: float, y: float) -> int:
-        """Room id of the room that holds a point."""
+        """Return the id of the room that holds a point."""
         point = shapely.Point(x, y)
         return next((k for k, polygon in self.rooms.items() if polygon.covers(point)), -1)
 
-    def way(self, a: Point, b: Point) -> list[Point] | None:
-        """Shortest way in the house without obstacles."""
-        if (a, b) not in self.ways:
-            self.ways[a, b] = self.sight.path(a, b)
-        return self.ways[a, b]
+    def path(self, a: Point, b: Point) -> list[Point] | None:
+        """Return the shortest path in the house without obstacles."""
+        if (a, b) not in self.paths:
+            self.paths[a, b] = self.sight.path(a, b)
+        return self.paths[a, b]
 
     def cut_by(self, shape: shapely.Geometry) -> tuple[list[Node], list[tuple[Node, Node]]]:
-        """Nodes and edges that an obstacle takes from the house's grid."""
+        """Return the nodes and edges that an obstacle blocks in the house's grid."""
         nodes = self.node_tree.query(shape, predicate="dwithin", distance=CLEARANCE)
         edges = self.edge_tree.query(shape, predicate="dwithin", distance=CLEARANCE)
         return [self.node_list[k] for k in nodes], [self.edges[k] for k in edges]
@@ -283,20 +283,20 @@ class NaiveObstacle:
     """An obstacle at rest."""
 
     asset: Asset
-    rest: SettleSolution
+    rest: SettledPose
     shape: shapely.Geometry
 
 
 @dataclass
 class NaiveEpisode:
-    """What an episode says, as far as the comparison needs it."""
+    """Fields of an episode that the comparison needs."""
 
     mode: str
     start: Node
     goal: Node
     shortest_path_steps: int
     shortest_path_m: float
-    steps: int | None
+    obstructed_path_steps: int | None
     obstructed_path_m: float | None
     obstacles: list[NaiveObstacle]
 
@@ -315,9 +315,9 @@ def steps_between(grid: nx.Graph, start: Node, goal: Node) -> int | None:
 
 
 def judge(
-    site: Site, start: Node, goal: Node, shapes: Sequence[shapely.Geometry]
+    site: SharedHouse, start: Node, goal: Node, shapes: Sequence[shapely.Geometry]
 ) -> tuple[int | None, float | None]:
-    """Lattice steps and any-angle metres with obstacles in the way."""
+    """Return the lattice steps and Euclidean metres of the path among obstacles."""
     grid = site.grid.copy()
     for shape in shapes:
         nodes, edges = site.cut_by(shape)
@@ -333,14 +333,22 @@ def _metres(node: Node) -> Point:
 
 
 def build_episodes(
-    site: Site, count: int, pool: Sequence[Asset], most: int, rng: np.random.Generator
+    site: SharedHouse,
+    count: int,
+    pool: Sequence[Asset],
+    max_obstacles: int,
+    rng: np.random.Generator,
 ) -> list[NaiveEpisode]:
     """Make episodes of one house."""
-    return [_episode(site, index, pool, most, rng) for index in range(count)]
+    return [_episode(site, index, pool, max_obstacles, rng) for index in range(count)]
 
 
 def _episode(
-    site: Site, index: int, pool: Sequence[Asset], most: int, rng: np.random.Generator
+    site: SharedHouse,
+    index: int,
+    pool: Sequence[Asset],
+    max_obstacles: int,
+    rng: np.random.Generator,
 ) -> NaiveEpisode:
     mode = "blocked" if (site.house.scene + index) % 2 == 0 else "lengthened"
     for _ in range(REDRAWS):
@@ -351,7 +359,7 @@ def _episode(
         episode = NaiveEpisode(
             mode, start, goal, shortest_path_steps, clear, shortest_path_steps, None, []
         )
-        if _spawn(site, episode, node_paths, pool, most, rng):
+        if _spawn(site, episode, node_paths, pool, max_obstacles, rng):
             shapes = [o.shape for o in episode.obstacles]
             path = site.sight.with_obstacles(grown(shapely.union_all(shapes))).path(
                 _metres(start), _metres(goal)
@@ -361,7 +369,7 @@ def _episode(
     raise RuntimeError(f"{site.house.scene_id}: no episode in {REDRAWS} draws")
 
 
-def _ends(site: Site, rng: np.random.Generator) -> tuple[Node, Node, float]:
+def _ends(site: SharedHouse, rng: np.random.Generator) -> tuple[Node, Node, float]:
     while True:
         a, b = (site.component[int(k)] for k in rng.integers(len(site.component), size=2))
         same = site.room_of(*_metres(a)) == site.room_of(*_metres(b))
@@ -372,7 +380,7 @@ def _ends(site: Site, rng: np.random.Generator) -> tuple[Node, Node, float]:
             return a, b, length(path)
 
 
-def _node_paths(site: Site, start: Node, goal: Node) -> list[list[Point]]:
+def _node_paths(site: SharedHouse, start: Node, goal: Node) -> list[list[Point]]:
     a, b = site.room_of(*_metres(start)), site.room_of(*_metres(goal))
     if a == b:
         return [[_metres(start), _metres(goal)]]
@@ -390,18 +398,18 @@ def _node_paths(site: Site, start: Node, goal: Node) -> list[list[Point]]:
 
 
 def _spawn(
-    site: Site,
+    site: SharedHouse,
     episode: NaiveEpisode,
     node_paths: list[list[Point]],
     pool: Sequence[Asset],
-    most: int,
+    max_obstacles: int,
     rng: np.random.Generator,
 ) -> bool:
     grid = site.grid.copy()
     for _ in range(SPOTS):
         if _done(episode):
             return True
-        if len(episode.obstacles) == most:
+        if len(episode.obstacles) == max_obstacles:
             return False
         obstacle = _try(site, episode, node_paths, pool, rng)
         if obstacle is None:
@@ -429,7 +437,7 @@ def _done(episode: NaiveEpisode) -> bool:
 
 
 def _try(  # noqa: PLR0911 - every refusal is a return
-    site: Site,
+    site: SharedHouse,
     episode: NaiveEpisode,
     node_paths: list[list[Point]],
     pool: Sequence[Asset],
@@ -440,10 +448,10 @@ def _try(  # noqa: PLR0911 - every refusal is a return
     k = int(rng.integers(len(points) - 1))
     along, sideways = float(rng.random()), float(rng.normal(0.0, SIDEWAYS))
     yaw_deg = 15 * int(rng.integers(24))
-    way = site.way(points[k], points[k + 1])
-    if way is None:
+    path = site.path(points[k], points[k + 1])
+    if path is None:
         return None
-    line = shapely.LineString(way)
+    line = shapely.LineString(path)
     at = line.interpolate(along, normalized=True)
     ahead = line.interpolate(min(along * line.length + 0.01, line.length))
     behind = line.interpolate(max(along * line.length - 0.01, 0.0))

@@ -1,4 +1,4 @@
-"""The baseline's physics: a fresh Bullet scene with what stands nearby, for every obstacle."""
+"""Baseline physics: a new Bullet scene with the neighbours, for every obstacle."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ DROP = 0.01
 
 
 @dataclass(frozen=True)
-class Rest:
-    """Where a thing came to rest."""
+class SettledPose:
+    """Pose at rest, and its certificate."""
 
     pose: Pose
     seconds: float
@@ -45,8 +45,8 @@ def settle(
     y: float,
     yaw_deg: float,
     shape: shapely.Geometry,
-) -> Rest | None:
-    """Let a thing fall 1 cm among what is near; None when it may not stay."""
+) -> SettledPose | None:
+    """Let an object fall 1 cm among its neighbours; None where it may not stay."""
     bullet.resetSimulation(physicsClientId=CLIENT)
     bullet.setGravity(0, 0, -9.81, physicsClientId=CLIENT)
     bullet.setTimeStep(STEP, physicsClientId=CLIENT)
@@ -78,7 +78,7 @@ def settle(
     return _judged(_add(asset, start, visual, moves=True), asset, start)
 
 
-def _judged(body: int, asset: Asset, start: Pose) -> Rest | None:
+def _judged(body: int, asset: Asset, start: Pose) -> SettledPose | None:
     calm = steps = 0
     while steps < 240 and calm < 10:
         bullet.stepSimulation(physicsClientId=CLIENT)
@@ -97,7 +97,7 @@ def _judged(body: int, asset: Asset, start: Pose) -> Rest | None:
     if calm < 10 or moved > 0.05 or tilt > 5.0 or depth > 0.002:
         return None
     x, y, z = (round(float(v), 4) for v in origin)
-    return Rest(Pose(x, y, z, tuple(round(q, 6) for q in turn)), steps * STEP, depth)
+    return SettledPose(Pose(x, y, z, tuple(round(q, 6) for q in turn)), steps * STEP, depth)
 
 
 def _surface(body: int, friction: float) -> None:

@@ -46,7 +46,13 @@ MEASURE = ("--split", "all", *NEAR, "--max-steps", 200, "--limit", 400, "--no-re
 
 
 def tool(name: str, *words: object) -> None:
-    """Run one of the project's commands on one thread."""
+    """Run one of the project's commands on one thread.
+
+    Raises
+    ------
+    SystemExit
+        The command fails.
+    """
     command = [str(Path(sys.executable).with_name(name)), *map(str, words)]
     environment = os.environ | {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
@@ -55,7 +61,7 @@ def tool(name: str, *words: object) -> None:
 
 
 def one_run(folder: Path, name: str, seed: int) -> None:
-    """Clone, measure, go on, measure."""
+    """Clone, evaluate, train, evaluate."""
     run, results = folder / "runs" / f"{name}-{seed}", folder / "results"
     houses, unseen = folder / "houses", folder / "unseen"
     cloned, final = (results / kind / f"{name}-{seed}" for kind in ("cloned", "final"))

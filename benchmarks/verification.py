@@ -1,4 +1,4 @@
-"""How fast a dataset is proved right: episodes/s a core at each level, JSON on stdout.
+"""Rate of validation: episodes/s a core at each level, JSON on stdout.
 
     python benchmarks/verification.py [--dataset DIR] [--scenes 24] [--out FILE]
 

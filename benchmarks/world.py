@@ -1,4 +1,4 @@
-"""How fast the world is: moves, sight, pushes from the cache and in Bullet, outcomes. JSON out.
+"""Times of the world: moves, visibility, pushes from the cache and in Bullet, outcomes. JSON out.
 
     python benchmarks/world.py [--scenes 12] [--episodes-per-scene 4] [--out FILE]
 
@@ -28,10 +28,10 @@ from internav_data.houses import HouseConfig, build_house
 from internav_data.physics import push
 from internav_data.physics.cache import CachedEngine
 from internav_data.physics.engines.bullet import bullet
-from internav_data.physics.pushing import PUSH_SPECS, _push_alone, _push_in
+from internav_data.physics.pushing import _push_alone, _push_in
 from internav_data.physics.result_cache import FOLDER_VARIABLE, ResultCache
 from internav_data.physics.scene import UPRIGHT, Body, PhysicsScene
-from internav_data.records import Pose
+from internav_data.records import PUSH_SPECS, Pose
 from internav_data.world import Action, HouseModel, World
 
 if TYPE_CHECKING:

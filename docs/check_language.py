@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 # ---------------------------------------------------------------------------------------------
 # Tables: what the rules look for. Change the language here.
 
-DEFAULT_PATHS = ("internav_data", "cli")
+DEFAULT_PATHS = ("internav_data", "cli", "benchmarks", "docs", "examples")
 """Checked when no path is given, below the root of the repository."""
 LONG_FUNCTION = 50
 """Lines of code above which the report counts a function as long."""

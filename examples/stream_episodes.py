@@ -1,4 +1,4 @@
-"""What training code does with a dataset: stream its share, stop, and go on where it stopped.
+"""Streaming in training code: read a rank's share, stop, and resume.
 
     python examples/stream_episodes.py data/mine
 
