@@ -58,7 +58,7 @@ def command(*, dataset: Path | None, split: str | None, as_json: bool) -> int:
 def table2_lines(stats: dict[str, Any]) -> list[str]:
     """Return Table 2 of the paper, its figures in brackets beside the dataset's."""
     columns = ("ratio", "obstacle_num", "distance_m", "cross_room_num")
-    titles = ("share", "obstacles", "distance m", "rooms on way")
+    titles = ("share", "obstacles", "distance m", "rooms on path")
     lines = [f"{'rooms':<6}{'episodes':>9}" + "".join(f"{title:>20}" for title in titles)]
     for row in stats["table2"]:
         cells = [f"{row[name]:.3f} ({row['paper'][name]:.3f})" for name in columns]
