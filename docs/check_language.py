@@ -256,7 +256,7 @@ DIALECT_OF_ROOM = {
 }
 """Names that were replaced in one room only: the word is good elsewhere."""
 
-STRICT_SHAPES = frozenset({"geometry", "navigation", "physics", "render", "world"})
+STRICT_SHAPES = frozenset({"envs", "geometry", "navigation", "physics", "render", "world"})
 """Rooms where a public function of arrays without a shape in its docstring is a finding."""
 
 FIRST_WORD = re.compile(r"[A-Za-z]+")
@@ -264,8 +264,8 @@ FIRST_WORD = re.compile(r"[A-Za-z]+")
 ARRAY = re.compile(r"\b(?:NDArray|ndarray|Tensor)\b")
 """Annotation of an array; aliases of such annotations are found by `array_aliases`."""
 SHAPE = re.compile(
-    r"""\(\s*[\w.*+/-]+(?:\s[*+/-]\s[\w.]+)?\s*,  # (n, 2), (n,), (n + 1, 3): a comma is needed
-        (?:\s*[\w.*+/-]+(?:\s[*+/-]\s[\w.]+)?\s*,?)*\s*\)
+    r"""\(\s*[\w.*+/-]+(?:\s[*+/-]\s[\w.]+)?\s*,  # (n, 2), (n,), (n + 1, 3), (n, …): with a comma
+        (?:\s*[\w.…*+/-]+(?:\s[*+/-]\s[\w.]+)?\s*,?)*\s*\)
         |\b\w+\s?\N{MULTIPLICATION SIGN}\s?\w+    # n times 2
         |\b\w+\sx\s\w+                            # n x 2
         |\b[Ss]hapes?\b|\b[Ss]calars?\b           # 'Shapes' section; a scalar""",

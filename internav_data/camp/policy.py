@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.dataset import Dataset
-    from internav_data.evaluation.evaluate import EvaluationConfig, Observations, Policy
+    from internav_data.envs.types import Observations
+    from internav_data.evaluation.evaluate import EvaluationConfig, Policy
     from internav_data.evaluation.policies import Note
     from internav_data.records import Episode
 

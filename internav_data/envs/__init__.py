@@ -35,7 +35,7 @@ ENV_ID = "InterNav-v0"
 
 
 def register() -> None:
-    """Tell Gymnasium about the environments; a second time changes nothing."""
+    """Register `InterNav-v0` with Gymnasium; a second call changes nothing."""
     if ENV_ID not in gymnasium.registry:
         gymnasium.register(
             id=ENV_ID,

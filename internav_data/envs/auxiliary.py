@@ -1,6 +1,7 @@
 """Starts of the auxiliary tasks of Push and Pick: beside an obstacle, opposite to the goal.
 
-A pure function of an episode: no random numbers, so that a start is named by its number.
+The starts are a pure function of the episode; only the choice among them is drawn. The paper's
+section 5.2 describes them, the released code has the rule for the poses.
 """
 
 from __future__ import annotations
@@ -23,13 +24,14 @@ if TYPE_CHECKING:
     from internav_data.envs.source import Source
     from internav_data.records import Asset, Episode, Pose, Vec2
 
-Kind = Literal["push", "pick"]
+InteractionKind = Literal["push", "pick"]
+"""Interaction that an auxiliary task teaches."""
 CLEARED_STEPS: Final = 1
 """Drop of the path, in steps of 0.25 m, from which on an obstacle that did not block is cleared."""
 
 
 class AuxiliaryStart(NamedTuple):
-    """A pose from which an obstacle is the very one that Push or Pick would act on."""
+    """Pose of the agent from which Push or Pick acts on a certain obstacle."""
 
     i: int
     j: int
@@ -40,21 +42,21 @@ class AuxiliaryStart(NamedTuple):
 
 
 def auxiliary_starts(
-    model: HouseModel, episode: Episode, assets: Mapping[str, Asset], kind: Kind
+    model: HouseModel, episode: Episode, assets: Mapping[str, Asset], kind: InteractionKind
 ) -> tuple[AuxiliaryStart, ...]:
     """Return all starts of an episode: obstacle after obstacle, the nearest to its node first.
 
     The agent sees the obstacle within reach, it is the closest of its kind, and agent and goal lie
     on opposite sides of it along x and along y; where no pose does that, on opposite sides of the
-    line across the way to the goal (the released code gives up there). Nearest means to the next
-    node of the first node path after the obstacle, ties by i, j and quarter.
+    line across the path to the goal (the released code gives up there). Nearest means nearest to
+    the next node of the first node path after the obstacle; ties go by i, j and quarter.
 
     Parameters
     ----------
     model
-        The episode's house.
+        Model of the episode's house.
     episode
-        The episode.
+        Episode whose obstacles are considered.
     assets
         Assets of its obstacles, by id.
     kind
@@ -72,7 +74,7 @@ def auxiliary_starts(
 
 
 def next_start(
-    source: Source, order: EpisodeOrder, seed: int, position: int, kind: Kind
+    source: Source, order: EpisodeOrder, seed: int, position: int, kind: InteractionKind
 ) -> tuple[int, AuxiliaryStart, int]:
     """Return the next episode that has a start, one of its starts, and the position after it.
 
@@ -81,9 +83,9 @@ def next_start(
     Parameters
     ----------
     source
-        Episodes.
+        Episodes of a dataset.
     order
-        Their order.
+        Order of the episodes.
     seed
         Seed of the environment.
     position
@@ -134,7 +136,7 @@ def is_cleared(before: int | None, after: int | None) -> bool:
 
 
 def _poses(
-    world: World, episode: Episode, number: int, kind: Kind
+    world: World, episode: Episode, number: int, kind: InteractionKind
 ) -> Iterator[tuple[bool, AuxiliaryStart]]:
     """Yield poses, best first, and whether agent and goal are opposite along both axes."""
     index = world.obstacles[number]
@@ -142,7 +144,7 @@ def _poses(
     if pose is None:
         return
     there = world.copy()
-    # A pocket of furniture that no way leads out of, obstacles or not, teaches nothing.
+    # A pocket of furniture that is cut off from the goal even without obstacles teaches nothing.
     joined = world.model.lattice.distances(episode.goal.i, episode.goal.j) >= 0
     for i, j in _nodes_near(world, index, pose, _next_node(episode, number)):
         if not joined[i, j]:
@@ -168,7 +170,7 @@ def _next_node(episode: Episode, number: int) -> Vec2:
 
 
 def _nodes_near(world: World, index: int, pose: Pose, node: Vec2) -> list[tuple[int, int]]:
-    """Free nodes within reach of a thing, the nearest to a point first."""
+    """Return the free nodes within reach of an object, the nearest to a point first."""
     size = world.items[index].asset.size
     reach = REACH_M + math.hypot(*size)
     free = np.argwhere(world.lattice.free)

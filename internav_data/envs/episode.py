@@ -1,4 +1,4 @@
-"""A run of one episode: world, task and props, without any picture."""
+"""Run of one episode: world, task and the camera's props; nothing is drawn here."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 
 class EpisodeRun:
-    """An episode from its start; a function of the episode and the actions so far.
+    """Episode being played; a function of the episode and the actions so far.
 
     Parameters
     ----------
     episode
         The episode.
     loaded_house
-        Its house.
+        House of the episode.
     assets
         Assets of its obstacles, by id.
     config
@@ -34,7 +34,7 @@ class EpisodeRun:
     start
         Node i, j and quarter turn to begin at; None for the episode's own.
     task
-        Reward, end and metrics.
+        Class of the task.
 
     Attributes
     ----------
@@ -47,18 +47,18 @@ class EpisodeRun:
     actions : list of int
         Actions so far; -1 waits.
     start : (int, int, int) or None
-        Node i, j and quarter turn it began at, where that is not the episode's own.
+        Node i, j and quarter turn of the start; None if it is the episode's own.
     last : StepResult or None
         Result of the last action.
     done : bool
         Whether the episode has ended.
     stale : bool
-        Whether the picture has changed since it was drawn; the camera's user sets it to False.
+        Whether the picture has changed since it was drawn; the drawing code sets it to False.
 
     Raises
     ------
     UsageError
-        The start is no free node.
+        The start is not a free node.
     """
 
     __slots__ = (
@@ -100,7 +100,7 @@ class EpisodeRun:
         self.last: StepResult | None = None
 
     def step(self, action: int) -> TaskStep:
-        """Act; return the reward and whether the episode ends.
+        """Take an action; return the reward and whether the episode ends.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Choice of how many processes environments are stepped in."""
+"""Vector environments in this process or in several."""
 
 from __future__ import annotations
 
@@ -21,7 +21,15 @@ def make_vector(
     workers: int = 0,
     **arguments: Any,  # noqa: ANN401 - those of `InterNavVectorEnv`
 ) -> VectorEnv[Any, Any, Any]:
-    """Step environments in this process, or (workers > 0) in so many others."""
+    """Make a vector environment: in this process, or (workers > 0) in that many others.
+
+    Parameters
+    ----------
+    num_envs, dataset, **arguments
+        Arguments of `InterNavVectorEnv`.
+    workers
+        Number of processes.
+    """
     if workers:
         from internav_data.envs.processes import InterNavProcesses  # noqa: PLC0415 - when asked for
 

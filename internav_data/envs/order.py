@@ -1,4 +1,4 @@
-"""Which episode comes next: a pure function of (seed, position), house by house."""
+"""Order of episodes: a pure function of (seed, position), house by house."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def scene_bounds(dataset: Dataset[Episode]) -> NDArray[np.int64]:
-    """Return the episode numbers at which a new house begins, and the count: (scenes + 1,)."""
+    """Return the episode numbers at which a new house begins, then the count: (scenes + 1,)."""
     column = dataset.to_table(["scene_id"]).column("scene_id")
     codes = column.combine_chunks().dictionary_encode().indices.to_numpy()
     starts = np.flatnonzero(np.diff(codes)) + 1
@@ -26,18 +26,19 @@ def scene_bounds(dataset: Dataset[Episode]) -> NDArray[np.int64]:
 class EpisodeOrder:
     """Order of episodes: each once an epoch, several of the same house in a row.
 
-    A house costs more to prepare than an episode: staying a while saves that.
+    A house costs more to prepare than an episode. So the episodes of each house are shuffled and
+    cut into runs, and the runs of all houses are shuffled.
 
     Parameters
     ----------
     bounds : (scenes + 1,) int64
-        See `scene_bounds`.
+        Episode numbers at which houses begin; see `scene_bounds`.
     seed
-        What the order depends on.
+        Seed of the order.
     episodes_per_house
-        Episodes of one house in a row, at least 1.
+        Number of episodes of one house in a row, at least 1.
     shuffle
-        False for the order on disk.
+        Whether to shuffle; False keeps the order on disk.
     """
 
     def __init__(
@@ -52,6 +53,7 @@ class EpisodeOrder:
         self._episodes_per_house, self._shuffle = episodes_per_house, shuffle
         self._count = int(bounds[-1])
         counts = np.diff(bounds)
+        # One row a run: its scene, the place of its first episode in the scene, and its length.
         runs = -(-counts // episodes_per_house)
         self._scenes = np.repeat(np.arange(len(counts), dtype=np.int32), runs)
         first = np.repeat(np.cumsum(runs) - runs, runs)
@@ -61,14 +63,14 @@ class EpisodeOrder:
         self._runs = self._ends = np.empty(0, np.int64)
 
     def number(self, position: int) -> int:
-        """Return the number in the dataset of the episode at a position, 0 and up."""
+        """Return the number, in the dataset, of the episode at a position (0 and up)."""
         epoch, offset = divmod(position, self._count)
         if not self._shuffle:
             return offset
         if epoch != self._epoch:
             rng = generator(self._seed, Purpose.LOADER, attempt=LoaderStream.HOUSES, draw=epoch)
             self._runs = rng.permutation(len(self._scenes))
-            self._ends = np.cumsum(self._lengths[self._runs])
+            self._ends = np.cumsum(self._lengths[self._runs])  # positions at which runs end
             self._epoch = epoch
         at = int(np.searchsorted(self._ends, offset, side="right"))
         run = int(self._runs[at])

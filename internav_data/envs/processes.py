@@ -1,4 +1,4 @@
-"""Many agents in several processes; observations lie in memory that all of them see."""
+"""Vector environment over several processes; observations lie in shared memory."""
 
 from __future__ import annotations
 
@@ -52,7 +52,11 @@ def _serve(
     rows: tuple[int, int],
     arguments: dict[str, Any],
 ) -> None:
-    """Do what the pipe says until it says no more: one of the processes."""
+    """Serve requests from a pipe until it asks to close: the main function of a process.
+
+    A request is (method, (arguments, keyword arguments)); an answer is (True, result) or
+    (False, error).
+    """
     try:
         whole = _arrays(memory, count, arguments["image_size"], arguments["sensors"])
         own = {name: array[rows[0] : rows[1]] for name, array in whole.items()}
@@ -71,12 +75,20 @@ def _serve(
             pipe.send((True, answer if name == "state" else answer[1:]))
     except (EOFError, KeyboardInterrupt):
         return
-    except Exception as error:  # noqa: BLE001 - whatever it is, the other side has to hear of it
+    except Exception as error:  # noqa: BLE001 - the parent raises it
         pipe.send((False, error))
 
 
 def concatenate_infos(parts: Sequence[dict[str, Any]], counts: Sequence[int]) -> dict[str, Any]:
-    """Lay infos of parts of a batch side by side."""
+    """Join the infos of parts of a batch, as Gymnasium lays them out.
+
+    Parameters
+    ----------
+    parts
+        Infos of each part: arrays (count, …) by key, or dictionaries of them.
+    counts
+        Number of environments in each part.
+    """
     whole: dict[str, Any] = {}
     ends = np.cumsum(counts)
     for key in dict.fromkeys(key for part in parts for key in part):
@@ -95,19 +107,23 @@ def concatenate_infos(parts: Sequence[dict[str, Any]], counts: Sequence[int]) ->
 
 
 class InterNavProcesses(VectorEnv[Any, Any, Any]):
-    """N worlds stepped in several processes, each an `InterNavVectorEnv` of its share.
+    """N environments stepped in several processes, each an `InterNavVectorEnv` of its share.
 
-    The same as one `InterNavVectorEnv` of all, to the last bit.
+    Results are those of one `InterNavVectorEnv` of all, to the last bit.
 
     Parameters
     ----------
     num_envs, dataset, image_size, autoreset, copy, sensors, **arguments
-        As `InterNavVectorEnv` has them; a loaded dataset is opened again in each process.
+        Arguments of `InterNavVectorEnv`; a loaded dataset is opened again in each process.
     workers
-        Processes; at most one for each environment.
+        Number of processes, at most one for each environment.
     context
-        How they start: "spawn", "forkserver" or "fork".
+        Start method of the processes: "spawn", "forkserver" or "fork".
 
+    Raises
+    ------
+    UsageError
+        An argument is out of its bounds or unknown.
     """
 
     def __init__(
@@ -158,7 +174,10 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Observations, dict[str, Any]]:
-        """As `InterNavVectorEnv.reset`."""
+        """Begin episodes; see `InterNavVectorEnv.reset`.
+
+        Observations are arrays (N, …) by sensor.
+        """
         chosen = check_options(options, OPTIONS)
         seeds = split_seeds(seed, self.num_envs)
         mask, ids, actions, starts = reset_choices(chosen, self.num_envs)
@@ -177,7 +196,13 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
         return self._observations(), concatenate_infos(infos, self._counts)
 
     def step(self, actions: NDArray[np.int64] | Sequence[int]) -> Stepped:
-        """As `InterNavVectorEnv.step`."""
+        """Take actions (N,) int64; see `InterNavVectorEnv.step`.
+
+        Raises
+        ------
+        UsageError
+            The number of actions is not `num_envs`, or an action is unknown.
+        """
         asked = np.asarray(actions)
         if asked.shape != (self.num_envs,):
             raise UsageError(f"step: expected {self.num_envs} actions, got shape {asked.shape}")
@@ -193,13 +218,19 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
         )
 
     def state(self) -> tuple[EpisodeSnapshot, ...]:
-        """Return what each environment is."""
+        """Return a snapshot of each environment."""
         for k in range(len(self._pipes)):
             self._ask(k, "state")
         return tuple(state for states in self._answers() for state in states)
 
     def restore(self, states: Sequence[EpisodeSnapshot]) -> tuple[Observations, dict[str, Any]]:
-        """Become what `state` returned."""
+        """Become the environments of snapshots; return observations, arrays (N, …) by sensor.
+
+        Raises
+        ------
+        UsageError
+            The number of snapshots is not `num_envs`.
+        """
         if len(states) != self.num_envs:
             raise UsageError(f"restore: expected {self.num_envs} states, got {len(states)}")
         for k, (low, high) in enumerate(self._rows):
@@ -208,7 +239,7 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
         return self._observations(), concatenate_infos(infos, self._counts)
 
     def close_extras(self, **_: Any) -> None:  # noqa: ANN401 - Gymnasium's signature
-        """End the processes."""
+        """Stop the processes."""
         for k in range(len(self._pipes)):
             self._ask(k, "close")
         for process in self._processes:
@@ -216,14 +247,17 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
             if process.is_alive():
                 process.kill()
 
-    def _ask(self, k: int, name: str, *given: Any, **named: Any) -> None:  # noqa: ANN401 - whatever
+    def _ask(self, k: int, name: str, *given: Any, **named: Any) -> None:  # noqa: ANN401 - of any method
         try:
             self._pipes[k].send((name, (given, named)))
         except OSError:
-            return  # it died: `_answers` says so
+            return  # it died: `_answers` raises
 
     def _answers(self, of: Sequence[int] | None = None) -> list[Any]:
-        """Hear all of them before the first error is raised: none is left with a full pipe."""
+        """Return the answers of some processes, or raise the first error.
+
+        All answers are read before an error is raised: no pipe is left full.
+        """
         answers: list[Any] = []
         errors: list[Exception] = []
         for k in range(len(self._pipes)) if of is None else of:

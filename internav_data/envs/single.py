@@ -1,4 +1,4 @@
-"""`gymnasium.make("InterNav-v0", dataset=…)`: one agent in one house."""
+"""Environment `InterNav-v0`: one agent in one house."""
 
 from __future__ import annotations
 
@@ -25,33 +25,33 @@ if TYPE_CHECKING:
     from internav_data.records import Episode
 
 RENDER_SIZE = 300
-"""Pixels a side of what `render` returns: the paper's."""
+"""Size of the pictures that `render` returns, pixels a side: the paper's."""
 
 
 class InterNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
-    """An agent that walks to a goal, and pushes or carries away what is in its way.
+    """Interactive navigation: an agent walks to a goal, and pushes or carries obstacles aside.
 
-    `docs/environment.md` describes it: actions, observations, rewards, start, end, arguments.
+    `docs/environment.md` describes actions, observations, rewards, start, end and arguments.
 
     Parameters
     ----------
     dataset : str, Path or Dataset
-        A folder that `internav-gen generate` wrote, or a loaded dataset.
+        Directory of a dataset, or a loaded dataset.
     image_size
-        Pixels a side of `rgb` and `depth`.
+        Size of the pictures, pixels a side.
     render_mode
         None or "rgb_array".
     sensors
         Sensors to observe: names in `internav_data.envs.sensors.SENSORS`, or one's own `Sensor`.
     **arguments
-        See `Arguments`.
+        Arguments by name; see `Arguments`.
 
     Raises
     ------
     CorruptDataError
-        No dataset, or a damaged one.
+        There is no dataset, or it is damaged.
     UsageError
-        An argument that cannot be meant.
+        An argument is out of its bounds or unknown.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 4}  # noqa: RUF012 - as Gymnasium has it
@@ -77,41 +77,63 @@ class InterNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Begin the next episode of the seed's order, or `options["episode_id"]`.
+        """Begin the next episode of the seed's order, or a named one.
 
-        `options["actions"]` are played at once: with the episode they are a state.
-        `options["start"]` = (i, j, quarter) puts the agent elsewhere first.
+        Parameters
+        ----------
+        seed
+            Seed of the order of episodes; None goes on in the present order.
+        options
+            `episode_id`: episode to begin. `actions`: actions to take at once; with the episode
+            they make up a state. `start`: node and quarter turns (i, j, quarter) to begin at.
+
+        Raises
+        ------
+        UsageError
+            An option is unknown, or there is no such episode.
         """
         chosen = check_options(options, ("episode_id", "actions", "start"))
         super().reset(seed=seed)
         if seed is not None or not self._slot.ordered:
             self._slot.seed(self.np_random_seed)
         self._slot.begin(chosen.get("episode_id"), chosen.get("actions", ()), chosen.get("start"))
-        return self._look(), self._whose()
+        return self._observation(), self._info()
 
     def step(
         self, action: int | np.int64
     ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """Act: 0 … 11, or -1 to wait."""
+        """Take an action, 0 … 11, or -1 to wait.
+
+        Raises
+        ------
+        UsageError
+            The episode has ended, or there is no such action.
+        """
         run = self._slot.run
         step = run.step(int(action))
-        return self._look(), step.reward, step.terminated, step.truncated, step_info(run, step)
+        return (
+            self._observation(),
+            step.reward,
+            step.terminated,
+            step.truncated,
+            step_info(run, step),
+        )
 
     def wait(self) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """Pass a step: for options that hand control back."""
+        """Let a step pass, for options that hand control back."""
         return self.step(Action.WAIT)
 
     def state(self) -> EpisodeSnapshot:
-        """Return all that this environment is, in a few words."""
+        """Return a snapshot: the episode, the actions so far, and the place in the order."""
         return self._slot.state()
 
     def restore(self, state: EpisodeSnapshot) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Become what `state` returned, here or elsewhere."""
+        """Become the environment of a snapshot, taken in this process or another one."""
         self._slot.restore(state)
-        return self._look(), self._whose()
+        return self._observation(), self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Return what the agent sees, large."""
+        """Return the agent's view, (300, 300, 3) uint8; None without a render mode."""
         if self.render_mode is None:
             return None
         if self._large is None:
@@ -119,9 +141,9 @@ class InterNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
         picture: NDArray[np.uint8] = self._large.render([self._slot.run.view()]).rgb[0]
         return picture
 
-    def _look(self) -> dict[str, Any]:
+    def _observation(self) -> dict[str, Any]:
         self._buffer.write(0, self._slot.run)
         return self._buffer.one()
 
-    def _whose(self) -> dict[str, Any]:
+    def _info(self) -> dict[str, Any]:
         return {"episode_id": self._slot.run.episode.episode_id}

@@ -91,7 +91,7 @@ class EnvSlot:
     episodes_per_house
         Episodes of one house in a row.
     shuffle
-        False for the order on disk.
+        Whether houses are shuffled; False keeps the order on disk.
     """
 
     __slots__ = (
@@ -133,7 +133,7 @@ class EnvSlot:
         Raises
         ------
         UsageError
-            An argument that cannot be meant, or is unknown.
+            An argument is out of its bounds or unknown.
         """
         _check_names(arguments)
         episodes_per_house = arguments.get("episodes_per_house", 4)
@@ -194,7 +194,7 @@ class EnvSlot:
         Parameters
         ----------
         episode_id
-            None for the next of the order.
+            Id of an episode; None for the next of the order.
         actions
             Actions to take at once.
         start
@@ -231,7 +231,7 @@ class EnvSlot:
         return self.begin(state.episode_id, state.actions, state.start)
 
     def _next(self) -> tuple[int, Sequence[int] | None]:
-        """Return the number of the next episode and its start; None for the episode's own."""
+        """Return the number of the next episode, and its start (None for the episode's own)."""
         if self._order is None:
             raise UsageError("InterNav: no order of episodes yet; call reset() first")
         kind = self._task.start_beside
@@ -280,7 +280,7 @@ def check_options(options: Mapping[str, Any] | None, known: tuple[str, ...]) -> 
     Raises
     ------
     UsageError
-        An option that cannot be meant, or is unknown.
+        An option is unknown, or needs an episode's id.
     """
     if options is None:
         return {}

@@ -1,6 +1,7 @@
-"""Where environments get their episodes: a dataset, opened once a process.
+"""Episodes and houses of environments, shared by all environments of a process.
 
-What environments share about houses: prepared once a process, the latest ones kept.
+A dataset is opened once, and a house is prepared once: a `HouseModel`, the camera's scene and
+distance fields cost far more than a step. The most recently used ones are kept.
 """
 
 from __future__ import annotations
@@ -30,25 +31,25 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.dataset import Dataset
-    from internav_data.envs.auxiliary import AuxiliaryStart, Kind
+    from internav_data.envs.auxiliary import AuxiliaryStart, InteractionKind
     from internav_data.records import Episode, House, PushModel
 
 
 FIELDS_KEPT: Final = 64
-"""Distance fields kept a house: one for each goal."""
+"""Number of distance fields kept for a house, one for each goal."""
 HOUSE_CACHE_SIZE: Final = 64
-"""Houses kept a process, unless an environment asks for more."""
+"""Number of houses kept in a process, unless an environment asks for more."""
 
 
 class ShortestPathField:
-    """Any-angle distance to one goal, no obstacle about: worked out where somebody asks.
+    """Euclidean path lengths to one goal without obstacles, computed where they are asked for.
 
     Parameters
     ----------
     model
-        The house.
+        Model of the house.
     goal : (int, int)
-        Node.
+        Lattice node.
     """
 
     __slots__ = ("_goal", "_metres", "_model")
@@ -59,30 +60,30 @@ class ShortestPathField:
         self._metres = np.full(model.lattice.shape, np.nan)
 
     def at(self, i: int, j: int) -> float:
-        """Distance from a node, metres, as `World.shortest_path_m` has it; inf where cut off."""
+        """Return the path length from a node, metres: `World.shortest_path_m`, inf if cut off."""
         known = float(self._metres[i, j])
         if math.isnan(known):
-            way = self._model.shortest_path_m((SPACING_M * i, SPACING_M * j), self._goal)
-            known = math.inf if way is None else round_m(way)
+            path = self._model.shortest_path_m((SPACING_M * i, SPACING_M * j), self._goal)
+            known = math.inf if path is None else round_m(path)
             self._metres[i, j] = known
         return known
 
 
 @dataclass(slots=True, eq=False)
 class LoadedHouse:
-    """A house ready to be walked in."""
+    """House prepared for episodes: model, camera scene and distance fields."""
 
     model: HouseModel
     static_scene: StaticScene
     instances: tuple[int, ...]
-    """Which instance of the camera's props each of the stage's items is."""
+    """Instance number, among the camera's props, of each movable object of the model."""
     _fields: OrderedDict[tuple[int, int], ShortestPathField] = field(default_factory=OrderedDict)
 
     @staticmethod
     def of(house: House) -> LoadedHouse:
         """Prepare a house."""
         model = HouseModel.of(house)
-        rows = {thing.object_id: row for row, thing in enumerate(house.objects)}
+        rows = {placed.object_id: row for row, placed in enumerate(house.objects)}
         return LoadedHouse(model, StaticScene.of(house), tuple(rows[t] for t in model.object_ids))
 
     def distance_field(self, goal: tuple[int, int]) -> ShortestPathField:
@@ -97,7 +98,7 @@ class LoadedHouse:
 
 
 class LoadedHouses:
-    """The latest houses, by dataset and scene."""
+    """The most recently used houses, by dataset and scene."""
 
     def __init__(self, capacity: int = HOUSE_CACHE_SIZE) -> None:
         self.capacity = capacity
@@ -107,7 +108,7 @@ class LoadedHouses:
         return len(self._houses)
 
     def of(self, dataset_key: str, house: House) -> LoadedHouse:
-        """Return a house's place, prepared unless it is known."""
+        """Return a house prepared for episodes; one that is kept is not prepared again."""
         key = (dataset_key, house.scene_id)
         found = self._houses.get(key)
         if found is None:
@@ -119,16 +120,28 @@ class LoadedHouses:
 
 
 LOADED_HOUSES: Final = LoadedHouses()
-"""Of this process: environments in it share their houses."""
-
-
+"""Houses of this process, shared by its environments."""
 SOURCES_KEPT: Final = 8
+"""Number of datasets kept open in a process."""
 STARTS_KEPT: Final = 8192
-"""Episodes whose auxiliary starts are kept a source."""
+"""Number of episodes of a source whose auxiliary starts are kept."""
 
 
 class Source:
-    """Episodes by number and by id, and the places they happen in."""
+    """Episodes of a dataset by number and by id, and their houses.
+
+    Parameters
+    ----------
+    dataset
+        Dataset, or a selection of one.
+    digest
+        SHA-256 of its manifest: the key of its houses.
+
+    Raises
+    ------
+    UsageError
+        Nothing is selected.
+    """
 
     def __init__(self, dataset: Dataset[Episode], digest: str) -> None:
         self.dataset, self._digest = dataset, digest
@@ -141,7 +154,7 @@ class Source:
 
     @property
     def push_model(self) -> PushModel:
-        """The model that the dataset's outcomes and experts were made with."""
+        """Push model of the dataset's outcomes and experts."""
         model: PushModel = self.dataset.manifest.config.get("episodes", {}).get(
             "push_model", "force"
         )
@@ -149,7 +162,7 @@ class Source:
 
     @cached_property
     def bounds(self) -> NDArray[np.int64]:
-        """Episode numbers at which a new house begins, and the count."""
+        """Episode numbers at which a new house begins, and the count: (houses + 1,) int64."""
         return scene_bounds(self.dataset)
 
     @cached_property
@@ -188,7 +201,7 @@ class Source:
         """Return the house of an episode, ready for the environment."""
         return LOADED_HOUSES.of(self._digest, self.dataset.scene(episode.scene_id))
 
-    def _auxiliary_starts(self, number: int, kind: Kind) -> tuple[AuxiliaryStart, ...]:
+    def _auxiliary_starts(self, number: int, kind: InteractionKind) -> tuple[AuxiliaryStart, ...]:
         """Return the starts of an episode; `auxiliary_starts` keeps the latest ones."""
         episode = self.episode(number)
         model = self.loaded_house(episode).model
@@ -203,12 +216,12 @@ def open_source(
     split: str | None = None,
     filters: list[tuple[str, str, object]] | None = None,
 ) -> Source:
-    """Open a dataset, or take the one that this process has open already.
+    """Open a dataset, or return the one that this process has open already.
 
     Raises
     ------
     CorruptDataError
-        No dataset there, or a damaged one.
+        There is no dataset, or it is damaged.
     UsageError
         An unknown split, column or operator, or nothing selected.
     """
@@ -216,7 +229,7 @@ def open_source(
         return Source(dataset, _digest(dataset.path))
     path = Path(dataset)
     if not (path / MANIFEST).exists():
-        load_dataset(path)  # says what is wrong
+        load_dataset(path)  # raises with what is wrong there
     digest = _digest(path)
     key = repr((str(path.resolve()), digest, split, filters))
     found = _SOURCES.get(key)

@@ -43,7 +43,13 @@ def observation_space(size: int, sensors: Sequence[str | Sensor]) -> spaces.Dict
 def buffer_shapes(
     count: int, size: int, sensors: Sequence[str | Sensor]
 ) -> dict[str, tuple[tuple[int, ...], DTypeLike]]:
-    """Return shape (count, …) and dtype of each sensor's buffer, by name."""
+    """Return shape (count, …) and dtype of each sensor's buffer, by name.
+
+    Raises
+    ------
+    UsageError
+        A sensor is unknown, or its space is none of arrays.
+    """
     shapes: dict[str, tuple[tuple[int, ...], DTypeLike]] = {}
     for name, space in observation_space(size, sensors).items():
         if space.shape is None or space.dtype is None:
@@ -74,8 +80,8 @@ class ObservationBuffer:
         self.buffers = dict(buffers)
         self._camera, self._frames = camera, camera.frames(1)
         found = find_sensors(sensors)
-        self._seeing = [sensor for sensor in found if sensor.camera]
-        self._feeling = [sensor for sensor in found if not sensor.camera]
+        self._of_picture = [sensor for sensor in found if sensor.camera]
+        self._of_state = [sensor for sensor in found if not sensor.camera]
 
     @staticmethod
     def of(camera: Camera, count: int, sensors: Sequence[str | Sensor]) -> ObservationBuffer:
@@ -86,16 +92,16 @@ class ObservationBuffer:
 
     def write(self, row: int, run: EpisodeRun) -> None:
         """Write a slot's observations; pictures only if they have changed since the last time."""
-        if run.stale and self._seeing:
+        if run.stale and self._of_picture:
             self._camera.render([run.view()], self._frames)
-            for sensor in self._seeing:
+            for sensor in self._of_picture:
                 sensor.write(run, self._frames, self.buffers[sensor.name][row, ...])
         run.stale = False
-        for sensor in self._feeling:
+        for sensor in self._of_state:
             sensor.write(run, self._frames, self.buffers[sensor.name][row, ...])
 
     def copied(self) -> dict[str, NDArray[Any]]:
-        """Return copies of all buffers."""
+        """Return copies of all buffers: arrays (n, …) by sensor."""
         return {name: buffer.copy() for name, buffer in self.buffers.items()}
 
     def one(self) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from internav_data.records.errors import UsageError
 from internav_data.world.actions import INTERACTION_KINDS, ActionKind
 
 if TYPE_CHECKING:
-    from internav_data.envs.auxiliary import Kind
+    from internav_data.envs.auxiliary import InteractionKind
     from internav_data.envs.source import ShortestPathField
     from internav_data.records import Episode, PushModel
     from internav_data.world import StepResult, World
@@ -43,7 +43,7 @@ class TaskConfig:
     push_model: PushModel = "force"
 
     def check(self) -> None:
-        """Refuse settings that cannot be meant.
+        """Refuse settings that are out of their bounds.
 
         Raises
         ------
@@ -137,7 +137,7 @@ class Task(ABC):
 
     name: ClassVar[str]
     """Key in `TASKS`, and value of the environments' argument `task`."""
-    start_beside: ClassVar[Kind | None] = None
+    start_beside: ClassVar[InteractionKind | None] = None
     """Interaction to be learnt; the agent begins beside an obstacle that it would act on."""
     first_position: ClassVar[int] = 0
     """Position of the first episode in the order of episodes."""
@@ -167,7 +167,7 @@ class Task(ABC):
 
     @abstractmethod
     def metrics(self) -> dict[str, float | int | bool]:
-        """Return the metrics as of now; meant for the end."""
+        """Return the metrics so far; an environment reports them at the end."""
 
 
 class InteractiveNavigation(Task):
@@ -176,7 +176,7 @@ class InteractiveNavigation(Task):
     name = "interactive"
 
     def step(self, result: StepResult) -> tuple[float, bool]:
-        """Pay the step, and progress by a move, an interaction or Done."""
+        """Return the step's reward, and the progress by a move, an interaction or Done."""
         kind, reward = result.action.kind, STEP
         self.statistics.steps += 1
         if kind == "move":
@@ -206,8 +206,8 @@ class InteractiveNavigation(Task):
         self.statistics.moves += 1
         after = self.distances.at(self.world.i, self.world.j)
         if math.isinf(after):
-            # Furniture was moved and let the agent into what is cut off else: the last distance
-            # stands, so that rewards still add up to start minus end on every loop.
+            # Moved furniture let the agent into a part that is cut off in the untouched house. The
+            # last distance stands: rewards of a loop still add up to start minus end.
             return 0.0
         before, self.distance_m = self.distance_m, after
         return before - after
@@ -272,7 +272,7 @@ class _MoveAside(InteractiveNavigation):
         self._rewarded: set[int] = set()
 
     def step(self, result: StepResult) -> tuple[float, bool]:
-        """Pay as the main task does, and for the choice of interactions."""
+        """Return the main task's reward, plus r_as or minus r_af for an interaction."""
         reward, ended = super().step(result)
         if result.action.kind in INTERACTION_KINDS:
             extra = self._chosen(result)
@@ -302,7 +302,7 @@ class _MoveAside(InteractiveNavigation):
         return CHOSEN_ACTION
 
     def _path_steps(self) -> int | None:
-        """Return the lattice distance from the episode's start to the goal, things as they lie."""
+        """Return the lattice distance from the start to the goal, objects as they lie."""
         return self.world.lattice.distance(self._start, self.world.goal)
 
 

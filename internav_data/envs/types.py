@@ -1,4 +1,4 @@
-"""Types that environments and their callers share."""
+"""Types shared by environments and their callers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Many agents in one process, drawn by one camera; and the choice of more processes."""
+"""Vector environment in one process; all environments share one camera."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def declare_spaces(
     *,
     autoreset: bool,
 ) -> None:
-    """Give a vector environment its spaces and say how it resets."""
+    """Set the spaces and the autoreset mode of a vector environment."""
     from gymnasium import spaces  # noqa: PLC0415 - a short name in a short place
 
     env.num_envs = count
@@ -51,7 +51,13 @@ def declare_spaces(
 
 
 def split_seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
-    """Return each environment's seed: seed, seed + 1, … for a number."""
+    """Return the seed of each environment: seed, seed + 1, … for a number.
+
+    Raises
+    ------
+    UsageError
+        The number of seeds is not `count`.
+    """
     if seed is None:
         return [None] * count
     if isinstance(seed, int | np.integer):
@@ -62,23 +68,30 @@ def split_seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int
 
 
 class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
-    """N worlds stepped in one process.
+    """N environments stepped in one process.
 
     Environment k is `InterNavEnv` reset with seed + k, to the last bit. After an episode's last
-    step the next `step` begins another episode: its action counts for nothing, its reward is 0.
+    step the next `step` begins another episode; it ignores that action and pays 0.
 
     Parameters
     ----------
     num_envs
-        How many.
+        Number of environments, N.
     dataset, image_size, sensors, **arguments
-        As `InterNavEnv` has them.
+        Arguments of `InterNavEnv`; `task` may name a task for each environment.
     autoreset
-        False: whoever is done is to be reset by `reset(options={"reset_mask": …})`.
+        False: an environment that is done must be reset by `options={"reset_mask": …}`.
     copy
-        False returns the very buffers that the next step writes into.
-    buffers
-        Where observations are written; shared memory will do.
+        False: return the buffers that the next step overwrites, not copies.
+    buffers : dict of arrays
+        Arrays (N, …) to write observations into, one a sensor; made if not given.
+
+    Raises
+    ------
+    CorruptDataError
+        There is no dataset, or it is damaged.
+    UsageError
+        An argument is out of its bounds or unknown.
     """
 
     def __init__(
@@ -109,11 +122,22 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Observations, dict[str, Any]]:
-        """Begin everywhere, or where `options["reset_mask"]` (N,) says.
+        """Begin an episode in every environment, or in some.
 
-        `options["episode_id"]` is one for all, or N of them (None: the next of the order);
-        `options["actions"]` N sequences to be played at once, `options["start"]` N poses
-        (i, j, quarter) to begin at (None: the episode's own).
+        Parameters
+        ----------
+        seed
+            Seed of environment 0; environment k gets seed + k. Or N seeds. None goes on.
+        options
+            `reset_mask` (N,) bool: environments to reset; all if not given. `episode_id`: one for
+            all, or N of them (None: the next of the order). `actions`: N sequences of actions to
+            take at once. `start`: N nodes and quarter turns (i, j, quarter) to begin at (None: the
+            start that the task chooses).
+
+        Raises
+        ------
+        UsageError
+            An option is unknown or of another length, or there is no such episode.
         """
         chosen = check_options(options, OPTIONS)
         seeds = split_seeds(seed, self.num_envs)
@@ -130,33 +154,51 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         return self._observations(), infos
 
     def step(self, actions: NDArray[np.int64] | Sequence[int]) -> Stepped:
-        """Act everywhere: 0 … 11, or -1 to wait, (N,)."""
+        """Act in every environment.
+
+        Parameters
+        ----------
+        actions : (N,) int64
+            Actions, 0 … 11, or -1 to wait.
+
+        Raises
+        ------
+        UsageError
+            The shape is not (N,), an action is unknown, or an environment is done and `autoreset`
+            is False.
+        """
         asked = np.asarray(actions).tolist()
         count = self.num_envs
         if np.shape(actions) != (count,):
             raise UsageError(f"step: expected {count} actions, got shape {np.shape(actions)}")
         rewards = np.zeros(count)
         terminated, truncated = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
-        said: list[tuple[int, dict[str, Any]]] = []
+        stepped: list[tuple[int, dict[str, Any]]] = []
         for k, action in enumerate(asked):
             if self._done[k]:
-                said.append((k, self._again(k)))
+                stepped.append((k, self._autoreset_slot(k)))
                 continue
             run = self.slots[k].run
             step = run.step(int(action))
             rewards[k], terminated[k], truncated[k] = step
             self._buffer.write(k, run)
-            said.append((k, step_info(run, step)))
+            stepped.append((k, step_info(run, step)))
         self._done = terminated | truncated
-        infos = self._joined(said)
+        infos = self._joined(stepped)
         return self._observations(), rewards, terminated, truncated, infos
 
     def state(self) -> tuple[EpisodeSnapshot, ...]:
-        """Return what each environment is."""
+        """Return a snapshot of each environment."""
         return tuple(slot.state() for slot in self.slots)
 
     def restore(self, states: Sequence[EpisodeSnapshot]) -> tuple[Observations, dict[str, Any]]:
-        """Become what `state` returned."""
+        """Become the environments of snapshots; return observations, arrays (N, …) by sensor.
+
+        Raises
+        ------
+        UsageError
+            The number of snapshots is not `num_envs`.
+        """
         if len(states) != self.num_envs:
             raise UsageError(f"restore: expected {self.num_envs} states, got {len(states)}")
         infos: dict[str, Any] = {}
@@ -167,7 +209,7 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
             infos = self._add_info(infos, {"episode_id": state.episode_id}, k)
         return self._observations(), infos
 
-    def _again(self, k: int) -> dict[str, Any]:
+    def _autoreset_slot(self, k: int) -> dict[str, Any]:
         if not self._autoreset:
             raise UsageError(
                 f"step: environment {k} is done; reset it by options={{'reset_mask': …}}"
@@ -186,19 +228,23 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         self._buffer.write(k, run)
         return {"episode_id": run.episode.episode_id}
 
-    def _joined(self, said: list[tuple[int, dict[str, Any]]]) -> dict[str, Any]:
-        """Lay infos out as Gymnasium does; what every step says without its loops."""
+    def _joined(self, parts: list[tuple[int, dict[str, Any]]]) -> dict[str, Any]:
+        """Join infos by slot, as Gymnasium lays them out.
+
+        `VectorEnv._add_info` copies arrays for each environment and key; keys of every step are
+        joined at once.
+        """
         infos: dict[str, Any] = {}
-        stepped = [k for k, info in said if "target" in info]
+        stepped = [k for k, info in parts if "target" in info]
         if stepped:
             mask = np.zeros(self.num_envs, np.bool_)
             mask[stepped] = True
             kinds = (("action_success", np.bool_), ("reason", object), ("target", np.int64))
             for name, kind in kinds:
                 empty = None if kind is object else 0
-                column = np.array([info.get(name, empty) for _, info in said], dtype=kind)
+                column = np.array([info.get(name, empty) for _, info in parts], dtype=kind)
                 infos[name], infos[f"_{name}"] = column, mask.copy()
-        for k, info in said:
+        for k, info in parts:
             rest: dict[str, Any] = {
                 key: info[key] for key in ("episode_id", "metrics") if key in info
             }
@@ -213,7 +259,15 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
 def reset_choices(
     chosen: dict[str, Any], count: int
 ) -> tuple[Bools, list[str | None], list[Sequence[int]], list[Sequence[int] | None]]:
-    """Return who is to be reset, to which episode, what is played at once, and from where."""
+    """Return the mask (count,) bool of slots to reset, and a value of each option for each slot.
+
+    The values are the episode's id, the actions to take at once and the start.
+
+    Raises
+    ------
+    UsageError
+        The mask is not (count,) bool or is empty, or an option has another length.
+    """
     mask = np.asarray(chosen.get("reset_mask", np.ones(count, np.bool_)))
     if mask.shape != (count,) or mask.dtype != np.bool_ or not mask.any():
         raise UsageError(

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.dataset import Dataset
+    from internav_data.envs.types import Observations
     from internav_data.records import Episode
 
-    Observations = Mapping[str, NDArray[Any]]
     Tell = Callable[[int, int], None]
 
 STEPS_AT_MOST = 10_000
