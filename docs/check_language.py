@@ -11,7 +11,7 @@ fragment  a public docstring, or a description under `Parameters` or `Attributes
 raises    a public function raises by name and its docstring has no `Raises` section that says so
 dialect   a class, function, argument, attribute, module or module constant has a name that was
           replaced by the field's word
-meaning   one class name or type alias is defined in two modules
+meaning   one class name or type alias is defined in two modules of the package
 shapes    a public function of arrays states no shape (only in rooms listed in `STRICT_SHAPES`)
 """
 
@@ -30,6 +30,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeGuard
 
 from code_lines import (
+    FOLDERS,
     ROOT,
     Function,
     code_lines,
@@ -45,6 +46,8 @@ if TYPE_CHECKING:
 # ---------------------------------------------------------------------------------------------
 # Tables: what the rules look for. Change the language here.
 
+SCRIPTS = frozenset(FOLDERS) - {"cli"}
+"""Rooms beside the package, each file of which is a program of its own."""
 DEFAULT_PATHS = ("internav_data", "cli", "benchmarks", "docs", "examples")
 """Checked when no path is given, below the root of the repository."""
 LONG_FUNCTION = 50
@@ -614,9 +617,14 @@ def dialect(module: Module) -> Iterator[Finding]:
 
 
 def meanings(modules: Sequence[Module]) -> Iterator[Finding]:
-    """Yield public class names and type aliases that are defined in two modules or more."""
+    """Yield public class names and type aliases that two modules of the package define.
+
+    Scripts beside the package are programs of their own: their names concern no one else.
+    """
     places: defaultdict[str, list[tuple[str, int]]] = defaultdict(list)
     for module in modules:
+        if module.room in SCRIPTS:
+            continue
         for made in definitions(module):
             if made.public and not made.owner and (made.kind == "class" or _is_alias(made)):
                 places[made.name].append((module.path, made.line))

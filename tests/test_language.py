@@ -325,6 +325,12 @@ def test_private_and_local_names_and_values_may_repeat(text):
     assert language.check([parse(text, path="a.py"), parse(text, path="b.py")]) == []
 
 
+def test_scripts_may_define_what_the_package_defines():
+    package = parse("class Box: ...\n", path="a.py")
+    script = parse("class Box: ...\n", path="b.py", room="benchmarks")
+    assert language.check([package, script]) == []
+
+
 ARRAYS = 'def area(corners: {}) -> float:\n    """Return the area of {}."""\n'
 
 
