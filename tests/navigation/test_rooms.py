@@ -58,9 +58,10 @@ def test_room_paths_stay_quick_where_a_dense_part_leads_nowhere():
     # 38 rooms all joined with each other hang on one room: billions of dead ends, two ways.
     dense = [(a, b) for a in range(4, 42) for b in range(4, a)]
     house = graph_house([(0, 1), (1, 2), (0, 3), (3, 2), (3, 4), *dense], 42)
-    begin = time.perf_counter()
+    begin = time.process_time()
     assert room_paths(house, 0, 2) == (((0, 1, 2), (0, 3, 2)), False)
-    assert time.perf_counter() - begin < 5.0
+    # Milliseconds of this process: other work on the machine does not count.
+    assert time.process_time() - begin < 5.0
 
 
 def test_room_of_a_point_is_its_polygon_and_a_border_has_one_owner():
