@@ -84,10 +84,10 @@ class CachedEngine:
         if not self.result_cache.is_open:
             return self.engine.settle(scene)
         key = self._key("settle", scene)
-        known = _read_settle(self.result_cache.get(key))
+        known = unpack_settle(self.result_cache.get(key))
         if known is None:
             known = self.engine.settle(scene)
-            self.result_cache.put(key, _write_settle(known))
+            self.result_cache.put(key, pack_settle(known))
         return known
 
     def push(self, scene: PhysicsScene, spec: PushSpec) -> PushSolution:
@@ -95,10 +95,10 @@ class CachedEngine:
         if not self.result_cache.is_open:
             return self.engine.push(scene, spec)
         key = self._key(repr(spec), scene)
-        known = _read_push(self.result_cache.get(key), sum(b.moves for b in scene.bodies))
+        known = unpack_push(self.result_cache.get(key), sum(b.moves for b in scene.bodies))
         if known is None:
             known = self.engine.push(scene, spec)
-            self.result_cache.put(key, _write_push(known))
+            self.result_cache.put(key, pack_push(known))
         return known
 
     def _key(self, what: str, scene: PhysicsScene) -> bytes:
@@ -122,12 +122,14 @@ def _numbers(pose: Pose) -> tuple[float, ...]:
     return (pose.x, pose.y, pose.z, *pose.quaternion)
 
 
-def _write_settle(solution: SettleSolution) -> bytes:
+def pack_settle(solution: SettleSolution) -> bytes:
+    """Return a solution of a settle as bytes, exact to the last bit."""
     numbers = (solution.seconds, solution.penetration_m, solution.reach_m)
     return _SETTLE.pack(*_numbers(solution.pose), *numbers, solution.at_rest)
 
 
-def _read_settle(value: bytes | None) -> SettleSolution | None:
+def unpack_settle(value: bytes | None) -> SettleSolution | None:
+    """Return the solution of a settle that bytes hold; None for bytes that hold none."""
     if value is None or len(value) != _SETTLE.size:
         return None
     x, y, z, a, b, c, d, *numbers, at_rest = _SETTLE.unpack(value)
@@ -137,7 +139,8 @@ def _read_settle(value: bytes | None) -> SettleSolution | None:
     return SettleSolution(Pose(x, y, z, (a, b, c, d)), seconds, at_rest, penetration_m, reach_m)
 
 
-def _write_push(solution: PushSolution) -> bytes:
+def pack_push(solution: PushSolution) -> bytes:
+    """Return a solution of a push as bytes, exact to the last bit."""
     movers = zip(solution.poses, solution.sweeps, solution.paths, strict=True)
     return b"".join((
         _PUSH.pack(solution.seconds, solution.at_rest, len(solution.poses)),
@@ -146,8 +149,8 @@ def _write_push(solution: PushSolution) -> bytes:
     ))  # fmt: skip
 
 
-def _read_push(value: bytes | None, movers: int) -> PushSolution | None:
-    """Read a solution of `movers` moving bodies; None for bytes that are none."""
+def unpack_push(value: bytes | None, movers: int) -> PushSolution | None:
+    """Return the solution of a push of `movers` moving bodies; None for bytes that hold none."""
     at = _PUSH.size + movers * _MOVER.size
     if value is None or len(value) < at:
         return None

@@ -23,9 +23,9 @@ FILE_NAME: Final = "solutions.sqlite"
 MAX_BYTES: Final = 1 << 30
 """Maximum size, about 150,000 pushes. The file is emptied once it is full."""
 _PAGE: Final = 4096
-_OPENING_S: Final = 5.0
+OPENING_S: Final = 5.0
 """Time to wait for a lock while opening, long enough for a busy moment of other processes."""
-_WAIT_S: Final = 0.2
+WAIT_S: Final = 0.2
 """Time to wait for a lock later: solving anew takes some milliseconds."""
 _BATCH: Final = 32
 """Values written in one transaction: one by one, each would cost a tenth of what it saves."""
@@ -142,7 +142,7 @@ def _opened(path: Path) -> sqlite3.Connection:
 
 def _connected(path: Path) -> sqlite3.Connection:
     # Worlds may be stepped in any thread, if in one at a time.
-    file = sqlite3.connect(path, timeout=_OPENING_S, isolation_level=None, check_same_thread=False)
+    file = sqlite3.connect(path, timeout=OPENING_S, isolation_level=None, check_same_thread=False)
     file.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _MAX_VALUE_BYTES + _CHECK)
     file.execute("PRAGMA trusted_schema = OFF")
     # No waiting for the disk: a lost solution is solved again, and the checksums find the damage
@@ -160,7 +160,7 @@ def _connected(path: Path) -> sqlite3.Connection:
     if found != [("table", _TABLE)]:
         file.close()
         raise sqlite3.DatabaseError(f"{path} holds something else: {found}")
-    file.execute(f"PRAGMA busy_timeout = {round(1000 * _WAIT_S)}")
+    file.execute(f"PRAGMA busy_timeout = {round(1000 * WAIT_S)}")
     return file
 
 

@@ -32,8 +32,19 @@ SLACK: Final = 1e-9
 
 
 @njit(cache=True)
-def _hidden(eye: Floats, point: Floats, planes: Floats, starts: Ints, skip: int) -> bool:
-    """Return whether a convex part other than `skip` cuts the segment from the eye to a point."""
+def is_hidden(eye: Floats, point: Floats, planes: Floats, starts: Ints, skip: int) -> bool:
+    """Return whether a convex part cuts the segment from the eye to a point.
+
+    Parameters
+    ----------
+    eye, point : (3,) float64
+        Ends of the segment, metres.
+    planes, starts
+        Half-spaces of the parts, as in `OcclusionShape`.
+    skip
+        Index of a part to leave out; -1 for none.
+
+    """
     dx, dy, dz = point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]
     for part in range(len(starts) - 1):
         if part == skip:
@@ -85,7 +96,7 @@ def _seen(
 ) -> bool:
     """Return whether a point is in view and not hidden; the object's parts begin at `first`."""
     for k in range(len(points)):
-        if _in_view(eye, points[k], *view) and not _hidden(
+        if _in_view(eye, points[k], *view) and not is_hidden(
             eye, points[k], planes, starts, first + owners[k]
         ):
             return True

@@ -68,32 +68,33 @@ def test_what_an_interrupt_left_in_a_world_is_swept_away(fresh, monkeypatch):
     lone = next(scene for scene in asked if len(scene.bodies) == 1)
     crowded = next(scene for scene in asked if len(scene.bodies) > 1)
     expected = fresh.push(lone, PUSH_SPECS["force"])
-    real = Builder._place
+    real = pybullet.createMultiBody
 
-    def interrupted(self, *args, **where):
-        real(self, *args, **where)
-        self._bodies.pop()
+    def interrupted(*args, **where):
+        real(*args, **where)
         raise KeyboardInterrupt
 
     for _ in range(2):
-        # A thing stands where the next scene's would go, and nobody knows its number.
-        monkeypatch.setattr(Builder, "_place", interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            bullet().push(crowded, PUSH_SPECS["force"])
-        monkeypatch.setattr(Builder, "_place", real)
+        # A body stands where the next scene's would go, and nobody knows its number.
+        with monkeypatch.context() as patch:
+            patch.setattr(pybullet, "createMultiBody", interrupted)
+            with pytest.raises(KeyboardInterrupt):
+                bullet().push(crowded, PUSH_SPECS["force"])
         assert bullet().push(lone, PUSH_SPECS["force"]) == expected
 
 
 def test_a_world_is_given_up_before_it_leaks_much(monkeypatch):
     begun = []
-    real = Builder._begin
-    monkeypatch.setattr(Builder, "_begin", lambda self: begun.append(real(self)))
+    real = pybullet.resetSimulation
+    monkeypatch.setattr(
+        pybullet, "resetSimulation", lambda *args, **kw: begun.append(real(*args, **kw))
+    )
     engine = bullet()
     lone = PhysicsScene((Body.of(THINGS[2], Pose(0.0, 0.0, 0.001, UPRIGHT)),))
     for _ in range(3 * SCENES_PER_WORLD):
-        engine._builder.build(lone)
+        engine.builder.build(lone)
     assert len(begun) == 3
-    assert pybullet.getNumBodies(engine._builder.client) == 1 + len(lone.bodies)
+    assert pybullet.getNumBodies(engine.builder.client) == 1 + len(lone.bodies)
 
 
 def test_what_a_users_own_client_sets_changes_nothing():
@@ -113,6 +114,6 @@ def test_a_forked_process_has_a_client_and_files_of_its_own():
     child = os.fork()
     if child == 0:
         there = bullet()
-        os._exit(0 if there is not here and there._builder.folder != here._builder.folder else 1)
+        os._exit(0 if there is not here and there.builder.folder != here.builder.folder else 1)
     assert os.waitpid(child, 0)[1] == 0
-    assert here._builder.folder.is_dir()
+    assert here.builder.folder.is_dir()

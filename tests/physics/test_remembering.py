@@ -1,6 +1,7 @@
 """What is kept on disk is what was solved; whatever happens to the file, answers stay right."""
 
 import contextlib
+import functools
 import math
 import shutil
 import sqlite3
@@ -24,11 +25,11 @@ from internav_data.physics import (
 )
 from internav_data.physics.cache import (
     CachedEngine,
-    _read_push,
-    _read_settle,
-    _write_push,
-    _write_settle,
     origin,
+    pack_push,
+    pack_settle,
+    unpack_push,
+    unpack_settle,
 )
 from internav_data.physics.engines.bullet import bullet
 from internav_data.physics.result_cache import FILE_NAME, ResultCache
@@ -179,12 +180,12 @@ push_solutions = st.builds(
 
 @given(push_solutions)
 def test_motions_come_back_as_they_were(solution):
-    count, written = len(solution.poses), _write_push(solution)
-    assert repr(_read_push(written, count)) == repr(solution)  # tells -0.0 from 0.0
-    assert all(_read_push(written[:k], count) is None for k in range(len(written)))
-    assert _read_push(written + b"x", count) is None
-    assert _read_push(written, count + 1) is None
-    assert _read_push(written, count - 1) is None
+    count, written = len(solution.poses), pack_push(solution)
+    assert repr(unpack_push(written, count)) == repr(solution)  # tells -0.0 from 0.0
+    assert all(unpack_push(written[:k], count) is None for k in range(len(written)))
+    assert unpack_push(written + b"x", count) is None
+    assert unpack_push(written, count + 1) is None
+    assert unpack_push(written, count - 1) is None
 
 
 @given(push_solutions, st.sampled_from([math.nan, math.inf, -math.inf]))
@@ -197,21 +198,21 @@ def test_a_motion_that_is_not_finite_is_none(solution, number):
         replace(solution, paths=(*solution.paths[:-1], b"")),
         replace(solution, paths=(*solution.paths[:-1], b"abc")),
     ):
-        assert _read_push(_write_push(wrong), len(solution.poses)) is None
+        assert unpack_push(pack_push(wrong), len(solution.poses)) is None
 
 
 @given(poses, finite, finite, finite, st.booleans())
 def test_rests_come_back_as_they_were(pose, seconds, penetration_m, reach_m, at_rest):
     rest = SettleSolution(pose, seconds, at_rest, penetration_m, reach_m)
-    assert repr(_read_settle(_write_settle(rest))) == repr(rest)
-    assert _read_settle(_write_settle(rest)[:-1]) is None
-    assert _read_settle(_write_settle(replace(rest, reach_m=math.nan))) is None
+    assert repr(unpack_settle(pack_settle(rest))) == repr(rest)
+    assert unpack_settle(pack_settle(rest)[:-1]) is None
+    assert unpack_settle(pack_settle(replace(rest, reach_m=math.nan))) is None
 
 
 @given(st.binary(max_size=400), st.integers(0, 3))
 def test_no_bytes_make_reading_fail(value, movers):
-    _read_push(value, movers)
-    _read_settle(value)
+    unpack_push(value, movers)
+    unpack_settle(value)
 
 
 def kept(folder):
@@ -293,10 +294,16 @@ def test_a_folder_that_cannot_be_made_keeps_nothing(tmp_path):
     assert engine.result_cache.count() == 0
 
 
-def test_a_read_only_file_is_read(tmp_path):
+def test_a_read_only_file_is_read(tmp_path, monkeypatch):
     kept(tmp_path)
+
+    class ReadOnly(sqlite3.Connection):
+        def __init__(self, *args, **kwargs):
+            super().__init__(*args, **kwargs)
+            self.execute("PRAGMA query_only = ON")
+
+    monkeypatch.setattr(sqlite3, "connect", functools.partial(sqlite3.connect, factory=ReadOnly))
     engine = remembering(tmp_path)
-    engine.result_cache._file.execute("PRAGMA query_only = ON")
     engine.push(LONE, FORCE)
     assert engine.engine.asked == 0
     engine.push(PAIR, FORCE)
@@ -304,7 +311,7 @@ def test_a_read_only_file_is_read(tmp_path):
 
 
 def test_a_writer_who_is_waited_for_in_vain_costs_no_answer(tmp_path, monkeypatch):
-    monkeypatch.setattr("internav_data.physics.result_cache._OPENING_S", 0.2)
+    monkeypatch.setattr("internav_data.physics.result_cache.OPENING_S", 0.2)
     solution = kept(tmp_path)
     held = remembering(tmp_path)
     with contextlib.closing(opened(tmp_path)) as other:
@@ -323,10 +330,17 @@ def opened(folder):
 
 def test_solving_anew_believes_nothing_that_is_kept(tmp_path, monkeypatch):
     monkeypatch.setattr("internav_data.physics.registry.result_cache", lambda: held)
-    held = ResultCache(tmp_path)
-    engine = get_engine()
-    lie = replace(engine.push(LONE, FORCE), seconds=123.0)
-    held.put(engine._key(repr(FORCE), LONE), _write_push(lie))
+
+    class Recording(ResultCache):
+        """Result cache that remembers the last key."""
+
+        def put(self, key, value):
+            self.last = key
+            super().put(key, value)
+
+    held = Recording(tmp_path)
+    lie = replace(get_engine().push(LONE, FORCE), seconds=123.0)
+    held.put(held.last, pack_push(lie))
     held.flush()
     assert get_engine().push(LONE, FORCE) == lie
     with cache_disabled():

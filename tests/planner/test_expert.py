@@ -84,11 +84,11 @@ def episodes():
 
 
 def check(model, episode):
-    """Solve; where there is an expert, hold every claim it makes against a fresh world."""
+    """Solve, and hold every claim of the expert against a fresh world; all are solvable."""
     assets = catalogue().assets
     expert = expert_of_episode(model, episode, assets)
-    if expert is None:
-        return False
+    assert expert == episode.expert
+    assert expert is not None
     world = World.of_episode(model, episode, assets)
     results = [world.step(action) for action in expert.actions]
     assert all(result.success for result in results)
@@ -99,31 +99,23 @@ def check(model, episode):
     assert expert.path_m == 0.25 * expert.actions.count(Action.MOVE_AHEAD)
     assert expert.picks == expert.actions.count(Action.PICKUP)
     assert expert.pushes == sum(5 <= action <= 8 for action in expert.actions)
-    if episode.mode == "blocked":
-        assert expert.pushes + expert.picks > 0
-    return True
+    interactions = expert.pushes + expert.picks
+    assert interactions > 0 or episode.mode == "lengthened"
+    return interactions
 
 
 def test_every_expert_replays(episodes):
-    solved = [check(model, episode) for model, episode in episodes]
-    assert sum(solved) >= 0.6 * len(solved)
-
-
-def test_what_is_not_blocked_is_solved(episodes):
-    for model, episode in episodes:
-        if episode.mode == "lengthened":
-            assert expert_of_episode(model, episode, catalogue().assets) is not None
+    assert {episode.mode for _, episode in episodes} == {"blocked", "lengthened"}
+    assert sum(check(model, episode) for model, episode in episodes) >= len(episodes) // 2
 
 
 @pytest.mark.slow
 def test_a_thousand_experts_replay():
-    solved = []
     for scene in range(100):
         house = build_house(1, scene, HouseConfig(), catalogue())
         model = HouseModel.of(house)
-        made = build_episodes(house, 10, catalogue().spawnable)
-        solved += [check(model, episode) for episode in made]
-    assert sum(solved) >= 700
+        for episode in build_episodes(house, 10, catalogue().spawnable):
+            check(model, episode)
 
 
 def test_a_box_in_a_corridor_is_pushed():
@@ -144,12 +136,13 @@ def test_a_parcel_in_a_corridor_is_picked_up():
 def test_two_parcels_need_an_empty_hand():
     parcels = [at(PARCEL, 2.0, 0.75), at(PARCEL, 4.5, 0.75)]
     expert = expert_of(CORRIDOR, parcels, (2, 3, 0), (22, 3))
-    if expert is not None:  # dropped in a corridor, a parcel may bar it again
-        assert expert.picks >= 2
-        assert Action.DROP in expert.actions
+    assert expert is not None
+    # The first is dropped behind the agent: in front of it, it would bar the corridor again.
+    assert expert.picks == 2
+    assert expert.actions.count(Action.DROP) == 1
     wide = [at(PARCEL, 2.5, 0.75), at(PARCEL, 2.5, 8.25)]
     house = one_room(5.0, 9.0, (2.44, 1.4, 2.56, 7.6))
-    assert expert_of(HouseModel.of(house), wide, (4, 3, 0), (16, 3)) is not None
+    assert expert_of(HouseModel.of(house), wide, (4, 3, 0), (16, 3)).picks == 1, "one gap is enough"
 
 
 def test_a_short_way_round_is_gone():
@@ -236,6 +229,7 @@ def test_replay_refuses_what_fails():
 
 
 def test_fields_count_what_the_lattice_counts(episodes):
+    reachable = set()
     for model, episode in episodes[::5]:
         world = World.of_episode(model, episode, catalogue().assets)
         problem = PlanningProblem.of(world)
@@ -249,10 +243,11 @@ def test_fields_count_what_the_lattice_counts(episodes):
         costs = problem.costs(masks, EVERYTHING, problem.prices(world))
         ahead = int(costs[problem.pose(world)])
         assert (ahead < FAR) == (world.steps() is not None)
-        if ahead < FAR:
-            # There and back are equally far.
-            goal = 4 * (world.goal[0] * problem.ny + world.goal[1])
-            assert ahead == reach[goal : goal + 4].min()
+        # There and back are equally far, and equally cut off.
+        goal = 4 * (world.goal[0] * problem.ny + world.goal[1])
+        assert ahead == reach[goal : goal + 4].min()
+        reachable.add(ahead < FAR)
+    assert reachable == {True, False}
 
 
 def experts():

@@ -20,7 +20,7 @@ def worlds():
 
 
 def pushables(world):
-    return [k for k, item in enumerate(world.items) if item.asset.pushable]
+    return [k for k, item in enumerate(world.items) if item.dynamics.pushable]
 
 
 def test_free_slides_are_guessed(worlds):

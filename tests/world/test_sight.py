@@ -11,7 +11,7 @@ from internav_data.geometry import part_corners, transform, yaw_quaternion
 from internav_data.geometry.headings import HEADINGS
 from internav_data.records import Pose
 from internav_data.world.occlusion import MAX_POINTS, occlusion_shape, placed_occlusion_shape
-from internav_data.world.visibility import CAMERA_M, REACH_M, Occluders, _hidden, camera_pose
+from internav_data.world.visibility import CAMERA_M, REACH_M, Occluders, camera_pose, is_hidden
 
 SHAPES = ("box", "cylinder", "sphere")
 
@@ -45,7 +45,7 @@ def test_rays_are_obstructed_where_samples_lie_inside_a_hull():
             eye, end = rng.uniform(-1.5, 1.5, 3), rng.uniform((-0.4, -0.4, 0), (0.4, 0.4, 1))
             samples = eye + np.linspace(0.0, 1.0, 800)[:, None] * (end - eye)
             inside = sum(int((hull.find_simplex(samples) >= 0).sum()) for hull in hulls)
-            answer = _hidden(eye, end, shell.planes, shell.starts, -1)
+            answer = is_hidden(eye, end, shell.planes, shell.starts, -1)
             if inside:
                 assert answer
                 hidden += 1

@@ -59,7 +59,8 @@ _ASLEEP = (
 class Bullet:
     """Engine on one client of pybullet in DIRECT mode (without graphics)."""
 
-    _builder: Builder
+    builder: Builder
+    """Builder of scenes on the engine's client."""
     name: str = "bullet"
     rules: int = RULES
     libraries: tuple[str, ...] = ("pybullet",)
@@ -68,19 +69,19 @@ class Bullet:
 
     def settle(self, scene: PhysicsScene) -> SettleSolution:
         """Let the first body fall until it is at rest, for one second at most."""
-        ids = self._builder.build(scene)
+        ids = self.builder.build(scene)
         body = scene.bodies[0]
         radius = bounding_radius_m(body.asset)
-        start, start_turn = pybullet.getBasePositionAndOrientation(ids[0], self._builder.client)
+        start, start_turn = pybullet.getBasePositionAndOrientation(ids[0], self.builder.client)
         reach, calm, steps = 0.0, 0, 0
         limit = round(SETTLE_LIMIT_S / STEP_S)
         while steps < limit and calm < REST_STEPS:
-            pybullet.stepSimulation(self._builder.client)
+            pybullet.stepSimulation(self.builder.client)
             steps += 1
-            speed, spin = pybullet.getBaseVelocity(ids[0], self._builder.client)
+            speed, spin = pybullet.getBaseVelocity(ids[0], self.builder.client)
             slow = math.hypot(*speed) < REST_SPEED and math.hypot(*spin) < REST_SPIN
             calm = calm + 1 if slow else 0
-            now, turn = pybullet.getBasePositionAndOrientation(ids[0], self._builder.client)
+            now, turn = pybullet.getBasePositionAndOrientation(ids[0], self.builder.client)
             shift = math.hypot(now[0] - start[0], now[1] - start[1])
             # A bound for all corners: the shift of the centre of mass plus the arc of the farthest.
             reach = max(reach, shift + radius * _angle(start_turn, turn))
@@ -94,8 +95,8 @@ class Bullet:
 
     def push(self, scene: PhysicsScene, spec: PushSpec) -> PushSolution:
         """Push the first body along +x, release it, and step until all bodies are at rest."""
-        ids = self._builder.build(scene)
-        client = self._builder.client
+        ids = self.builder.build(scene)
+        client = self.builder.client
         moving = [k for k, body in enumerate(scene.bodies) if body.moves]
         pushes_left = round(spec.seconds / STEP_S)
         limit = pushes_left + round(PUSH_LIMIT_S / STEP_S)
@@ -135,33 +136,33 @@ class Bullet:
 
     def _slow(self, identity: int) -> bool:
         """Return whether a body's linear and angular speeds are those of a body at rest."""
-        speed, spin = pybullet.getBaseVelocity(identity, self._builder.client)
+        speed, spin = pybullet.getBaseVelocity(identity, self.builder.client)
         return math.hypot(*speed) < REST_SPEED and math.hypot(*spin) < REST_SPIN
 
     def _apply_push(self, identity: int, spec: PushSpec, gain: float, pushes_left: int) -> int:
         """Push for one step; return the number of steps of pushing that are left."""
-        speed, spin = pybullet.getBaseVelocity(identity, self._builder.client)
+        speed, spin = pybullet.getBaseVelocity(identity, self.builder.client)
         if speed[0] + gain >= spec.speed_m_s:
             # The last impulse is scaled: it gives just the speed that is missing.
             missing = (spec.speed_m_s, speed[1], speed[2])
-            pybullet.resetBaseVelocity(identity, missing, spin, self._builder.client)
+            pybullet.resetBaseVelocity(identity, missing, spin, self.builder.client)
             return 0
-        middle, _ = pybullet.getBasePositionAndOrientation(identity, self._builder.client)
+        middle, _ = pybullet.getBasePositionAndOrientation(identity, self.builder.client)
         force = (spec.force_n, 0.0, 0.0)
         pybullet.applyExternalForce(
-            identity, -1, force, middle, pybullet.WORLD_FRAME, self._builder.client
+            identity, -1, force, middle, pybullet.WORLD_FRAME, self.builder.client
         )
         return pushes_left - 1
 
     def _pose(self, identity: int, asset: Asset) -> Pose:
         """Return the pose of the asset's frame; Bullet reports that of the centre of mass."""
-        position, turn = pybullet.getBasePositionAndOrientation(identity, self._builder.client)
+        position, turn = pybullet.getBasePositionAndOrientation(identity, self.builder.client)
         offset = rotation_matrix(turn) @ centre_of_mass(asset)
         x, y, z = (float(p - o) for p, o in zip(position, offset, strict=True))
         return Pose(x, y, z, (turn[0], turn[1], turn[2], turn[3]))
 
     def _penetration(self, identity: int) -> float:
-        client = self._builder.client
+        client = self.builder.client
         contacts: Any = pybullet.getContactPoints(bodyA=identity, physicsClientId=client)
         # Column 8 of a contact point is the distance, negative where bodies overlap.
         depths = [-contact[8] for contact in contacts]
