@@ -75,7 +75,7 @@ def measure(ds: Dataset[Any], records: int) -> dict[str, Any]:
     ds[0]  # opens the first file
 
     def cold(row: int) -> None:
-        ds.shelf._groups.clear()
+        ds.row_group_cache.clear()
         _ = ds[row]
 
     for row in rows:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import functools
 import hashlib
-from collections import OrderedDict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast, overload
 
 import numpy as np
 
+from internav_data.core.lru import LRUCache
 from internav_data.core.storage import Store, StoreLike, store_of
 from internav_data.dataset.decode import from_table
 from internav_data.dataset.location import dataset_folder
@@ -31,8 +31,9 @@ if TYPE_CHECKING:
 
 E = TypeVar("E")
 
-_CACHED_HOUSES = 256
+MAX_CACHED_HOUSES = 256
 _RUN = 64
+"""Episodes that iteration reads at once."""
 
 
 def load_dataset(
@@ -93,8 +94,8 @@ class Dataset(Generic[E]):
             check_columns(columns, EPISODES)
         self._digest = hashlib.sha256(store.read(MANIFEST)).hexdigest()
         self._files = self.manifest.of("episodes", split)
-        self.shelf = RowGroupCache(store, self._files, EPISODES, self.columns)
-        self._houses: OrderedDict[str, House] = OrderedDict()
+        self.row_group_cache = RowGroupCache(store, self._files, EPISODES, self.columns)
+        self._houses: LRUCache[str, House] = LRUCache(MAX_CACHED_HOUSES)
         for file in (*self.manifest.of("scenes"), *self.manifest.of("assets")):
             check_file(store, file)
         self._index: NDArray[np.int64] | None = None
@@ -127,12 +128,12 @@ class Dataset(Generic[E]):
 
     @property
     def fingerprint(self) -> str:
-        """What the selection of episodes is, for states: changes whenever the order would."""
-        said = repr((self._digest, self.split, self.filters, self.columns))
-        return hashlib.sha256(said.encode()).hexdigest()[:16]
+        """Digest of the selection of episodes, for states; it changes whenever the order would."""
+        selection = repr((self._digest, self.split, self.filters, self.columns))
+        return hashlib.sha256(selection.encode()).hexdigest()[:16]
 
     def __len__(self) -> int:
-        return len(self.shelf) if self._index is None else len(self._index)
+        return len(self.row_group_cache) if self._index is None else len(self._index)
 
     @overload
     def __getitem__(self, item: int) -> E: ...
@@ -146,7 +147,7 @@ class Dataset(Generic[E]):
         number = int(item)
         if not -len(self) <= number < len(self):
             raise IndexError(f"episode {number} of {len(self)}")
-        return cast("E", self.shelf.row(self._row(number % len(self))))
+        return cast("E", self.row_group_cache.row(self._row(number % len(self))))
 
     def __getitems__(self, numbers: Sequence[int]) -> list[E]:
         """Return several episodes, as torch's DataLoader asks for a batch."""
@@ -161,7 +162,7 @@ class Dataset(Generic[E]):
         """Read rows of the files, neighbours in one go."""
         start = 0
         while start < len(rows):
-            first, end, reader = self.shelf.group_of(rows[start])
+            first, end, reader = self.row_group_cache.group_of(rows[start])
             stop = start + 1
             while stop < len(rows) and rows[stop] == rows[stop - 1] + 1 and rows[stop] < end:
                 stop += 1
@@ -177,7 +178,7 @@ class Dataset(Generic[E]):
 
     def blocks(self) -> NDArray[np.int64]:
         """Return the numbers of selected episodes at which row groups start, and their count."""
-        bounds = self.shelf.all_bounds()
+        bounds = self.row_group_cache.all_bounds()
         if self._index is not None:
             bounds = np.searchsorted(self._index, bounds)
         return np.unique(np.concatenate([[0], bounds])).astype(np.int64)
@@ -216,9 +217,9 @@ class Dataset(Generic[E]):
     @functools.cached_property
     def _scenes(self) -> tuple[RowGroupCache, dict[str, int]]:
         files = self.manifest.of("scenes")
-        shelf = RowGroupCache(self.store, files, SCENES, extra=lambda: {"assets": self.assets})
+        cache = RowGroupCache(self.store, files, SCENES, extra=lambda: {"assets": self.assets})
         ids = read_columns(self.store, files, SCENES, ["scene_id"])["scene_id"].to_pylist()
-        return shelf, {scene_id: row for row, scene_id in enumerate(ids)}
+        return cache, {scene_id: row for row, scene_id in enumerate(ids)}
 
     @property
     def scene_ids(self) -> tuple[str, ...]:
@@ -235,15 +236,10 @@ class Dataset(Generic[E]):
             No such scene in the dataset.
 
         """
-        if scene_id not in self._houses:
-            shelf, rows = self._scenes
-            if scene_id not in rows:
-                raise UsageError(f"{self.path}: no scene {scene_id!r} (ids look like scene-000017)")
-            self._houses[scene_id] = shelf.row(rows[scene_id])
-            while len(self._houses) > _CACHED_HOUSES:
-                self._houses.popitem(last=False)
-        self._houses.move_to_end(scene_id)
-        return self._houses[scene_id]
+        cache, rows = self._scenes
+        if scene_id not in rows:
+            raise UsageError(f"{self.path}: no scene {scene_id!r} (ids look like scene-000017)")
+        return self._houses.get(scene_id, lambda: cast("House", cache.row(rows[scene_id])))
 
     def to_table(self, columns: Sequence[str] | None = None) -> pa.Table:
         """Return the selected episodes as an Arrow table of the given (or all) columns."""

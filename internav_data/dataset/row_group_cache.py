@@ -1,13 +1,13 @@
-"""Row groups of a dataset's files, opened when asked for and kept within a bound."""
+"""Row groups of a dataset's files: read at their first use, the latest ones kept in memory."""
 
 from __future__ import annotations
 
 import os
-from collections import OrderedDict
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from internav_data.core.lru import LRUCache
 from internav_data.dataset.decode import ColumnReader, RecordReader
 from internav_data.dataset.manifest import DataFile, check_file, open_file
 from internav_data.dataset.parquet import read_group
@@ -25,15 +25,34 @@ V = TypeVar("V")
 
 Reader = RecordReader | ColumnReader
 
-_OPEN_FILES = 64
-_CACHED_BYTES = 96 << 20
+MAX_OPEN_FILES = 64
+MAX_CACHED_BYTES = 96 << 20
 
 
 class RowGroupCache:
     """The rows of one table in several files, numbered through, read a row group at a time.
 
-    Holds open files and at most some 96 MiB of row groups. After a fork (a DataLoader's worker)
-    it forgets both and opens the files again.
+    Holds `MAX_OPEN_FILES` files and `MAX_CACHED_BYTES` of row groups. After a fork (a DataLoader's
+    worker) it drops both and opens the files again.
+
+    Parameters
+    ----------
+    store
+        Store of the dataset.
+    files
+        Files of the table, in the order of their rows.
+    spec
+        The table.
+    columns
+        Columns of the rows, which are then dictionaries; None: rows are records.
+    extra
+        Values of a record's fields that the table does not hold, read with the first row group.
+
+    Raises
+    ------
+    CorruptDataError
+        A file is missing, truncated or edited.
+
     """
 
     def __init__(
@@ -51,27 +70,37 @@ class RowGroupCache:
         self.starts: NDArray[np.int64] = np.cumsum([0, *[file.rows for file in files]])
         """(files + 1,) row number at which each file starts."""
         self._bounds: dict[int, NDArray[np.int64]] = {}
-        self._forget()
+        self._open_anew()
 
     def __len__(self) -> int:
         return int(self.starts[-1])
 
-    def _forget(self) -> None:
+    def _open_anew(self) -> None:
+        # A forked process shares file positions with its parent: nothing of it may be used.
         self._process = os.getpid()
-        self._open: OrderedDict[int, pq.ParquetFile] = OrderedDict()
-        self._groups: OrderedDict[int, tuple[int, Reader]] = OrderedDict()
-        self._bytes = 0
+        self._open: LRUCache[int, pq.ParquetFile] = LRUCache(
+            MAX_OPEN_FILES, on_evict=lambda file: file.close()
+        )
+        self._groups: LRUCache[int, tuple[int, Reader]] = LRUCache(
+            MAX_CACHED_BYTES, weigh=lambda held: held[0]
+        )
+
+    @property
+    def groups_held(self) -> int:
+        """Number of row groups in memory."""
+        return len(self._groups)
+
+    def clear(self) -> None:
+        """Drop the row groups in memory; files stay open."""
+        self._groups.clear()
 
     def file(self, number: int) -> pq.ParquetFile:
         """Return an open file."""
         if self._process != os.getpid():
-            self._forget()
-        if number not in self._open:
-            self._open[number] = open_file(self._store, self._files[number], self._spec)
-            while len(self._open) > _OPEN_FILES:
-                self._open.popitem(last=False)[1].close()
-        self._open.move_to_end(number)
-        return self._open[number]
+            self._open_anew()
+        return self._open.get(
+            number, lambda: open_file(self._store, self._files[number], self._spec)
+        )
 
     def bounds(self, number: int) -> NDArray[np.int64]:
         """Return the row numbers at which a file's row groups start, and the end: (groups + 1,)."""
@@ -93,19 +122,12 @@ class RowGroupCache:
         group = int(np.searchsorted(bounds, row, side="right")) - 1
         first, end = int(bounds[group]), int(bounds[group + 1])
         if self._process != os.getpid():
-            self._forget()
-        held = self._groups.get(first)
-        if held is None:
-            held = self._read(number, group)
-            self._groups[first] = held
-            self._bytes += held[0]
-            while self._bytes > _CACHED_BYTES and len(self._groups) > 1:
-                self._bytes -= self._groups.popitem(last=False)[1][0]
-        else:
-            self._groups.move_to_end(first)
-        return first, end, held[1]
+            self._open_anew()
+        _, reader = self._groups.get(first, lambda: self._read(number, group))
+        return first, end, reader
 
     def _read(self, number: int, group: int) -> tuple[int, Reader]:
+        """Return the bytes of a row group in memory, and its reader."""
         path = self._store.at(self._files[number].path)
         table = read_group(path, self.file(number), group, self._spec, self._columns)
         if self._columns is not None:

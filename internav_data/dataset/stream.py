@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import sys
-from collections import OrderedDict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from internav_data.core.lru import LRUCache
 from internav_data.dataset.order import WINDOW, epoch_order, share
 from internav_data.records.errors import UsageError
 
@@ -97,19 +98,16 @@ class EpisodeStream:
             self._position = 0
         self._resume = False
         rows = self.rows()
-        recent: OrderedDict[int, tuple[int, Any]] = OrderedDict()
-        bounds = self.dataset.shelf.all_bounds()
+        cache = self.dataset.row_group_cache
+        # Rows come from WINDOW groups in turn: these stay, whatever else the dataset reads.
+        recent: LRUCache[int, tuple[int, int, Any]] = LRUCache(WINDOW)
+        bounds = cache.all_bounds()
         groups = np.searchsorted(bounds, rows, side="right") - 1
         for k in range(self._position, len(rows)):
-            group, row = int(groups[k]), int(rows[k])
-            held = recent.get(group)
-            if held is None:
-                first, _, reader = self.dataset.shelf.group_of(row)
-                held = recent[group] = (first, reader)
-                if len(recent) > WINDOW:
-                    recent.popitem(last=False)
+            row = int(rows[k])
+            first, _, reader = recent.get(int(groups[k]), functools.partial(cache.group_of, row))
             self._position = k + 1
-            yield held[1].rows(row - held[0], row - held[0] + 1)[0]
+            yield reader.rows(row - first, row - first + 1)[0]
 
     def __len__(self) -> int:
         start, stop = share(len(self.dataset), *self._rank)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections import OrderedDict
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from internav_data.core.lru import LRUCache
 from internav_data.dataset import load_dataset
 from internav_data.dataset.manifest import MANIFEST
 from internav_data.envs.auxiliary import auxiliary_starts
@@ -77,7 +77,9 @@ class LoadedHouse:
     static_scene: StaticScene
     instances: tuple[int, ...]
     """Instance number, among the camera's props, of each movable object of the model."""
-    _fields: OrderedDict[tuple[int, int], ShortestPathField] = field(default_factory=OrderedDict)
+    _fields: LRUCache[tuple[int, int], ShortestPathField] = field(
+        default_factory=lambda: LRUCache(FIELDS_KEPT)
+    )
 
     @staticmethod
     def of(house: House) -> LoadedHouse:
@@ -88,39 +90,13 @@ class LoadedHouse:
 
     def distance_field(self, goal: tuple[int, int]) -> ShortestPathField:
         """Return the distance field of a goal."""
-        found = self._fields.get(goal)
-        if found is None:
-            found = self._fields[goal] = ShortestPathField(self.model, goal)
-            if len(self._fields) > FIELDS_KEPT:
-                self._fields.popitem(last=False)
-        self._fields.move_to_end(goal)
-        return found
+        return self._fields.get(goal, lambda: ShortestPathField(self.model, goal))
 
 
-class LoadedHouses:
-    """The most recently used houses, by dataset and scene."""
-
-    def __init__(self, capacity: int = HOUSE_CACHE_SIZE) -> None:
-        self.capacity = capacity
-        self._houses: OrderedDict[tuple[str, str], LoadedHouse] = OrderedDict()
-
-    def __len__(self) -> int:
-        return len(self._houses)
-
-    def of(self, dataset_key: str, house: House) -> LoadedHouse:
-        """Return a house prepared for episodes; one that is kept is not prepared again."""
-        key = (dataset_key, house.scene_id)
-        found = self._houses.get(key)
-        if found is None:
-            found = self._houses[key] = LoadedHouse.of(house)
-            while len(self._houses) > self.capacity:
-                self._houses.popitem(last=False)
-        self._houses.move_to_end(key)
-        return found
+LOADED_HOUSES: Final[LRUCache[tuple[str, str], LoadedHouse]] = LRUCache(HOUSE_CACHE_SIZE)
+"""The latest houses by manifest digest and scene id; all environments of a process share them."""
 
 
-LOADED_HOUSES: Final = LoadedHouses()
-"""Houses of this process, shared by its environments."""
 SOURCES_KEPT: Final = 8
 """Number of datasets kept open in a process."""
 STARTS_KEPT: Final = 8192
@@ -199,7 +175,8 @@ class Source:
 
     def loaded_house(self, episode: Episode) -> LoadedHouse:
         """Return the house of an episode, ready for the environment."""
-        return LOADED_HOUSES.of(self._digest, self.dataset.scene(episode.scene_id))
+        house = self.dataset.scene(episode.scene_id)
+        return LOADED_HOUSES.get((self._digest, house.scene_id), lambda: LoadedHouse.of(house))
 
     def _auxiliary_starts(self, number: int, kind: InteractionKind) -> tuple[AuxiliaryStart, ...]:
         """Return the starts of an episode; `auxiliary_starts` keeps the latest ones."""
@@ -208,7 +185,7 @@ class Source:
         return auxiliary_starts(model, episode, self.dataset.assets, kind)
 
 
-_SOURCES: OrderedDict[str, Source] = OrderedDict()
+_SOURCES: Final[LRUCache[str, Source]] = LRUCache(SOURCES_KEPT)
 
 
 def open_source(
@@ -232,13 +209,7 @@ def open_source(
         load_dataset(path)  # raises with what is wrong there
     digest = _digest(path)
     key = repr((str(path.resolve()), digest, split, filters))
-    found = _SOURCES.get(key)
-    if found is None:
-        found = _SOURCES[key] = Source(load_dataset(path, split, filters), digest)
-        if len(_SOURCES) > SOURCES_KEPT:
-            _SOURCES.popitem(last=False)
-    _SOURCES.move_to_end(key)
-    return found
+    return _SOURCES.get(key, lambda: Source(load_dataset(path, split, filters), digest))
 
 
 def _digest(path: Path) -> str:

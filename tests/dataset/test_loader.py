@@ -181,23 +181,23 @@ def test_row_groups_end_where_scenes_end(dataset_folder):
 
 
 def test_memory_held_is_bounded(ds, monkeypatch):
-    from internav_data.dataset import row_group_cache as shelf
-
+    monkeypatch.setattr("internav_data.dataset.row_group_cache.MAX_CACHED_BYTES", 1)
     some = load_dataset(ds.path)
-    monkeypatch.setattr(shelf, "_CACHED_BYTES", 1)
     for number in (0, 779, 400, 1, 778):
         some[number]
-        assert len(some.shelf._groups) == 1
+        assert some.row_group_cache.groups_held == 1
 
 
 def test_another_process_opens_its_own_files(ds, monkeypatch):
     some = load_dataset(ds.path)
     some[0]
-    before, groups = some.shelf.file(0), some.shelf._groups
+    cache = some.row_group_cache
+    file, (_, _, reader) = cache.file(0), cache.group_of(0)
+    assert cache.group_of(0)[2] is reader
     monkeypatch.setattr("os.getpid", lambda: -1)
     assert some[0] == ds[0]
-    assert some.shelf._groups is not groups
-    assert some.shelf.file(0) is not before
+    assert cache.group_of(0)[2] is not reader
+    assert cache.file(0) is not file
 
 
 def test_duckdb_reads_it(dataset_folder, everything):

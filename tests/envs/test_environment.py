@@ -10,10 +10,11 @@ from gymnasium.utils.env_checker import check_env
 
 import internav_data.envs
 from internav_data.dataset import load_dataset
+from internav_data.core.lru import LRUCache
 from internav_data.envs import EpisodeSnapshot, InterNavVectorEnv
 from internav_data.envs.order import EpisodeOrder
 from internav_data.envs.sensors import SENSORS
-from internav_data.envs.source import FIELDS_KEPT, LoadedHouses, open_source
+from internav_data.envs.source import FIELDS_KEPT, open_source
 from internav_data.generation import generate, load_config
 from internav_data.navigation import TangentGraph
 from internav_data.records.errors import CorruptDataError, UsageError
@@ -363,19 +364,24 @@ def test_registered_once():
     assert "InterNav-v0" in gymnasium.registry
 
 
-def test_so_many_houses_are_kept(small):
+def test_houses_and_distance_fields_are_kept_within_bounds(small, monkeypatch):
+    held = LRUCache(2)
+    monkeypatch.setattr("internav_data.envs.source.LOADED_HOUSES", held)
     source = open_source(small)
-    houses = LoadedHouses(2)
     first = source.episode(0)
-    house = source.dataset.scene(first.scene_id)
-    assert houses.of("d", house) is houses.of("d", house)
+    loaded_house = source.loaded_house(first)
+    assert source.loaded_house(first) is loaded_house
     for number in source.bounds[1:-1].tolist():
-        houses.of("d", source.dataset.scene(source.episode(number).scene_id))
-        assert len(houses) <= 2
-    loaded_house = houses.of("d", house)
-    fields = {id(loaded_house.distance_field((i, 5))) for i in range(200)}
-    assert fields
-    assert len(loaded_house._fields) == FIELDS_KEPT
+        source.loaded_house(source.episode(number))
+        assert len(held) <= 2
+    assert source.loaded_house(first) is not loaded_house
+    field = loaded_house.distance_field((0, 5))
+    for i in range(1, FIELDS_KEPT):
+        loaded_house.distance_field((i, 5))
+    assert loaded_house.distance_field((0, 5)) is field
+    for i in range(1, FIELDS_KEPT + 1):
+        loaded_house.distance_field((i, 5))
+    assert loaded_house.distance_field((0, 5)) is not field
 
 
 @pytest.mark.slow

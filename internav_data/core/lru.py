@@ -1,0 +1,82 @@
+"""Cache that drops the entries used least recently.
+
+For functions of their arguments `functools.lru_cache` does the same; this one bounds the weight of
+its entries rather than their number, closes what it drops, and can be emptied or enlarged.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Hashable
+
+K = TypeVar("K", bound="Hashable")
+V = TypeVar("V")
+
+
+def _one(_: object) -> float:
+    return 1.0
+
+
+class LRUCache(Generic[K, V]):
+    """Values by key; the least recently used ones go once all together weigh too much.
+
+    The newest entry is pinned: it stays even where it alone is heavier than `capacity`, so a caller
+    may use what it just asked for.
+
+    Parameters
+    ----------
+    capacity
+        Greatest weight of all entries together; may be changed later.
+    weigh
+        Weight of a value; 1 if not given, so that `capacity` is a number of entries. It must not
+        change while the value is held.
+    on_evict
+        Called with every value that goes, as by `clear`.
+    """
+
+    __slots__ = ("_entries", "_on_evict", "_weigh", "_weight", "capacity")
+
+    def __init__(
+        self,
+        capacity: float,
+        weigh: Callable[[V], float] = _one,
+        on_evict: Callable[[V], object] | None = None,
+    ) -> None:
+        self.capacity = capacity
+        self._weigh, self._on_evict = weigh, on_evict
+        self._entries: OrderedDict[K, V] = OrderedDict()
+        self._weight = 0.0
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def __contains__(self, key: object) -> bool:
+        return key in self._entries
+
+    def get(self, key: K, make: Callable[[], V]) -> V:
+        """Return the value of a key, made if the cache has none; it is now the newest entry.
+
+        If `make` raises, nothing changes.
+        """
+        if key in self._entries:
+            self._entries.move_to_end(key)
+            return self._entries[key]
+        value = self._entries[key] = make()
+        self._weight += self._weigh(value)
+        while self._weight > self.capacity and len(self._entries) > 1:
+            self._evict()
+        return value
+
+    def clear(self) -> None:
+        """Drop every entry."""
+        while self._entries:
+            self._evict()
+
+    def _evict(self) -> None:
+        _, value = self._entries.popitem(last=False)
+        self._weight -= self._weigh(value)
+        if self._on_evict:
+            self._on_evict(value)
