@@ -9,8 +9,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import internav_data.envs
-from internav_data.dataset import load_dataset
 from internav_data.core.lru import LRUCache
+from internav_data.dataset import load_dataset
 from internav_data.envs import EpisodeSnapshot, InterNavVectorEnv
 from internav_data.envs.order import EpisodeOrder
 from internav_data.envs.sensors import SENSORS
