@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / "internav_data"
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 SNIPPET = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -116,3 +117,36 @@ def test_tests_named_in_the_architecture_exist():
     assert len(named) > 20
     for name, path in named:
         assert f"def {name}(" in (ROOT / path).read_text(), name
+
+
+def table_rows(page):
+    """Cells of every row of the page's tables, without heads and lines below them."""
+    lines = [line for line in (ROOT / page).read_text().splitlines() if line.startswith("| ")]
+    rows = [[cell.strip() for cell in line.strip("| ").split(" | ")] for line in lines]
+    return [row for row in rows if row[0] not in {"term", "step", "invariant"}]
+
+
+def defines(path, name):
+    """Whether a module, or one in a folder, defines a name or a column or option of this name."""
+    modules = sorted(path.rglob("*.py")) if path.is_dir() else [path]
+    pattern = rf"^ *(def|class) {name}\b|^ *(self\.)?{name}\b *[:=]|[\"']{name}[\"']"
+    return any(re.search(pattern, module.read_text(), re.MULTILINE) for module in modules)
+
+
+def test_functions_named_in_the_architecture_exist():
+    named = [row for row in table_rows("ARCHITECTURE.md") if len(row) == 3]
+    assert len(named) > 30
+    for _, name, path in named:
+        assert defines(PACKAGE / path.strip("`"), name.strip("`")), f"{path} defines no {name}"
+
+
+def test_names_in_the_glossary_exist_where_it_says():
+    rows = table_rows("docs/glossary.md")
+    assert len(rows) > 150
+    for term, _, _, where in rows:
+        paths = [PACKAGE / path for path in re.findall(r"`([^`]+)`", where)]
+        assert paths, term
+        for path in paths:
+            assert path.exists(), f"{term}: {path}"
+        for name in re.findall(r"`(\w+)`", term):
+            assert any(defines(path, name) for path in paths), f"{name} is not in {where}"
