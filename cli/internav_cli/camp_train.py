@@ -139,9 +139,8 @@ def _config(given: dict[str, Any]) -> CampConfig:
 
 
 def _request(given: dict[str, Any]) -> Request:
-    from internav_data.camp.cloning import CLONING
     from internav_data.camp.run import Request
-    from internav_data.camp.stages import PARTS
+    from internav_data.camp.stages import CLONING, PARTS
 
     config, method = _config(given), given["method"] or "camp"
     words = (given["stages"] or ",".join(PARTS)).replace(" ", "").split(",")

@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 import platform
 import shutil
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -24,6 +24,8 @@ from safetensors.torch import load_file, save_file
 
 from internav_data.camp.agents import make_agent
 from internav_data.camp.config import from_mapping, plain, preset
+from internav_data.camp.stages import check_parts
+from internav_data.core import config as values
 from internav_data.core.storage import (
     file_sha256,
     sync,
@@ -166,7 +168,7 @@ def read(path: Path, which: str = "last", *, training: bool = True) -> Checkpoin
     return Checkpoint(method, config, weights, progress, rest)
 
 
-def load_agent(path: str | Path, which: str = "last") -> Agent:
+def load_agent(path: str | Path, which: str = "last") -> Agent[Any]:
     """Return the trained agent of a run or checkpoint, on the processor.
 
     It knows its `method`, `config` and `progress`.
@@ -301,107 +303,125 @@ def _compare(
             )
 
 
-_OPTIMISER, _STATE, _STARTS = "optimiser", "state", "starts"
-_RANDOM: Final = "random"
-"""States of torch's generators, bytes. (What training draws is keyed by seed and update: only a
-user's own agent could draw from these.)"""
+_OPTIMISER, _STATE, _STARTS, _RANDOM = "optimiser", "state", "starts", "random"
+"""Groups of the training tensors. Random numbers of training are keyed by seed and update: only a
+user's own agent could draw from torch's generators."""
 
 
 @dataclass(slots=True)
 class TrainState:
-    """Where a run is."""
+    """Counters of a run, to resume from."""
 
-    parts: list[str]
-    """Stages that it is to go through."""
-    clones: bool
-    """Whether it clones the expert first."""
+    parts: tuple[str, ...] = ()
+    """Parts of the schedule that it is to go through."""
+    clones: bool = False
+    """Whether experts are cloned first."""
     stage: str = ""
-    """Under way, or just over; none yet: empty."""
+    """Stage that is under way or has just ended; empty before the first."""
     done: int = 0
     """Updates of that stage."""
     updates: int = 0
-    """Of all stages."""
+    """PPO updates of all stages."""
     environment_steps: int = 0
-    cloned_updates: int = 0
     cloned_frames: int = 0
+    training_s: float = 0.0
     critics: dict[str, int] = field(default_factory=dict)
     """Rollouts that each critic has learnt from."""
-    training_s: float = 0.0
+
+    @classmethod
+    def from_progress(cls, progress: Mapping[str, Any]) -> TrainState:
+        """Read the counters of a checkpoint, and check what else its progress must have.
+
+        Raises
+        ------
+        CorruptDataError
+            A value is missing or of another type.
+        """
+        critics, window = progress.get("critics"), progress.get("window")
+        counts = [progress.get("log"), *(critics.values() if isinstance(critics, dict) else [None])]
+        if not all(type(count) is int and count >= 0 for count in counts):
+            raise CorruptDataError(f"checkpoint: progress: log, critics: got {counts}")
+        if not isinstance(window, list) or not all(isinstance(each, dict) for each in window):
+            raise CorruptDataError("checkpoint: progress: window: expected a list of episodes")
+        names = [f.name for f in fields(cls) if f.name != "critics"]
+        counters = {name: progress.get(name) for name in names}
+        try:
+            state = values.from_mapping(cls(), counters, "progress")
+            state.critics.update(critics or {})
+            if state.parts:
+                check_parts(state.parts)
+        except UsageError as error:
+            raise CorruptDataError(f"checkpoint: {error}") from error
+        return state
 
 
-def packed(optimiser: Optimizer, state: State, starts: Tensor | None = None) -> dict[str, Tensor]:
-    """Return the optimiser's moments, what the agent remembers, and torch's random numbers."""
-    said = {f"{_RANDOM}/cpu": torch.get_rng_state()}
-    if torch.cuda.is_available():
-        said[f"{_RANDOM}/cuda"] = torch.cuda.get_rng_state()
-    for number, moments in optimiser.state_dict()["state"].items():
-        said |= {f"{_OPTIMISER}/{number}/{name}": value for name, value in moments.items()}
-    said |= {f"{_STATE}/{name}": kept for name, kept in state.items()}
-    return said if starts is None else {**said, _STARTS: starts}
+def pack(optimiser: Optimizer, state: State, starts: Tensor) -> dict[str, Tensor]:
+    """Return an optimiser's moments, an agent's memory and torch's random numbers by name.
 
-
-def unpack_optimiser(tensors: Mapping[str, Tensor], optimiser: Optimizer) -> None:
-    """Put moments back.
-
-    Raises
-    ------
-    CorruptDataError
-        They are those of other parameters.
+    `state` (n, …) and `starts` (n,) bool are those of all environments.
     """
-    parameters = [p for group in optimiser.param_groups for p in group["params"]]
-    state: dict[int, dict[str, Tensor]] = {}
-    for key, value in tensors.items():
-        parts = key.split("/")
-        if parts[0] != _OPTIMISER:
-            continue
-        number = int(parts[1]) if len(parts) == 3 and parts[1].isdecimal() else -1  # noqa: PLR2004 - group, number, name
-        fits = 0 <= number < len(parameters)
-        if not fits or value.shape not in {parameters[number].shape, torch.Size([])}:
-            raise CorruptDataError(f"checkpoint: {key} is of no parameter that is trained now")
-        state.setdefault(number, {})[parts[2]] = value
-    optimiser.load_state_dict(
-        {"state": state, "param_groups": optimiser.state_dict()["param_groups"]}
-    )
+    tensors = {f"{_RANDOM}/cpu": torch.get_rng_state(), _STARTS: starts}
+    if torch.cuda.is_available():
+        tensors[f"{_RANDOM}/cuda"] = torch.cuda.get_rng_state()
+    for number, moments in optimiser.state_dict()["state"].items():
+        tensors |= {f"{_OPTIMISER}/{number}/{name}": value for name, value in moments.items()}
+    return tensors | {f"{_STATE}/{name}": value for name, value in state.items()}
 
 
-def unpack_state(tensors: Mapping[str, Tensor], like: State, own: range, count: int) -> State:
-    """Return what the agent remembered; `like` is what it does at a start.
+def unpack(
+    tensors: Mapping[str, Tensor], optimiser: Optimizer, blank: State, own: range, count: int
+) -> tuple[State, Tensor]:
+    """Restore optimiser and random numbers; return the memory and starts of some environments.
 
     Parameters
     ----------
     tensors
-        Of all `count` environments.
-    like
-        Of this rank's `own` ones.
+        Tensors of `pack`, of all `count` environments.
+    optimiser
+        New optimiser of the same parameters.
+    blank
+        Initial memory of the agent.
     own, count
-        Numbers of environments.
+        Numbers of this rank's environments, and how many there are.
 
     Raises
     ------
     CorruptDataError
-        It is another agent's, or of another number of environments.
+        A tensor is missing, or belongs to another agent or number of environments.
     """
-    return {
-        name: _rows(tensors, f"{_STATE}/{name}", blank, own, count) for name, blank in like.items()
-    }
+    parameters = [p for group in optimiser.param_groups for p in group["params"]]
+    moments: dict[int, dict[str, Tensor]] = {}
+    for key, value in tensors.items():
+        group, _, rest = key.partition("/")
+        if group != _OPTIMISER:
+            continue
+        number, _, name = rest.partition("/")
+        k = int(number) if number.isdecimal() else len(parameters)
+        if k >= len(parameters) or value.shape not in {parameters[k].shape, torch.Size([])}:
+            raise CorruptDataError(f"checkpoint: {key} is of no parameter that is trained now")
+        moments.setdefault(k, {})[name] = value
+    groups = optimiser.state_dict()["param_groups"]
+    optimiser.load_state_dict({"state": moments, "param_groups": groups})
+
+    def rows(name: str, like: Tensor) -> Tensor:
+        found, shape = tensors.get(name), (count, *like.shape[1:])
+        if found is None or tuple(found.shape) != shape or found.dtype != like.dtype:
+            got = None if found is None else (found.dtype, tuple(found.shape))
+            raise CorruptDataError(f"checkpoint: {name}: expected {like.dtype} {shape}, got {got}")
+        return found[own.start : own.stop].to(like.device)
+
+    state = {name: rows(f"{_STATE}/{name}", like) for name, like in blank.items()}
+    starts = rows(_STARTS, torch.zeros(1, dtype=torch.bool))
+    try:
+        torch.set_rng_state(tensors[f"{_RANDOM}/cpu"])
+        if f"{_RANDOM}/cuda" in tensors and torch.cuda.is_available():
+            torch.cuda.set_rng_state(tensors[f"{_RANDOM}/cuda"])
+    except (KeyError, RuntimeError, TypeError) as error:
+        raise CorruptDataError(f"checkpoint: {_RANDOM}: {error}") from error
+    return state, starts
 
 
-def unpack_starts(tensors: Mapping[str, Tensor], like: Tensor, own: range, count: int) -> Tensor:
-    """Return where an episode begins at the next step, (n,) bool; see `unpack_state`."""
-    return _rows(tensors, _STARTS, like, own, count)
-
-
-def _rows(tensors: Mapping[str, Tensor], name: str, like: Tensor, own: range, count: int) -> Tensor:
-    kept, shape = tensors.get(name), (count, *like.shape[1:])
-    if kept is None or tuple(kept.shape) != shape or kept.dtype != like.dtype:
-        raise CorruptDataError(
-            f"checkpoint: {name}: expected {like.dtype} {shape}, got "
-            f"{None if kept is None else (kept.dtype, tuple(kept.shape))}"
-        )
-    return kept[own.start : own.stop].to(like.device)
-
-
-def unpack_environments(progress: Mapping[str, Any], own: range) -> list[EpisodeSnapshot]:
+def snapshots_of(progress: Mapping[str, Any], own: range) -> list[EpisodeSnapshot]:
     """Return the snapshots of the environments with these numbers.
 
     Raises
@@ -417,13 +437,3 @@ def unpack_environments(progress: Mapping[str, Any], own: range) -> list[Episode
             f"checkpoint: progress: environments: expected a list of {own.stop} at least"
         )
     return [EpisodeSnapshot.from_json(state) for state in states[own.start : own.stop]]
-
-
-def unpack_random(tensors: Mapping[str, Tensor]) -> None:
-    """Put torch's random numbers back."""
-    try:
-        torch.set_rng_state(tensors[f"{_RANDOM}/cpu"])
-        if f"{_RANDOM}/cuda" in tensors and torch.cuda.is_available():
-            torch.cuda.set_rng_state(tensors[f"{_RANDOM}/cuda"])
-    except (KeyError, RuntimeError, TypeError) as error:
-        raise CorruptDataError(f"checkpoint: {_RANDOM}: {error}") from error

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from internav_data.camp.agents import Agent
-    from internav_data.camp.collect import Environments
     from internav_data.camp.config import CampConfig
     from internav_data.camp.stages import TrainingStage
     from internav_data.dataset import Dataset
+    from internav_data.envs.loop import Environments
     from internav_data.records import Episode
 
 _SINGLE = ("room_count", "==", 1)
@@ -94,7 +94,9 @@ class TrainingData:
         )  # fmt: skip
         return env  # type: ignore[no-any-return] # what `Environments` asks is there
 
-    def validate(self, agent: Agent, method: str, config: CampConfig) -> dict[str, float] | None:
+    def validate(
+        self, agent: Agent[Any], method: str, config: CampConfig
+    ) -> dict[str, float] | None:
         """Let an agent play the validation split: means over its episodes, None without any."""
         limit = config.run.validation_episodes
         episodes = load_dataset(self.path, "val", self._where or None)

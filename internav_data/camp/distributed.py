@@ -1,12 +1,11 @@
-"""Several processes that train one agent, each in its share of the environments (`torchrun`).
+"""Distributed training: several processes train one agent, each in its share of the environments.
 
-Every rank holds the same parameters and takes the same steps: whatever an update averages is a sum
-over all ranks (`ppo.update`). The first one writes what there is to write.
+`torchrun` starts them. Every rank holds the same parameters and takes the same steps, as each mean
+of an update is a sum across ranks (`ppo.update`). The first rank writes the run's files.
 """
 
 from __future__ import annotations
 
-import json
 import os
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any
@@ -23,19 +22,19 @@ if TYPE_CHECKING:
     from internav_data.camp.ppo import Reduce
 
 
-_PATIENCE_H = 6
+_TIMEOUT_H = 6
 """Hours that ranks wait for each other: the first one alone validates."""
 
 
 class DistributedContext:
-    """Where a process is among those that train together; alone unless `torchrun` started it.
+    """Rank of this process among those that train together; 0 of 1 unless `torchrun` started it.
 
     Parameters
     ----------
     device
-        Where tensors that travel lie.
+        Device of the tensors that ranks exchange.
     rank, size
-        Of this process, and of all.
+        Number of this process, and of all.
     """
 
     def __init__(self, device: torch.device, rank: int = 0, size: int = 1) -> None:
@@ -43,46 +42,38 @@ class DistributedContext:
 
     @property
     def first(self) -> bool:
-        """Whether it is this one that writes."""
+        """Whether this rank writes the run's files."""
         return self.rank == 0
 
     @property
     def reduce(self) -> Reduce:
-        """What adds over all ranks."""
-        return alone if self.size == 1 else self.sum
+        """All-reduce sum across ranks."""
+        return alone if self.size == 1 else self.all_reduce
 
-    def share(self, count: int, what: str) -> range:
+    def share(self, count: int, setting: str) -> range:
         """Return this rank's numbers of `count` environments.
 
         Raises
         ------
         UsageError
-            They cannot be shared out evenly.
+            The number, of a named setting, is no multiple of the number of ranks.
         """
         if count % self.size:
             raise UsageError(
-                f"{what} is {count}: {self.size} processes share environments out evenly, so it "
+                f"{setting} is {count}: {self.size} processes share environments out evenly, so it "
                 f"must be a multiple of {self.size}"
             )
         own = count // self.size
         return range(self.rank * own, (self.rank + 1) * own)
 
-    def sum(self, tensor: Tensor) -> Tensor:
-        """Return a tensor added up over all ranks, without gradient."""
-        whole = tensor.detach().to(self.device, copy=True)
-        distributed.all_reduce(whole)
-        return whole.to(tensor.device)
+    def all_reduce(self, tensor: Tensor) -> Tensor:
+        """Return the sum of a tensor across ranks, without gradient."""
+        total = tensor.detach().to(self.device, copy=True)
+        distributed.all_reduce(total)
+        return total.to(tensor.device)
 
-    def most(self, value: int) -> int:
-        """Return the greatest of a number over all ranks."""
-        if self.size == 1:
-            return value
-        greatest = torch.tensor(value, device=self.device)
-        distributed.all_reduce(greatest, distributed.ReduceOp.MAX)
-        return int(greatest)
-
-    def joined(self, tensor: Tensor, dim: int = 0) -> Tensor:
-        """Return the ranks' tensors of equal shape, one after another along a dimension."""
+    def all_gather(self, tensor: Tensor, dim: int = 0) -> Tensor:
+        """Return the ranks' tensors of equal shape, concatenated along a dimension."""
         if self.size == 1:
             return tensor
         own = tensor.contiguous().to(self.device)
@@ -91,23 +82,18 @@ class DistributedContext:
         distributed.all_gather(found, sent)
         return torch.cat(found, dim).to(tensor.device, tensor.dtype)
 
-    def listed(self, items: list[Any]) -> list[Any]:
-        """Return the ranks' lists of plain JSON, joined in their order."""
-        if self.size == 1:
-            return items
-        own = torch.frombuffer(bytearray(json.dumps(items).encode()), dtype=torch.uint8)
-        lengths = self.joined(torch.tensor([len(own)])).tolist()
-        padded = torch.zeros(max(lengths), dtype=torch.uint8)
-        padded[: len(own)] = own
-        rows = self.joined(padded.unsqueeze(0))
-        texts = [bytes(row[:length].tolist()) for row, length in zip(rows, lengths, strict=True)]
-        return [item for text in texts for item in json.loads(text)]
+    def all_gather_items(self, items: list[Any]) -> list[Any]:
+        """Return the ranks' lists, concatenated in the order of ranks."""
+        found: list[list[Any]] = [items] * self.size
+        if self.size > 1:
+            distributed.all_gather_object(found, items)
+        return [item for own in found for item in own]
 
 
-def ranks_of(device: torch.device) -> DistributedContext:
-    """Return this process among its ranks, and meet the others.
+def distributed_context(device: torch.device) -> DistributedContext:
+    """Return this process among its ranks, once all have met.
 
-    `torchrun` says who it is by the environment variables RANK, WORLD_SIZE and LOCAL_RANK.
+    `torchrun` sets the environment variables RANK, WORLD_SIZE and LOCAL_RANK.
     """
     size = int(os.environ.get("WORLD_SIZE", "1"))
     if size == 1:
@@ -117,12 +103,12 @@ def ranks_of(device: torch.device) -> DistributedContext:
         torch.cuda.set_device(device)
     if not distributed.is_initialized():
         backend = "nccl" if device.type == "cuda" else "gloo"
-        distributed.init_process_group(backend, timeout=timedelta(hours=_PATIENCE_H))
+        distributed.init_process_group(backend, timeout=timedelta(hours=_TIMEOUT_H))
     return DistributedContext(device, distributed.get_rank(), size)
 
 
 def device_of(name: str) -> torch.device:
-    """Return "cpu" or "cuda"; "auto" is a GPU where there is one.
+    """Return the device "cpu" or "cuda"; "auto" is a GPU where there is one.
 
     Raises
     ------
@@ -136,5 +122,5 @@ def device_of(name: str) -> torch.device:
 
 
 def default_preset(device: str) -> str:
-    """Return the preset that suits this machine: `paper` where there is a GPU, else `small`."""
+    """Return the preset that suits this machine: `paper` with a GPU, else `small`."""
     return "paper" if device != "cpu" and torch.cuda.is_available() else "small"

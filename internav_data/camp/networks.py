@@ -1,11 +1,12 @@
-"""Encoders, recurrent policies and what is drawn from them. Shapes: T steps, n environments.
+"""Networks: encoders, recurrent policies, the intent policy. Shapes: T steps, n environments.
 
-Section 4.1 of the paper: a policy is a GRU with two linear layers, for actions and for values;
-what it sees is encoded by convolutions and joined by an embedding of the goal.
+A policy is a GRU with two linear layers, one for actions and one for values (section 4.1 of the
+paper); its inputs are convolutional features joined by an embedding of the goal.
 """
 
 from __future__ import annotations
 
+import copy
 import itertools
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,7 +19,7 @@ from torch.nn import functional
 from internav_data.world.actions import HORIZONS_DEG
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from internav_data.camp.config import NetworkConfig
 
@@ -28,19 +29,21 @@ _LAYERS: Final = {
     "paper": ((32, 8, 4, 0), (64, 4, 2, 0), (32, 3, 1, 0)),
     "small": ((32, 4, 4, 0), (32, 3, 2, 1), (32, 3, 1, 1)),
 }
-"""Channels, kernel, stride, padding. `paper` is the released code's; `small` is made for 64x64 or
-32x32 on a processor."""
+"""Channels, kernel, stride and padding of each convolution. `paper` is the released code's; `small`
+is made for 64x64 or 32x32 pixels on a CPU."""
 _ACTOR_GAIN: Final = 0.01
+EMBEDDED: Final = 12
+"""Length of an embedded intent (section 5.2)."""
 _RGB, _DEPTH = 3, 1
 
 
 class Encoder(nn.Module):
-    """What is seen, where the goal is, whether something is held and where the camera looks.
+    """Features of an observation: camera, point goal, hand and horizon.
 
     Parameters
     ----------
     config
-        Sizes.
+        Sizes of the networks.
     """
 
     def __init__(self, config: NetworkConfig) -> None:
@@ -59,92 +62,199 @@ class Encoder(nn.Module):
         """Return the number of features."""
         return config.hidden + config.goal_embedding + 1 + len(HORIZONS_DEG)
 
-    def forward(self, seen: Observations) -> Tensor:
-        """Return features (T, n, size) of observations: `rgb` (T, n, S, S, 3) uint8, `depth`
-        (T, n, S, S, 1) metres, `goal` (T, n, 2), `held` and `horizon` (T, n).
-        """  # noqa: D205 - one sentence
-        rgb, depth = seen["rgb"].flatten(0, 1), seen["depth"].flatten(0, 1)
-        # Channels stay last in memory, as environments have them: the first convolution learns in
-        # a third of the time so.
+    def forward(self, observations: Observations) -> Tensor:
+        """Return features (T, n, size) float32.
+
+        Observations are `rgb` (T, n, S, S, 3) uint8, `depth` (T, n, S, S, 1) metres, `goal`
+        (T, n, 2) metres and radians, `held` and `horizon` (T, n).
+        """
+        rgb, depth = observations["rgb"].flatten(0, 1), observations["depth"].flatten(0, 1)
+        # Channels stay last in memory, as environments have them: so the first convolution learns
+        # in a third of the time.
         pictures = [depth.new_empty(*depth.shape[:-1], channels) for channels in self._channels]
         torch.div(rgb, 255.0, out=pictures[0][..., :_RGB])
         limit = self._depth_limit_m
         torch.div(depth.clamp(max=limit), limit, out=pictures[-1][..., -_DEPTH:])
-        views = [picture.permute(0, 3, 1, 2) for picture in pictures]
+        views = [picture.permute(0, 3, 1, 2) for picture in pictures]  # (T n, channels, S, S)
         with torch.autocast("cuda", torch.bfloat16, enabled=self._bf16 and depth.is_cuda):
             views = [eye(view) for eye, view in zip(self.eyes, views, strict=True)]
             fused = views[0] if len(views) == 1 else self.fuse(torch.cat(views, 1)).relu()
-        features = fused.float()
-        far, bearing = seen["goal"][..., 0] / self._goal_scale_m, seen["goal"][..., 1]
-        goal = self.goal(torch.stack([far, bearing.cos(), bearing.sin()], -1))
-        held = seen["held"].unsqueeze(-1).to(goal.dtype)
-        horizon = functional.one_hot(seen["horizon"].long(), len(HORIZONS_DEG)).to(goal.dtype)
-        return torch.cat([features.view(*held.shape[:2], -1), goal, held, horizon], -1)
+        features = fused.float()  # (T n, hidden)
+        distance = observations["goal"][..., 0] / self._goal_scale_m
+        bearing = observations["goal"][..., 1]
+        goal = self.goal(torch.stack([distance, bearing.cos(), bearing.sin()], -1))
+        held = observations["held"].unsqueeze(-1).to(goal.dtype)
+        horizon = functional.one_hot(observations["horizon"].long(), len(HORIZONS_DEG))
+        features = features.view(*held.shape[:2], -1)
+        return torch.cat([features, goal, held, horizon.to(goal.dtype)], -1)
 
 
 class RecurrentActorCritic(nn.Module):
-    """A GRU, a linear actor and a linear critic.
+    """GRU with a linear actor and a linear critic.
 
     Parameters
     ----------
     inputs, hidden
-        Sizes.
-    chances
-        Of the choices at the start: the actor's biases.
+        Sizes of the GRU.
+    probabilities
+        Initial probabilities of the choices, set by the actor's biases.
     """
 
-    def __init__(self, inputs: int, hidden: int, chances: Sequence[float]) -> None:
+    def __init__(self, inputs: int, hidden: int, probabilities: Sequence[float]) -> None:
         super().__init__()
         self.gru = nn.GRU(inputs, hidden)
         for name, parameter in self.gru.named_parameters():
             if name.startswith("weight"):
-                for gate in parameter.data.chunk(3):  # reset, update and new, each for itself
+                for gate in parameter.data.chunk(3):  # each gate for itself: reset, update, new
                     nn.init.orthogonal_(gate)
             else:
                 nn.init.zeros_(parameter)
-        self.actor = _linear(hidden, len(chances), _ACTOR_GAIN)
-        self.actor.bias.data.copy_(torch.tensor(chances).log())
+        self.actor = _linear(hidden, len(probabilities), _ACTOR_GAIN)
+        self.actor.bias.data.copy_(torch.tensor(probabilities).log())
         self.critic = _linear(hidden, 1, 1.0)
 
     def value(self, out: Tensor) -> Tensor:
-        """Return what the critic expects, (T, n)."""
+        """Return the critic's values (T, n) for the GRU's outputs (T, n, hidden)."""
         value: Tensor = self.critic(out)
         return value.squeeze(-1)
 
 
+class IntentConditionedPolicy(RecurrentActorCritic):
+    """Policy that also takes an intent, embedded by the linear layer E (equation 5).
+
+    Parameters
+    ----------
+    inputs, hidden, probabilities
+        See `RecurrentActorCritic`; the intent is no part of `inputs`.
+    intents
+        Length of an intent.
+    """
+
+    def __init__(
+        self, inputs: int, hidden: int, probabilities: Sequence[float], intents: int
+    ) -> None:
+        super().__init__(inputs + EMBEDDED, hidden, probabilities)
+        self.embed = nn.Linear(intents, EMBEDDED)
+
+    def condition(self, features: Tensor, intent: Tensor) -> Tensor:
+        """Return the GRU's inputs (T, n, inputs + 12)."""
+        return torch.cat([features, self.embed(intent)], -1)
+
+
+class IntentPolicy(nn.Module):
+    """Intent policy pi' (equation 6): a copy of a policy's E, GRU and actor.
+
+    It takes the uniform intent, has a hidden state of its own, and is never optimised.
+
+    Parameters
+    ----------
+    policy
+        Policy to copy, now and at every `synchronise`.
+    recursive
+        Run twice in a step from the same hidden state, the second time on the first intent; the
+        hidden state after the first run goes on.
+    """
+
+    def __init__(self, policy: IntentConditionedPolicy, *, recursive: bool) -> None:
+        super().__init__()
+        self.embed = copy.deepcopy(policy.embed)
+        self.gru = copy.deepcopy(policy.gru)
+        self.actor = copy.deepcopy(policy.actor)
+        self._recursive = recursive
+        self.requires_grad_(requires_grad=False)
+
+    @torch.no_grad()
+    def synchronise(self, policy: IntentConditionedPolicy) -> None:
+        """Copy the parameters of the policy; hidden states stay."""
+        self.embed.load_state_dict(policy.embed.state_dict())
+        self.gru.load_state_dict(policy.gru.state_dict())
+        self.actor.load_state_dict(policy.actor.state_dict())
+
+    @torch.no_grad()
+    def forward(
+        self,
+        features: Tensor,
+        hidden: Tensor,
+        segments: EpisodeSegments,
+        mix: Callable[[Tensor], Tensor],
+        mask: Tensor,
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Return P(omega') and P(i), without gradient.
+
+        Parameters
+        ----------
+        features : (T, n, inputs)
+            Inputs of the copied policy, without the intent.
+        hidden : (n, hidden)
+            Hidden state before the first step.
+        segments
+            Episode starts.
+        mix
+            Function of P(omega') that gives P(i), equation 7.
+        mask : (choices,)
+            0, or minus infinity for a forbidden choice.
+
+        Returns
+        -------
+        intended : (T, n, choices)
+            P(omega'), equation 6.
+        intent : (T, n, intents)
+            P(i), equation 7.
+        hidden : (n, hidden)
+            Hidden state after the last step.
+        """
+        uniform = uniform_intent(features, self.embed.in_features)
+        out, after = segments.run(self.gru, torch.cat([features, self.embed(uniform)], -1), hidden)
+        intended = torch.softmax(self.actor(out) + mask, -1)
+        intent = mix(intended)
+        if self._recursive:
+            inputs = torch.cat([features, self.embed(intent)], -1)
+            out = segments.run_again(self.gru, inputs, hidden, out)
+            intended = torch.softmax(self.actor(out) + mask, -1)
+            intent = mix(intended)
+        return intended, intent, after
+
+
+def uniform_intent(features: Tensor, count: int) -> Tensor:
+    """Return the uniform intent (T, n, count) for features (T, n, …)."""
+    return features.new_full((*features.shape[:2], count), 1.0 / count)
+
+
 @dataclass(frozen=True)
 class EpisodeSegments:
-    """Where episodes begin in a run of steps, and how GRUs go over it."""
+    """Episodes within T steps of n environments, and how GRUs run over them."""
 
     starts: Tensor
     """(T, n) bool: an episode begins at this step."""
 
     @cached_property
     def bounds(self) -> list[int]:
-        """First steps of the chunks between starts, and T."""
+        """First steps of the segments between starts, and T."""
         begun: list[int] = self.starts.any(1).nonzero().flatten().tolist()
         return sorted({0, *begun, len(self.starts)})
 
-    def of(self, columns: Tensor) -> EpisodeSegments:
-        """Return the course of some of the environments."""
+    def select(self, columns: Tensor) -> EpisodeSegments:
+        """Return the segments of some environments, by number (m,)."""
         return EpisodeSegments(self.starts[:, columns])
 
     def run(self, gru: nn.GRU, inputs: Tensor, hidden: Tensor) -> tuple[Tensor, Tensor]:
-        """Run a GRU in one call a chunk; zero it only where an episode begins.
+        """Run a GRU, one call a segment; zero its hidden state only where an episode begins.
 
         Parameters
         ----------
         gru
-            One layer.
+            GRU of one layer.
         inputs : (T, n, inputs)
+            Inputs of every step.
         hidden : (n, hidden)
-            Before the first step.
+            Hidden state before the first step.
 
         Returns
         -------
         out : (T, n, hidden)
+            Outputs of every step.
         hidden : (n, hidden)
-            After the last step.
+            Hidden state after the last step.
         """
         h, outs = hidden.unsqueeze(0), []
         for begin, end in itertools.pairwise(self.bounds):
@@ -153,26 +263,29 @@ class EpisodeSegments:
             outs.append(out)
         return (outs[0] if len(outs) == 1 else torch.cat(outs)), h.squeeze(0)
 
-    def again(self, gru: nn.GRU, inputs: Tensor, hidden: Tensor, out: Tensor) -> Tensor:
-        """Run every step once more on other inputs, from the hidden state it had before.
+    def run_again(self, gru: nn.GRU, inputs: Tensor, hidden: Tensor, out: Tensor) -> Tensor:
+        """Run every step once more on other inputs, from the hidden state that it had before.
 
-        `hidden` and `out` are those of the first run; returns (T, n, hidden).
+        `hidden` (n, hidden) and `out` (T, n, hidden) are those of the first run; returns
+        (T, n, hidden).
         """
         before = torch.cat([hidden.unsqueeze(0), out[:-1]])
         before = before.masked_fill(self.starts.unsqueeze(-1), 0.0)
+        # All T n steps at once, as a batch of sequences of length 1.
         once, _ = gru(inputs.flatten(0, 1).unsqueeze(0), before.flatten(0, 1).unsqueeze(0))
         again: Tensor = once.view_as(out)
         return again
 
 
 def drawn(log_probs: Tensor, uniforms: Tensor | None) -> Tensor:
-    """Draw from distributions by inversion, so that one number decides whatever the batch.
+    """Draw from distributions by inversion: one number decides, whatever the batch.
 
     Parameters
     ----------
     log_probs : (n, choices)
+        Log-probabilities.
     uniforms : (n,)
-        In [0, 1); None for the most probable choice.
+        Random numbers in [0, 1); None for the most probable choice.
 
     Returns
     -------
@@ -185,8 +298,13 @@ def drawn(log_probs: Tensor, uniforms: Tensor | None) -> Tensor:
     return (sums <= uniforms.double().unsqueeze(-1) * sums[:, -1:]).sum(-1)
 
 
+def log_prob_of(log_probs: Tensor, choice: Tensor) -> Tensor:
+    """Return the log-probabilities (…) of choices (…) in distributions (…, choices)."""
+    return log_probs.gather(-1, choice.unsqueeze(-1)).squeeze(-1)
+
+
 def entropy_of(log_probs: Tensor) -> Tensor:
-    """Return the entropy of distributions (…, choices); impossible choices count nothing."""
+    """Return the entropy of distributions (…, choices); impossible choices add nothing."""
     return -(log_probs.exp() * log_probs.clamp(min=-1e9)).sum(-1)
 
 

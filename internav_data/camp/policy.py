@@ -34,7 +34,7 @@ _NAMES: Final = {
 }
 """Names of options and of actions, by their number."""
 _NOTED: Final = {
-    "plan": ("option", "option"),
+    "option_probs": ("option", "option"),
     "intent": ("intent", ""),
     "action_probs": ("action", "choice"),
 }
@@ -79,7 +79,7 @@ class AgentPolicy:
         self._state: dict[str, Any] = {}
         self._starts: NDArray[np.bool_] = np.zeros(0, np.bool_)
         self._draws: list[Generator | None] = []
-        self._record: Mapping[str, Any] = {}
+        self._record: Any = None
 
     def begin(self, count: int, seed: int) -> None:
         """See `Policy`."""
@@ -117,12 +117,12 @@ class AgentPolicy:
         """Return what led to a seat's last action: chances of options, intent, of actions."""
         told: list[Note] = []
         for name, (title, taken) in _NOTED.items():
-            noted = self._record.get(name)
+            noted = getattr(self._record, name, None)
             if noted is None:
                 continue
             shares = tuple(float(share) for share in noted[slot].reshape(-1).tolist())
             names = _NAMES.get(len(shares))
-            chosen = self._record.get(taken)
+            chosen = getattr(self._record, taken, None)
             if names is not None:
                 told.append((title, names, shares, -1 if chosen is None else int(chosen[slot])))
         return told
@@ -161,9 +161,7 @@ def candidate(
     about = replace(about, name=row_name(about))
     size = agent_config(agent, "network", "image_size", 64)
     if without_intent:
-        from internav_data.camp.agents import without_intent as cut  # noqa: PLC0415 - torch
-
-        agent = cut(agent)
+        agent = agent.without_intent()
     return EvaluatedPolicy(AgentPolicy(about.name, agent, size, greedy=greedy), about)
 
 

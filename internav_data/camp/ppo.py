@@ -1,10 +1,14 @@
-"""Proximal policy optimisation (Schulman et al. 2017) of recurrent agents."""
+"""Proximal policy optimisation (Schulman et al. 2017) of recurrent agents.
+
+Shapes: T steps, n environments, m of them in a minibatch. Minibatches are of whole environments, so
+that GRUs run over a rollout's steps in order.
+"""
 
 from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import torch
 from torch import Tensor
@@ -22,24 +26,26 @@ if TYPE_CHECKING:
     from internav_data.camp.rollout import Rollout
 
     Reduce = Callable[[Tensor], Tensor]
-    """Adds a tensor over all ranks."""
+    """All-reduce sum of a tensor across ranks."""
 
 _EPSILON = 1e-8
 
 
 def alone(tensor: Tensor) -> Tensor:
-    """Add over a single rank."""
+    """Return a tensor as it is: the sum across a single rank."""
     return tensor
 
 
-def set_rate(optimiser: Optimizer, rate: float, progress: float) -> None:
-    """Let a learning rate fall in a straight line; progress goes from 0 to 1."""
+def set_rate(optimiser: Optimizer, rate: float, progress: float) -> float:
+    """Decay a learning rate linearly, progress from 0 to 1; return the rate that was set."""
+    decayed = rate * max(0.0, 1.0 - progress)
     for group in optimiser.param_groups:
-        group["lr"] = rate * max(0.0, 1.0 - progress)
+        group["lr"] = decayed
+    return decayed
 
 
 def update(
-    agent: Agent,
+    agent: Agent[Any],
     optimiser: Optimizer,
     rollout: Rollout,
     config: PPOConfig,
@@ -48,35 +54,35 @@ def update(
     critic_only: bool = False,
     reduce: Reduce = alone,
 ) -> dict[str, float]:
-    """Learn from a rollout.
+    """Update an agent on a rollout.
 
     Parameters
     ----------
     agent, optimiser
-        Who learns; the optimiser holds `agent.optimised()`.
+        Agent to update and its optimiser (must hold `agent.optimised()`).
     rollout
-        What it did with its present parameters.
+        Rollout that the agent collected with its present parameters.
     config
-        How.
+        PPO hyperparameters.
     orders
-        For each epoch a permutation of the rollout's environments, cut into minibatches.
+        Permutation of the rollout's environments for each epoch, cut into minibatches.
     critic_only
         Train the critic alone: it is new.
     reduce
-        Adds a tensor over all ranks; each holds part of every minibatch.
+        All-reduce sum across ranks, each of which has part of every minibatch.
 
     Returns
     -------
     dict
         Means over the minibatches: `policy_loss`, `value_loss`, `entropy`, `kl`, `clip_fraction`,
-        `extra_loss`, `grad_norm` (before it is cut); then `ratio_error` (of the first
-        minibatch: how far a ratio is from 1), `explained_variance`, `updates` (steps taken) and
-        `stopped` (1 if the KL stopped them).
+        `extra_loss`, `grad_norm` (before it is clipped); then `ratio_error` (of the first
+        minibatch: the greatest distance of a ratio from 1), `explained_variance`, `updates` (steps
+        taken) and `stopped` (1 if the KL divergence stopped them).
 
     Raises
     ------
     NotFiniteError
-        A loss or gradient is no number: the environment is named, the step is not taken.
+        A loss or gradient is NaN or infinite: the environment is named, the step is not taken.
     """
     advantages = rollout.advantages(config)
     returns = advantages + rollout.values
@@ -85,26 +91,26 @@ def update(
         mean, variance = moments(advantages, reduce)
         advantages = (advantages - mean) / (variance.sqrt() + _EPSILON)
     parameters = agent.critics() if critic_only else agent.optimised()
-    told: list[dict[str, float]] = []
+    minibatch_rows: list[dict[str, float]] = []
     stopped = False
     for columns in minibatches(orders, config.num_minibatches, rollout.rewards.device):
         goals = advantages[:, columns], returns[:, columns]
-        losses, said = _losses(agent, rollout, columns, goals, config, reduce)
-        told.append(said)
-        # Stop before the step that would be taken on too distant a policy.
+        losses, row = _losses(agent, rollout, columns, goals, config, reduce)
+        minibatch_rows.append(row)
+        # Stop before the step that would leave the rollout's policy too far behind.
         limit = math.inf if critic_only or config.target_kl is None else config.target_kl
-        stopped = said["kl"] > limit
+        stopped = row["kl"] > limit
         if stopped:
             break
         loss = losses["value"] if critic_only else sum(losses.values(), losses["value"] * 0.0)
-        said["grad_norm"] = step(optimiser, loss, parameters, config.max_grad_norm, reduce)
-    means = {name: _mean([said[name] for said in told if name in said]) for name in told[0]}
+        row["grad_norm"] = step(optimiser, loss, parameters, config.max_grad_norm, reduce)
+    names = [*minibatch_rows[0], "grad_norm"]  # no gradient where not a single step was taken
+    means = {name: _mean([row[name] for row in minibatch_rows if name in row]) for name in names}
     return {
-        "grad_norm": 0.0,  # where not a single step was taken
         **means,
-        "ratio_error": told[0]["ratio_error"],
+        "ratio_error": minibatch_rows[0]["ratio_error"],
         "explained_variance": explained,
-        "updates": float(len(told) - stopped),
+        "updates": float(len(minibatch_rows) - stopped),
         "stopped": float(stopped),
     }
 
@@ -118,44 +124,44 @@ def minibatches(
 
 
 def moments(values: Tensor, reduce: Reduce = alone) -> tuple[Tensor, Tensor]:
-    """Return mean and variance over all ranks, in float32."""
+    """Return mean and variance of values (T, n) across ranks, float32."""
     count = reduce(values.new_tensor(float(values.numel())))
     mean = reduce(values.sum()) / count
     return mean, reduce((values - mean).square().sum()) / count
 
 
 def explained_variance(values: Tensor, returns: Tensor, reduce: Reduce = alone) -> float:
-    """Return how much of the returns' variance the critic explains: 1 is all, 0 is none."""
-    _, left = moments(returns - values, reduce)
-    _, whole = moments(returns, reduce)
-    return float(1.0 - left / (whole + _EPSILON))
+    """Return the share of the variance of returns (T, n) that values (T, n) explain; 1 is all."""
+    _, residual = moments(returns - values, reduce)
+    _, total = moments(returns, reduce)
+    return float(1.0 - residual / (total + _EPSILON))
 
 
 def step(
     optimiser: Optimizer,
     loss: Tensor,
     parameters: Sequence[Parameter],
-    longest: float,
+    max_grad_norm: float,
     reduce: Reduce = alone,
 ) -> float:
-    """Take one step of an optimiser; return how long the gradient was before it was cut.
+    """Take one step of an optimiser; return the gradient's norm before it was clipped.
 
     Raises
     ------
     NotFiniteError
-        It is no number; the step is not taken.
+        The gradient is NaN or infinite; the step is not taken.
     """
     gradients = torch.autograd.grad(loss, parameters, allow_unused=True)
     optimiser.zero_grad()
     for parameter, gradient in zip(parameters, gradients, strict=True):
-        # Contiguous as parameters are, whatever kernels return: sums over it have one order so.
+        # Contiguous, as parameters are, whatever kernels return: so sums over it have one order.
         parameter.grad = torch.zeros_like(parameter) if gradient is None else gradient.contiguous()
     if reduce is not alone:
         flat = reduce(torch.cat([p.grad.flatten() for p in parameters if p.grad is not None]))
         ends = itertools.accumulate(p.numel() for p in parameters)
         for parameter, end in zip(parameters, ends, strict=True):
             parameter.grad = flat[end - parameter.numel() : end].view_as(parameter)
-    norm = float(torch.nn.utils.clip_grad_norm_(parameters, longest))
+    norm = float(torch.nn.utils.clip_grad_norm_(parameters, max_grad_norm))
     if not math.isfinite(norm):
         optimiser.zero_grad()
         raise NotFiniteError(
@@ -167,16 +173,19 @@ def step(
 
 
 def _losses(
-    agent: Agent,
+    agent: Agent[Any],
     rollout: Rollout,
     columns: Tensor,
     goals: tuple[Tensor, Tensor],
     config: PPOConfig,
     reduce: Reduce,
 ) -> tuple[dict[str, Tensor], dict[str, float]]:
-    """Return the parts of a minibatch's loss, weighted, and what is said of it."""
+    """Return a minibatch's weighted losses, and the row of it that is logged.
+
+    `columns` (m,) are its environments, `goals` their advantages and returns, (T, m) each.
+    """
     advantages, returns = goals
-    now = agent.evaluate(rollout.batch.of(columns))
+    now = agent.evaluate(rollout.batch.select(columns))
     check_finite(columns, now.log_prob, now.value)
     log_ratio = now.log_prob - rollout.log_probs[:, columns]
     ratio = log_ratio.exp()
@@ -189,37 +198,37 @@ def _losses(
         errors = torch.maximum(errors, (near - returns).square())
     extra = torch.zeros_like(gain) if now.loss is None else now.loss
     count = reduce(gain.new_tensor(float(gain.numel())))
-    sums = {
+    losses = {
         "policy": -gain.sum() / count,
         "value": config.vf_coef * 0.5 * errors.sum() / count,
         "entropy": -config.ent_coef * now.entropy.sum() / count,
         "extra": extra.sum() / count,
     }
     with torch.no_grad():
-        said = {
-            "policy_loss": sums["policy"],
+        sums = {
+            "policy_loss": losses["policy"],
             "value_loss": 0.5 * errors.sum() / count,
             "entropy": now.entropy.sum() / count,
-            "extra_loss": sums["extra"],
+            "extra_loss": losses["extra"],
             # An estimate that is never negative: http://joschu.net/blog/kl-approx.html
             "kl": (ratio - 1.0 - log_ratio).sum() / count,
             "clip_fraction": (ratio != clipped).float().sum() / count,
         }
-        whole = reduce(torch.stack(list(said.values()))).tolist()
-    far = float((ratio.detach() - 1.0).abs().max())
-    return sums, {**dict(zip(said, whole, strict=True)), "ratio_error": far}
+        row = reduce(torch.stack(list(sums.values()))).tolist()
+    error = float((ratio.detach() - 1.0).abs().max())
+    return losses, {**dict(zip(sums, row, strict=True)), "ratio_error": error}
 
 
-def check_finite(columns: Tensor, *numbers: Tensor) -> None:
-    """Refuse what networks say, (T, m), of environments with these numbers, (m,).
+def check_finite(columns: Tensor, *outputs: Tensor) -> None:
+    """Check outputs of networks (T, m) for environments with numbers `columns` (m,).
 
     Raises
     ------
     NotFiniteError
-        Some of it is no number: the first environment is named.
+        An output is NaN or infinite: the first environment is named.
     """
-    for number in numbers:
-        fine = number.detach().isfinite().all(0)
+    for output in outputs:
+        fine = output.detach().isfinite().all(0)
         if not bool(fine.all()):
             k = int(columns[~fine][0])
             raise NotFiniteError(

@@ -1,21 +1,28 @@
-"""What was seen, done and paid: T steps of n environments.
-
-Generalised advantages (Schulman et al. 2016), all environments at once.
-"""
+"""Rollouts: T steps of n environments as an agent took them, and their advantages."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
+from internav_data.camp.agents import Batch
+from internav_data.envs.loop import EnvironmentLoop
+from internav_data.records import Purpose, TrainingStream, generator
+from internav_data.records.errors import NotFiniteError
 
-    from internav_data.camp.agents import Batch
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from internav_data.camp.agents import Agent, AgentStep
     from internav_data.camp.config import PPOConfig
+    from internav_data.core.typing import Bools
+    from internav_data.envs.loop import Environments, LoopStep
+    from internav_data.envs.slot import EpisodeSnapshot
+    from internav_data.envs.types import Actions, Observations
 
 
 def advantages_of(
@@ -29,84 +36,62 @@ def advantages_of(
     gamma: float,
     lam: float,
 ) -> Tensor:
-    """Return advantages, (T, n) float32; added to values they are the returns.
+    """Return generalised advantages (Schulman et al. 2016), (T, n) float32.
+
+    Added to `values` they are the returns.
 
     Parameters
     ----------
     rewards, values : (T, n)
-        values[t] is what was expected before action t.
+        Reward of action t, and the critic's value before it.
     last_value : (n,)
-        Expected after the last row; counts nothing where an episode ended there.
+        Value after the last step; not used where an episode ended there.
     terminated, truncated : (T, n) bool
-        The episode ended, or was cut off, by action t. Where both are set it ended.
+        The episode ended, or was cut off, by action t. Where both are true it ended.
     final_values : (T, n)
-        Expected of what was seen after a cut, before the reset.
+        Value of the observation after a cut, before the reset.
     gamma, lam
         Discount and decay.
     """
     over = truncated | terminated
     following = torch.cat([values[1:], last_value.unsqueeze(0)])
     following = torch.where(truncated, final_values, following).masked_fill(terminated, 0.0)
-    surprises = rewards + gamma * following - values
+    td_errors = rewards + gamma * following - values
     carries = (gamma * lam) * (~over).to(values.dtype)
     advantages, ahead = torch.empty_like(values), torch.zeros_like(last_value)
     for t in range(len(values) - 1, -1, -1):
-        ahead = surprises[t] + carries[t] * ahead
+        ahead = td_errors[t] + carries[t] * ahead
         advantages[t] = ahead
     return advantages
 
 
-class Columns:
-    """Rows of tensors by name, in memory that is taken once.
-
-    Parameters
-    ----------
-    rows
-        How many there will be.
-    device
-        Where.
-    """
-
-    def __init__(self, rows: int, device: torch.device) -> None:
-        self._rows, self._device = rows, device
-        self.columns: dict[str, Tensor] = {}
-
-    def write(self, row: int, values: Mapping[str, Tensor]) -> dict[str, Tensor]:
-        """Write (n, …) by name; return the row as it lies here."""
-        for name, value in values.items():
-            if name not in self.columns:
-                shape = (self._rows, *value.shape)
-                self.columns[name] = torch.zeros(shape, dtype=value.dtype, device=self._device)
-            self.columns[name][row].copy_(value)
-        return {name: self.columns[name][row] for name in values}
-
-
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """An episode that ended during a rollout."""
+    """Episode that ended during a rollout."""
 
     environment: int
     step: int
     """Row of the rollout."""
     metrics: dict[str, Any]
-    """What the environment said of it."""
+    """Metrics of the episode, from the environment."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rollout:
-    """Steps as they were taken, and all that PPO asks of them. Tensors are (T, n)."""
+    """Steps, rewards and values that PPO learns from. Tensors are (T, n)."""
 
-    batch: Batch
+    batch: Batch[Any]
     rewards: Tensor
     terminated: Tensor
     truncated: Tensor
     values: Tensor
-    """Before each step."""
+    """Values before each step."""
     log_probs: Tensor
+    """Log-probabilities of everything that was drawn."""
     final_values: Tensor
-    """Of what was seen after a cut, before the reset; 0 elsewhere."""
+    """Values of the observations after a cut, before the reset; 0 elsewhere."""
     last_value: Tensor
-    """(n,): after the last step."""
+    """(n,): values after the last step."""
     finished: list[Finished] = field(default_factory=list)
     """Episodes that ended, in the order of their ends."""
 
@@ -116,3 +101,163 @@ class Rollout:
             self.rewards, self.values, self.last_value, self.terminated, self.truncated,
             self.final_values, gamma=config.gamma, lam=config.gae_lambda,
         )  # fmt: skip
+
+
+def uniforms_of(seed: int, rollout: int, environments: Sequence[int], steps: int) -> Tensor:
+    """Return the random numbers of a rollout, (T, n, 2) float32 in [0, 1).
+
+    Each environment has its own, so that several ranks draw what one would.
+    """
+    columns = [
+        generator(seed, Purpose.TRAINING, k, TrainingStream.ACTIONS, draw=rollout).random(
+            (steps, 2), np.float32
+        )
+        for k in environments
+    ]
+    return torch.from_numpy(np.stack(columns, 1))
+
+
+def orders_of(seed: int, rollout: int, epochs: int, count: int) -> list[list[int]]:
+    """Return a permutation of the environments for each epoch of an update."""
+    rng = generator(seed, Purpose.TRAINING, attempt=TrainingStream.MINIBATCHES, draw=rollout)
+    return [rng.permutation(count).tolist() for _ in range(epochs)]
+
+
+class Collector:
+    """An agent in its environments, rollout after rollout.
+
+    Parameters
+    ----------
+    env
+        Environments; reset `loop`, or `restore`, first.
+    agent
+        Agent that acts.
+    seed
+        Seed of environment 0, for messages.
+
+    Attributes
+    ----------
+    loop
+        Environments with the observations that come next.
+    state
+        Memory of the agent, (n, …).
+    """
+
+    def __init__(self, env: Environments, agent: Agent[Any], seed: int = 0) -> None:
+        self.loop, self.agent, self._seed = EnvironmentLoop(env), agent, seed
+        self.state = agent.initial_state(env.num_envs)
+
+    def restore(self, states: Sequence[EpisodeSnapshot], starts: Bools) -> None:
+        """Go on from snapshots of the environments and the `starts` that belong to them."""
+        self.loop.restore(states, starts)
+
+    @torch.no_grad()
+    def collect(self, uniforms: Tensor) -> Rollout:
+        """Take T steps everywhere.
+
+        Parameters
+        ----------
+        uniforms : (T, n, 2)
+            Random numbers of `uniforms_of`.
+
+        Raises
+        ------
+        NotFiniteError
+            An observation or a reward is NaN or infinite.
+        """
+        agent, device, before = self.agent, self.agent.device, self.state
+        seen = ObservationRows(len(uniforms), device)
+        taken: list[AgentStep[Any]] = []
+        starts: list[Tensor] = []
+        ends: list[tuple[Tensor, ...]] = []
+        finished: list[Finished] = []
+
+        def act(observations: Observations, begun: Bools) -> Actions:
+            self._check(observations)
+            row = seen.append(observations)
+            starts.append(torch.from_numpy(begun).to(device))
+            draws = uniforms[len(taken)].to(device)
+            taken.append(agent.act(row, self.state, starts[-1], draws))
+            self.state = taken[-1].state
+            actions: Actions = taken[-1].action.cpu().numpy()
+            return actions
+
+        for t, step in enumerate(self.loop.run(act, len(uniforms))):
+            self._check({"reward": step.rewards})
+            cut, final = torch.from_numpy(step.truncated), torch.zeros_like(taken[-1].value)
+            if (step.truncated & ~step.terminated).any():
+                self._check(step.observations)
+                final = self._values() * cut.to(device)
+            rewards = torch.from_numpy(step.rewards.astype(np.float32))
+            ends.append((rewards, torch.from_numpy(step.terminated), cut, final))
+            finished += _finished(t, step)
+        rewards, terminated, truncated, final_values = (
+            torch.stack(column).to(device) for column in zip(*ends, strict=True)
+        )
+        record = type(taken[0].record).stack([step.record for step in taken])
+        return Rollout(
+            Batch(seen.rows, torch.stack(starts), before, record),
+            rewards, terminated, truncated,
+            values=torch.stack([step.value for step in taken]),
+            log_probs=torch.stack([step.log_prob for step in taken]),
+            final_values=final_values, last_value=self._values(), finished=finished,
+        )  # fmt: skip
+
+    def _values(self) -> Tensor:
+        """Return the values (n,) of the present observations, after the last step."""
+        device, observations = self.agent.device, self.loop.observations
+        seen = {name: torch.from_numpy(array).to(device) for name, array in observations.items()}
+        return self.agent.value(seen, self.state)
+
+    def _check(self, arrays: Observations) -> None:
+        for name, array in arrays.items():
+            if array.dtype.kind != "f":
+                continue
+            sums = array.reshape(len(array), -1).sum(1)  # NaN and infinity outlive a sum
+            if not np.isfinite(sums).all():
+                k = int(np.flatnonzero(~np.isfinite(sums))[0])
+                raise NotFiniteError(
+                    f"environment {k} (seed {self._seed + k}): {name} is not finite"
+                )
+
+
+class ObservationRows:
+    """Observations of T steps, (T, n, …) by sensor: environments overwrite theirs.
+
+    Parameters
+    ----------
+    steps
+        Number of steps T.
+    device
+        Device of the tensors.
+    """
+
+    def __init__(self, steps: int, device: torch.device) -> None:
+        self._steps, self._device, self._next = steps, device, 0
+        self.rows: dict[str, Tensor] = {}
+
+    def append(self, observations: Observations) -> dict[str, Tensor]:
+        """Copy the observations of a step; return the copy, (n, …) by sensor."""
+        for name, array in observations.items():
+            values = torch.from_numpy(array)
+            if name not in self.rows:
+                self.rows[name] = values.new_empty(
+                    (self._steps, *values.shape), device=self._device
+                )
+            self.rows[name][self._next].copy_(values)
+        self._next += 1
+        return {name: self.rows[name][self._next - 1] for name in observations}
+
+
+def _finished(t: int, step: LoopStep) -> list[Finished]:
+    """Return the episodes that ended by a step, with those metrics that the environment gave."""
+    metrics = step.infos.get("metrics", {})
+    names = [name for name in metrics if not name.startswith("_")]
+    everywhere = np.ones(len(step.over), np.bool_)
+    return [
+        Finished(
+            k, t,
+            {n: metrics[n][k].item() for n in names if metrics.get(f"_{n}", everywhere)[k]},
+        )
+        for k in np.flatnonzero(step.over).tolist()
+    ]  # fmt: skip

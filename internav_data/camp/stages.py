@@ -1,4 +1,4 @@
-"""Which tasks are trained in which order, for how many steps (section 5.2)."""
+"""Schedule of a run: its stages, their tasks and their numbers of updates (section 5.2)."""
 
 from __future__ import annotations
 
@@ -13,37 +13,53 @@ if TYPE_CHECKING:
 
     from internav_data.camp.config import CampConfig
 
+CLONING: Final = "cloning"
+"""Name of the stage that comes first with `--pretrain bc`."""
 PARTS: Final = ("auxiliary", "single", "all")
-"""What `--stages` can name, in order."""
+"""Parts that `--stages` can name, in order."""
 TASKS: Final = ("navigate", "push", "pick")
 """Auxiliary tasks, named after the policies that they train; see `internav_data.envs.tasks`."""
-_NUMBERS: Final = ("cloning", *PARTS, *(f"auxiliary-{name}" for name in TASKS))
+_NUMBERS: Final = (CLONING, *PARTS, *(f"auxiliary-{name}" for name in TASKS))
 
 
 @dataclass(frozen=True, slots=True)
 class TrainingStage:
-    """A run of updates with an optimiser of its own."""
+    """Updates in a row with one optimiser, on the same tasks."""
 
     name: str
-    part: str
-    """Of `PARTS`."""
     tasks: tuple[str, ...]
     """Task of each environment; empty for the main task."""
     single_room: bool
-    """Only scenes of a single room."""
+    """Whether only scenes of a single room are used."""
     rate: float
-    """Of Adam at the beginning."""
+    """Initial learning rate of Adam."""
     updates: int
+    """Number of updates."""
     critic: str
-    """Whose values are learnt: critics are new once each."""
-    decay_from: float
-    """How much of the decay is over when it begins; 1 is all."""
-    decay_to: float
-    """… and when it ends."""
+    """Name of the critic that learns: each is new once."""
+    decay_from: float = 0.0
+    """Share of the learning rate's decay that is over when the stage begins; 1 is all of it."""
+    decay_to: float = 1.0
+    """Share that is over when the stage ends."""
+
+    @property
+    def clones(self) -> bool:
+        """Whether experts are cloned in this stage."""
+        return self.name == CLONING
 
 
-def plan(config: CampConfig, parts: Sequence[str], *, hierarchical: bool) -> list[TrainingStage]:
-    """Return the stages of a run.
+def cloning_stage(config: CampConfig) -> TrainingStage:
+    """Return the stage that clones the dataset's experts."""
+    cloning = config.cloning
+    an_epoch = max(1, round(cloning.frames / (cloning.num_envs * cloning.num_steps)))
+    rate, updates = cloning.learning_rate, an_epoch * cloning.epochs
+    return TrainingStage(CLONING, (), single_room=False, rate=rate, updates=updates, critic="main")
+
+
+def schedule(
+    config: CampConfig, parts: Sequence[str], *, hierarchical: bool
+) -> list[TrainingStage]:
+    """Return the PPO stages of a run.
 
     Every method gets the same environment steps: flat ones spend those of the auxiliary tasks on
     the main task in single rooms.
@@ -51,50 +67,69 @@ def plan(config: CampConfig, parts: Sequence[str], *, hierarchical: bool) -> lis
     Parameters
     ----------
     config
-        Of the run.
+        Training config.
     parts
-        Some of `PARTS`.
+        Some of `PARTS`, one after the other.
     hierarchical
         Whether there are action policies to be trained in auxiliary tasks.
 
     Raises
     ------
     UsageError
-        An unknown part, or more tasks side by side than environments.
+        An unknown part, more tasks side by side than environments, or nothing left to do.
     """
     check_parts(parts)
-    given, count = config.stages, config.ppo.num_envs
-    names = list(TASKS) if hierarchical and not given.side_by_side else []
-    if hierarchical and given.side_by_side and given.auxiliary_share and count < len(TASKS):
+    stages_config, count = config.stages, config.ppo.num_envs
+    auxiliary = stages_config.auxiliary_share
+    side_by_side = stages_config.side_by_side
+    if hierarchical and side_by_side and auxiliary and count < len(TASKS):
         raise UsageError(
             f"ppo.num_envs is {count}: three auxiliary tasks side by side need 3 at least; "
             "or set stages.side_by_side=false"
         )
-    shares = [
-        *((("auxiliary", task), given.auxiliary_share / len(names)) for task in names),
-        *([] if names else [(("auxiliary", ""), given.auxiliary_share)]),
-        (("single", ""), given.single_room_share),
-        (("all", ""), 1.0 - given.auxiliary_share - given.single_room_share),
-    ]
-    whole = max(1, round(given.total_timesteps / (count * config.ppo.num_steps)))
+    # Tasks of each environment, and share of the steps, by stage.
+    shares: dict[str, tuple[tuple[str, ...], float]] = {}
+    if hierarchical and not side_by_side:
+        for task in TASKS:
+            shares[f"auxiliary-{task}"] = ((task,) * count, auxiliary / len(TASKS))
+    else:
+        tasks = tuple(TASKS[k * len(TASKS) // count] for k in range(count)) if hierarchical else ()
+        shares["auxiliary"] = (tasks, auxiliary)
+    single = stages_config.single_room_share
+    shares |= {"single": ((), single), "all": ((), 1.0 - auxiliary - single)}
+    updates = max(1, round(stages_config.total_timesteps / (count * config.ppo.num_steps)))
     stages, share_before = [], 0.0
-    for (part, task), share in shares:
-        first, last = round(whole * share_before), round(whole * (share_before + share))
+    for name, (tasks, share) in shares.items():
+        first, last = round(updates * share_before), round(updates * (share_before + share))
         share_before += share
-        if part not in parts or last == first:
+        if name.split("-")[0] not in parts or last == first:
             continue
-        over = (first / whole, last / whole) if given.decay_over == "all" else (0.0, 1.0)
-        stages.append(_stage(config, part, task, last - first, over, hierarchical=hierarchical))
+        decay = (first / updates, last / updates)
+        joint = hierarchical and not tasks
+        stages.append(
+            TrainingStage(
+                name, tasks, name != "all",
+                stages_config.joint_learning_rate if joint else stages_config.learning_rate,
+                last - first, name if tasks else "main",
+                *(decay if stages_config.decay_over == "all" else (0.0, 1.0)),
+            )
+        )  # fmt: skip
     if not stages:
         raise UsageError(
-            f"stages.total_timesteps is {given.total_timesteps}: less than one update of "
+            f"stages.total_timesteps is {stages_config.total_timesteps}: less than one update of "
             f"{count * config.ppo.num_steps} steps is left for {', '.join(parts)}"
         )
     return stages
 
 
 def check_parts(parts: Sequence[str]) -> None:
-    """Refuse what is no run of stages."""
+    """Check that parts follow each other.
+
+    Raises
+    ------
+    UsageError
+        A part is unknown, or one between them is missing.
+    """
     first = PARTS.index(parts[0]) if parts and parts[0] in PARTS else -1
     if first < 0 or tuple(parts) != PARTS[first : first + len(parts)]:
         raise UsageError(
@@ -109,25 +144,3 @@ def order_seed(seed: int, stage: str) -> int:
         seed, Purpose.TRAINING, attempt=TrainingStream.EPISODES, draw=_NUMBERS.index(stage)
     )
     return int(rng.integers(2**31))
-
-
-def _stage(
-    config: CampConfig,
-    part: str,
-    task: str,
-    updates: int,
-    over: tuple[float, float],
-    *,
-    hierarchical: bool,
-) -> TrainingStage:
-    auxiliary = part == "auxiliary" and hierarchical
-    count, given = config.ppo.num_envs, config.stages
-    tasks: tuple[str, ...] = ()
-    if auxiliary:
-        side_by_side = tuple(TASKS[k * len(TASKS) // count] for k in range(count))
-        tasks = (task,) * count if task else side_by_side
-    name = f"{part}-{task}" if task else part
-    rate = given.joint_learning_rate if hierarchical and not auxiliary else given.learning_rate
-    return TrainingStage(
-        name, part, tasks, part != "all", rate, updates, name if auxiliary else "main", *over
-    )

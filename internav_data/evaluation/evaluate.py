@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol
 import numpy as np
 
 from internav_data.core.config import MAX_SEED, Bounds, check_bounds
+from internav_data.envs.loop import EnvironmentLoop
 from internav_data.evaluation.metrics import EpisodeResult, result_of
 from internav_data.records import EvaluationStream, Purpose, generator
 from internav_data.records.errors import UsageError
@@ -24,8 +25,9 @@ if TYPE_CHECKING:
     from numpy.random import Generator
     from numpy.typing import NDArray
 
+    from internav_data.core.typing import Bools
     from internav_data.dataset import Dataset
-    from internav_data.envs.types import Observations
+    from internav_data.envs.types import Actions, Observations
     from internav_data.records import Episode
 
     Tell = Callable[[int, int], None]
@@ -165,27 +167,28 @@ class _Round:
         self._found: dict[int, EpisodeResult] = {}
 
     def played(self, tell: Tell | None) -> list[EpisodeResult]:
-        env, count = self._env, self._env.num_envs
-        for slot in range(count):
+        loop = EnvironmentLoop(self._env)
+        for slot in range(self._env.num_envs):
             self._fill_slot(slot)
-        seen, _ = env.reset(seed=self._seed, options={"episode_id": self._ids})
-        while any(episode is not None for episode in self._episodes):
-            actions = np.array(self._player.act(seen), dtype=np.int64)
-            idle = [episode is None for episode in self._episodes]
-            actions[idle] = Action.WAIT
-            for slot, action in enumerate(actions.tolist()):
-                self._actions[slot].append(action)
-            seen, _, terminated, truncated, infos = env.step(actions)
-            over = terminated | truncated
-            if not over.any():
-                continue
-            for slot in np.flatnonzero(over).tolist():
-                self._ended(slot, infos)
+        loop.reset(seed=self._seed, options={"episode_id": self._ids})
+        for step in loop.run(self._act):
+            for slot in np.flatnonzero(step.over).tolist():
+                self._ended(slot, step.infos)
                 self._fill_slot(slot)
-            seen, _ = env.reset(options={"reset_mask": over, "episode_id": self._ids})
-            if tell is not None:
+            step.reset_options["episode_id"] = self._ids
+            if tell is not None and step.over.any():
                 tell(len(self._found), len(self._numbers))
+            if all(episode is None for episode in self._episodes):
+                break
         return [self._found[number] for number in self._numbers]
+
+    def _act(self, observations: Observations, starts: Bools) -> Actions:  # noqa: ARG002
+        actions = np.array(self._player.act(observations), dtype=np.int64)
+        idle = [episode is None for episode in self._episodes]
+        actions[idle] = Action.WAIT
+        for slot, action in enumerate(actions.tolist()):
+            self._actions[slot].append(action)
+        return actions
 
     def _fill_slot(self, slot: int) -> None:
         """Give a seat the next episode; where there is none its last one stays, and is waited."""

@@ -1,22 +1,28 @@
 """Agents by name: `random`, `ppo`, `ppo-intent`, `nie`, `hrl`, `camp`, and a user's own.
 
-One's own joins by an entry point of the group `internav.agents`: a callable that makes an `Agent`
-of a `CampConfig`.
+An entry point of the group `internav.agents`, a function of a `CampConfig` that returns an `Agent`,
+adds another.
 """
 
 from __future__ import annotations
 
 from functools import partial
 from importlib.metadata import entry_points
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import torch
 
-from internav_data.camp.agents.auxiliary import Auxiliary
 from internav_data.camp.agents.flat import PPOAgent, PPOIntentAgent, RandomAgent
-from internav_data.camp.agents.hierarchy import Hierarchy
+from internav_data.camp.agents.hierarchy import AuxiliaryAgent, Hierarchy
 from internav_data.camp.agents.nie import NIEAgent
-from internav_data.camp.agents.protocol import Agent, AgentStep, Batch, Evaluated, State
+from internav_data.camp.agents.protocol import (
+    Agent,
+    AgentStep,
+    Batch,
+    Evaluated,
+    State,
+    StepRecord,
+)
 from internav_data.records import Purpose, TrainingStream, generator
 from internav_data.records.errors import UsageError
 
@@ -29,34 +35,35 @@ __all__ = [
     "AGENTS",
     "Agent",
     "AgentStep",
-    "Auxiliary",
+    "AuxiliaryAgent",
     "Batch",
     "Evaluated",
     "Hierarchy",
     "State",
+    "StepRecord",
     "agent_names",
     "make_agent",
-    "without_intent",
 ]
 
-AGENTS: Final[dict[str, Callable[[CampConfig], Agent]]] = {
+AGENTS: Final[dict[str, Callable[[CampConfig], Agent[Any]]]] = {
     "random": RandomAgent,
     "ppo": PPOAgent,
     "ppo-intent": PPOIntentAgent,
     "nie": NIEAgent,
-    "hrl": partial(Hierarchy, keeps=False),
+    "hrl": partial(Hierarchy, temporally_extended=False),
     "camp": Hierarchy,
 }
-"""What makes the agent of each method."""
+"""Makers of agents by method."""
 GROUP: Final = "internav.agents"
+"""Entry points that add methods."""
 
 
 def agent_names() -> list[str]:
-    """Return the names of all methods, a user's own last."""
+    """Return the names of all methods; those of entry points come last."""
     return [*AGENTS, *sorted(point.name for point in entry_points(group=GROUP))]
 
 
-def make_agent(name: str, config: CampConfig) -> Agent:
+def make_agent(name: str, config: CampConfig) -> Agent[Any]:
     """Make an agent; its parameters are a pure function of its name and config.
 
     Raises
@@ -75,18 +82,5 @@ def make_agent(name: str, config: CampConfig) -> Agent:
     )
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(int(seed))
-        agent: Agent = make(config)
+        agent: Agent[Any] = make(config)
     return agent
-
-
-def without_intent(agent: Agent) -> Agent:
-    """Return the same networks fed the plane vector: Table 4's test without intent.
-
-    Raises
-    ------
-    UsageError
-        The agent has no intent.
-    """
-    if not isinstance(agent, PPOIntentAgent | Hierarchy) or not agent.told:
-        raise UsageError("this agent has no intent to be evaluated without")
-    return agent.without_intent()

@@ -1,30 +1,39 @@
-"""One policy over the twelve actions: `ppo`, `ppo-intent` (figure 2c), and chance."""
+"""Flat agents, one policy over the twelve actions: `ppo`, `ppo-intent` (figure 2c), `random`."""
 
 from __future__ import annotations
 
-import copy
 import math
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 import torch
 from torch import Tensor
 
-from internav_data.camp.agents.intent import IntentConditionedPolicy, IntentPolicy, uniform_intent
-from internav_data.camp.agents.options import DONE
+from internav_data.camp.agents.options import DONE, divergence
 from internav_data.camp.agents.protocol import (
     Agent,
     AgentStep,
     Batch,
     Evaluated,
+    StepRecord,
     one_step,
     reset_where_done,
 )
-from internav_data.camp.networks import Encoder, RecurrentActorCritic, drawn, entropy_of
+from internav_data.camp.networks import (
+    Encoder,
+    IntentConditionedPolicy,
+    IntentPolicy,
+    RecurrentActorCritic,
+    drawn,
+    entropy_of,
+    log_prob_of,
+    uniform_intent,
+)
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import ACTION_COUNT
 
 if TYPE_CHECKING:
-    from typing import Self
+    from collections.abc import Sequence
 
     from torch.nn import Parameter
 
@@ -33,33 +42,68 @@ if TYPE_CHECKING:
     from internav_data.camp.networks import EpisodeSegments
 
 
-def start_chances(end_chance: float) -> list[float]:
-    """Return the chances of the twelve actions at the start: Done, last, ends the episode."""
-    rest = (1.0 - end_chance) / (ACTION_COUNT - 1)
-    return [rest] * (ACTION_COUNT - 1) + [end_chance]
+@dataclass(frozen=True, slots=True)
+class FlatRecord(StepRecord):
+    """Action of a flat policy, and inputs that it worked out besides the observation."""
+
+    action_probs: Tensor | None = None
+    """P(a), (…, 12)."""
+    done_probability: Tensor | None = None
+    """Probability that the step ends the episode."""
+    intent: Tensor | None = None
+    """P(i), (…, 12), of `ppo-intent`."""
+    objects: Tensor | None = None
+    """Ids of the nearest objects in sight, (…, K), of `nie`; -1 for none."""
+    corners: Tensor | None = None
+    """Corners of the boxes round them, (…, K, 8, 3), metres from the eye, of `nie`."""
+
+    def statistics(self) -> dict[str, float]:
+        """Return the statistics of a rollout's decisions that are logged; see docs/training.md."""
+        found = {}
+        if self.done_probability is not None:
+            found["done_probability"] = float(self.done_probability.mean())
+        if self.action_probs is not None and self.intent is not None:
+            found["intent_kl"] = divergence(self.action_probs, self.intent)
+        return found
 
 
-class PPOAgent(Agent):
-    """Encoder, GRU, actor, critic.
+class FlatOutput(NamedTuple):
+    """Outputs of the networks over T steps."""
+
+    log_probs: Tensor
+    """(T, n, 12): log P(a)."""
+    value: Tensor
+    """(T, n): the critic's values."""
+    state: State
+    """(n, …): memory after the last step."""
+    intent: Tensor | None = None
+    """(T, n, 12): P(i), where there is an intent."""
+    objects: Tensor | None = None
+    corners: Tensor | None = None
+    """(T, n, K) and (T, n, K, 8, 3): objects in sight, of `nie`."""
+
+
+class PPOAgent(Agent[FlatRecord]):
+    """Encoder, GRU, actor and critic.
 
     Parameters
     ----------
     config
-        Of the run.
+        Training config.
     extra
-        Further inputs of the GRU.
+        Number of further inputs of the GRU.
     """
 
     def __init__(self, config: CampConfig, extra: int = 0) -> None:
         super().__init__()
         self.hidden = config.network.hidden
         self.encoder = Encoder(config.network)
-        self.policy = self._policy(
-            self.encoder.size + extra, start_chances(config.agent.initial_done_probability)
-        )
+        done = config.agent.initial_done_probability
+        others = [(1.0 - done) / (ACTION_COUNT - 1)] * (ACTION_COUNT - 1)
+        self.policy = self._policy(self.encoder.size + extra, [*others, done])
 
-    def _policy(self, inputs: int, chances: list[float]) -> RecurrentActorCritic:
-        return RecurrentActorCritic(inputs, self.hidden, chances)
+    def _policy(self, inputs: int, probabilities: list[float]) -> RecurrentActorCritic:
+        return RecurrentActorCritic(inputs, self.hidden, probabilities)
 
     def initial_state(self, count: int) -> State:
         """See `Agent`."""
@@ -67,36 +111,34 @@ class PPOAgent(Agent):
         return {"hidden": weight.new_zeros(count, self.hidden)}
 
     def act(
-        self, seen: dict[str, Tensor], state: State, starts: Tensor, uniforms: Tensor | None
-    ) -> AgentStep:
+        self,
+        observations: dict[str, Tensor],
+        state: State,
+        starts: Tensor,
+        uniforms: Tensor | None,
+    ) -> AgentStep[FlatRecord]:
         """See `Agent`."""
-        state = reset_where_done(state, starts)
-        out, state, record = self.run(*one_step(seen), state, {})
-        log_probs = torch.log_softmax(self.policy.actor(out[0]), -1)
+        ran = self.run(*one_step(observations), reset_where_done(state, starts))
+        log_probs = ran.log_probs[0]
         choice = drawn(log_probs, None if uniforms is None else uniforms[:, 1])
         probs = log_probs.exp()
-        record = {name: noted[0] for name, noted in record.items()}
-        record |= {"choice": choice, "action_probs": probs, "done_probability": probs[:, DONE]}
-        return AgentStep(
-            choice,
-            log_probs.gather(-1, choice.unsqueeze(-1)).squeeze(-1),
-            self.policy.value(out[0]),
-            record,
-            state,
-        )
+        inputs = (None if x is None else x[0] for x in (ran.intent, ran.objects, ran.corners))
+        record = FlatRecord(choice, probs, probs[:, DONE], *inputs)
+        return AgentStep(choice, log_prob_of(log_probs, choice), ran.value[0], record, ran.state)
 
-    def value(self, seen: dict[str, Tensor], state: State) -> Tensor:
+    def value(self, observations: dict[str, Tensor], state: State) -> Tensor:
         """See `Agent`."""
-        out, _, _ = self.run(*one_step(seen), state, {})
-        return self.policy.value(out[0])
+        return self.run(*one_step(observations), state).value[0]
 
-    def evaluate(self, batch: Batch) -> Evaluated:
+    def evaluate(self, batch: Batch[FlatRecord]) -> Evaluated:
         """See `Agent`."""
-        out, state, record = self.run(batch.observations, batch.course, batch.state, batch.record)
-        log_probs = torch.log_softmax(self.policy.actor(out), -1)
-        chosen = log_probs.gather(-1, batch.record["choice"].unsqueeze(-1)).squeeze(-1)
-        value, entropy = self.policy.value(out), entropy_of(log_probs)
-        return Evaluated(chosen, value, entropy, state, record.get("intent"))
+        ran = self.run(batch.observations, batch.segments, batch.state, batch.record)
+        log_prob = log_prob_of(ran.log_probs, batch.record.choice)
+        return Evaluated(log_prob, ran.value, entropy_of(ran.log_probs), ran.state, ran.intent)
+
+    def labels(self, actions: Sequence[int]) -> tuple[list[int], FlatRecord]:
+        """See `Agent`."""
+        return list(actions), FlatRecord(torch.tensor(actions))
 
     def critics(self) -> list[Parameter]:
         """See `Agent`."""
@@ -104,26 +146,31 @@ class PPOAgent(Agent):
 
     def run(
         self,
-        seen: dict[str, Tensor],
-        course: EpisodeSegments,
+        observations: dict[str, Tensor],
+        segments: EpisodeSegments,
         state: State,
-        record: dict[str, Tensor],
-    ) -> tuple[Tensor, State, dict[str, Tensor]]:
-        """Return the GRU's outputs (T, n, hidden), the state after them, and what to record.
+        record: FlatRecord | None = None,  # noqa: ARG002 - for those that work out more inputs
+    ) -> FlatOutput:
+        """Run the networks over T steps of n environments.
 
-        `record` is what was recorded of these steps when they were taken; empty for new ones.
+        Parameters
+        ----------
+        observations, segments, state
+            Observations (T, n, …), episode starts, and the memory (n, …) before the first step.
+        record
+            Record (T, n, …) of these steps; None for new ones.
         """
-        out, hidden = course.run(self.policy.gru, self.features(seen, record), state["hidden"])
-        return out, {"hidden": hidden}, {}
+        return self.decide(self.encoder(observations), segments, state)
 
-    def features(self, seen: dict[str, Tensor], record: dict[str, Tensor]) -> Tensor:  # noqa: ARG002
-        """Return what the GRU is fed, (T, n, inputs)."""
-        features: Tensor = self.encoder(seen)
-        return features
+    def decide(self, inputs: Tensor, segments: EpisodeSegments, state: State) -> FlatOutput:
+        """Run GRU, actor and critic on inputs (T, n, …)."""
+        out, hidden = segments.run(self.policy.gru, inputs, state["hidden"])
+        log_probs = torch.log_softmax(self.policy.actor(out), -1)
+        return FlatOutput(log_probs, self.policy.value(out), {**state, "hidden": hidden})
 
 
 class PPOIntentAgent(PPOAgent):
-    """The same, told what its own copy of some rollouts ago is about to do."""
+    """`ppo` that takes an intent: the next action of its own copy of some rollouts ago."""
 
     policy: IntentConditionedPolicy
 
@@ -135,52 +182,44 @@ class PPOIntentAgent(PPOAgent):
                 "agent.intent is 'policy': ppo-intent has one policy, whose intent is an action; "
                 "choose 'integrated', 'recursive' or 'none'"
             )
-        self.told = variant != "none"
+        self.uses_intent = variant != "none"
         self.intent = IntentPolicy(self.policy, recursive=variant == "recursive")
 
-    def _policy(self, inputs: int, chances: list[float]) -> RecurrentActorCritic:
-        return IntentConditionedPolicy(inputs, self.hidden, chances, ACTION_COUNT)
+    def _policy(self, inputs: int, probabilities: list[float]) -> RecurrentActorCritic:
+        return IntentConditionedPolicy(inputs, self.hidden, probabilities, ACTION_COUNT)
 
     def initial_state(self, count: int) -> State:
         """See `Agent`."""
         state = super().initial_state(count)
-        return {**state, "meaning": torch.zeros_like(state["hidden"])}
+        return {**state, "intent_hidden": torch.zeros_like(state["hidden"])}
 
     def run(
         self,
-        seen: dict[str, Tensor],
-        course: EpisodeSegments,
+        observations: dict[str, Tensor],
+        segments: EpisodeSegments,
         state: State,
-        record: dict[str, Tensor],
-    ) -> tuple[Tensor, State, dict[str, Tensor]]:
+        record: FlatRecord | None = None,
+    ) -> FlatOutput:
         """See `PPOAgent`."""
-        features, intent = self.features(seen, record), record.get("intent")
-        after, noted = {}, {}
-        if not self.told:
+        features, hidden = self.encoder(observations), state["intent_hidden"]
+        intent = None if record is None else record.intent
+        if not self.uses_intent:
             intent = uniform_intent(features, ACTION_COUNT)
-            after["meaning"] = state["meaning"]
         elif intent is None:
-            _, intent, after["meaning"] = self.intent(
-                features, state["meaning"], course, _itself, features.new_zeros(ACTION_COUNT)
-            )
-            noted["intent"] = intent
-        told = self.policy.told(features, intent)
-        out, after["hidden"] = course.run(self.policy.gru, told, state["hidden"])
-        return out, after, noted
+            no_mask = features.new_zeros(ACTION_COUNT)
+            # With a single policy P(i) is P(omega') itself.
+            _, intent, hidden = self.intent(features, hidden, segments, lambda p: p, no_mask)
+        ran = self.decide(self.policy.condition(features, intent), segments, state)
+        recorded = intent if self.uses_intent else None
+        return ran._replace(state={**ran.state, "intent_hidden": hidden}, intent=recorded)
 
     def synchronise(self) -> None:
         """See `Agent`."""
         self.intent.synchronise(self.policy)
 
-    def without_intent(self) -> Self:
-        """Return the same networks fed the plane vector."""
-        other = copy.copy(self)
-        other.told = False
-        return other
 
-
-class RandomAgent(Agent):
-    """Takes each action with the same chance."""
+class RandomAgent(Agent[StepRecord]):
+    """Agent that takes each action with the same probability."""
 
     def __init__(self, config: CampConfig) -> None:  # noqa: ARG002 - as all agents are made
         super().__init__()
@@ -191,29 +230,24 @@ class RandomAgent(Agent):
 
     def act(
         self,
-        seen: dict[str, Tensor],
+        observations: dict[str, Tensor],
         state: State,
-        starts: Tensor,  # noqa: ARG002 - it remembers nothing
+        starts: Tensor,  # noqa: ARG002 - it has no memory
         uniforms: Tensor | None,
-    ) -> AgentStep:
-        """See `Agent`; even the most probable action has to be drawn: it is the first."""
-        flat = torch.full((len(seen["goal"]), ACTION_COUNT), -math.log(ACTION_COUNT))
-        flat = flat.to(seen["goal"].device)
-        choice = drawn(flat, None if uniforms is None else uniforms[:, 1])
-        return AgentStep(
-            choice, flat[:, 0], torch.zeros_like(flat[:, 0]), {"choice": choice}, state
-        )
+    ) -> AgentStep[StepRecord]:
+        """See `Agent`; the most probable action is the first."""
+        goal = observations["goal"]
+        log_probs = torch.full((len(goal), ACTION_COUNT), -math.log(ACTION_COUNT)).to(goal.device)
+        choice = drawn(log_probs, None if uniforms is None else uniforms[:, 1])
+        value = self.value(observations, state)
+        return AgentStep(choice, log_probs[:, 0], value, StepRecord(choice), state)
 
-    def value(self, seen: dict[str, Tensor], state: State) -> Tensor:  # noqa: ARG002
+    def value(self, observations: dict[str, Tensor], state: State) -> Tensor:  # noqa: ARG002
         """See `Agent`."""
-        return torch.zeros(len(seen["goal"]), device=seen["goal"].device)
+        return observations["goal"].new_zeros(len(observations["goal"]))
 
-    def evaluate(self, batch: Batch) -> Evaluated:
+    def evaluate(self, batch: Batch[StepRecord]) -> Evaluated:
         """See `Agent`."""
         nothing = torch.zeros(batch.starts.shape, device=batch.starts.device)
         log = math.log(ACTION_COUNT)
         return Evaluated(nothing - log, nothing, nothing + log, batch.state)
-
-
-def _itself(meant: Tensor) -> Tensor:
-    return meant

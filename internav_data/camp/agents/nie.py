@@ -1,11 +1,11 @@
-"""`nie`: PPO that foresees what each action does to objects in sight.
+"""`nie`: PPO that predicts the effect of each action on the objects in sight.
 
-After Zeng et al. 2021, "Pushing it out of the way", as the released code has it:
-eight keypoints an object; for each action a 3x4 affine, the identity at the start, says where they
-go; an L1 loss on the action that was taken; a summary by attention joins the GRU's input. Objects
-are known by instance masks: **privileged input** that no other method gets. Ours: keypoints are the
-corners of the box round an object's visible points, level with the floor, in metres from the eye;
-the object's type is not given.
+The neural interaction engine of Zeng et al. 2021, "Pushing it out of the way", as the released code
+has it: eight keypoints an object; for each action a 3x4 affine map, at first the identity, predicts
+where they go; an L1 loss on the action that was taken; a summary by attention joins the GRU's
+input. Objects are known by instance masks: **privileged input** that no other method gets. Ours:
+keypoints are the corners of the box round an object's visible points, level with the floor, in
+metres from the eye; the object's type is no input.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from internav_data.camp.agents.flat import PPOAgent
+from internav_data.camp.agents.flat import FlatOutput, FlatRecord, PPOAgent
 from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import ACTION_COUNT, HORIZONS_DEG
@@ -49,66 +49,74 @@ class NIEAgent(PPOAgent):
 
     def run(
         self,
-        seen: dict[str, Tensor],
-        course: EpisodeSegments,
+        observations: dict[str, Tensor],
+        segments: EpisodeSegments,
         state: State,
-        record: dict[str, Tensor],
-    ) -> tuple[Tensor, State, dict[str, Tensor]]:
-        """See `PPOAgent`."""
-        record = record if "objects" in record else {**record, **self.sighted(seen)}
-        out, after, noted = super().run(seen, course, state, record)
-        return out, after, {**noted, **{name: record[name] for name in ("objects", "corners")}}
+        record: FlatRecord | None = None,
+    ) -> FlatOutput:
+        """See `PPOAgent`: features, and a summary of the predicted motion of objects in sight."""
+        objects, corners = self.sight(observations, record)
+        inputs = self.summarised(self.encoder(observations), objects, corners)
+        return self.decide(inputs, segments, state)._replace(objects=objects, corners=corners)
 
-    def features(self, seen: dict[str, Tensor], record: dict[str, Tensor]) -> Tensor:
-        """See `PPOAgent`: what is seen, and a summary of what could become of it."""
-        features = super().features(seen, record)
-        corners, there = record["corners"], record["objects"] >= 0
-        each = self.object(corners.flatten(-2))
-        moves = (self.foreseen(each, corners) - corners.unsqueeze(-3)).flatten(-3)
+    def sight(
+        self, observations: dict[str, Tensor], record: FlatRecord | None
+    ) -> tuple[Tensor, Tensor]:
+        """Return objects (T, n, K) and corners (T, n, K, 8, 3), recorded or found anew."""
+        if record is None or record.objects is None or record.corners is None:
+            return self.sighted(observations)
+        return record.objects, record.corners
+
+    def summarised(self, features: Tensor, objects: Tensor, corners: Tensor) -> Tensor:
+        """Return features (T, n, size) joined by an attention summary of objects, (T, n, 64)."""
+        there = objects >= 0  # (T, n, K)
+        each = self.object(corners.flatten(-2))  # (T, n, K, 64)
+        moves = (self.predicted(each, corners) - corners.unsqueeze(-3)).flatten(-3)
         likeness = (each * self.query(features).unsqueeze(-2)).sum(-1) / SUMMARY**0.5
         weights = torch.softmax(likeness.masked_fill(~there, -_NOWHERE), -1) * there
         content = self.content(torch.cat([each, moves], -1))
         return torch.cat([features, (weights.unsqueeze(-1) * content).sum(-2)], -1)
 
-    def foreseen(self, each: Tensor, corners: Tensor) -> Tensor:
-        """Return where keypoints (…, K, 8, 3) would go by each action, (…, K, 12, 8, 3)."""
+    def predicted(self, each: Tensor, corners: Tensor) -> Tensor:
+        """Return the keypoints (…, K, 8, 3) after each action, (…, K, 12, 8, 3)."""
         affine: Tensor = self.affine(each).view(*each.shape[:-1], ACTION_COUNT, 3, 4)
         padded = functional.pad(corners, (0, 1), value=1.0).unsqueeze(-3)
         ahead: Tensor = padded @ affine.transpose(-1, -2)
         return ahead
 
-    def evaluate(self, batch: Batch) -> Evaluated:
-        """See `Agent`; the loss is that of the keypoints foreseen."""
-        record = batch.record
-        if "objects" not in record:
-            record = {**record, **self.sighted(batch.observations)}
-        said = super().evaluate(replace(batch, record=record))
-        objects, corners = record["objects"], record["corners"]
-        index = batch.record["choice"][..., None, None, None, None]
-        ahead = self.foreseen(self.object(corners.flatten(-2)), corners)
-        ahead = ahead.take_along_dim(index, -3).squeeze(-3)
+    def evaluate(self, batch: Batch[FlatRecord]) -> Evaluated:
+        """See `Agent`; the loss is the L1 error of the predicted keypoints."""
+        objects, corners = self.sight(batch.observations, batch.record)
+        record = replace(batch.record, objects=objects, corners=corners)
+        found = super().evaluate(replace(batch, record=record))
+        index = record.choice[..., None, None, None, None]
+        ahead = self.predicted(self.object(corners.flatten(-2)), corners)
+        ahead = ahead.take_along_dim(index, -3).squeeze(-3)  # after the action that was taken
         same = objects[:-1, :, :, None] == objects[1:, :, None, :]
         same &= (objects[:-1, :, :, None] >= 0) & ~batch.starts[1:, :, None, None]
         apart = (ahead[:-1, :, :, None] - corners[1:, :, None]).abs().mean((-1, -2))
         loss = (apart * same).sum((-1, -2)) / same.sum((-1, -2)).clamp(min=1)
-        return replace(said, loss=self._weight * functional.pad(loss, (0, 0, 0, 1)))
+        return replace(found, loss=self._weight * functional.pad(loss, (0, 0, 0, 1)))
 
     @torch.no_grad()
-    def sighted(self, seen: dict[str, Tensor]) -> dict[str, Tensor]:
+    def sighted(self, observations: dict[str, Tensor]) -> tuple[Tensor, Tensor]:
         """Return the nearest objects in sight: ids (T, n, K), -1 for none; corners (T, n, K, 8, 3).
+
+        Corners are those of the box round an object's visible points, in metres from the eye.
 
         Raises
         ------
         UsageError
             The observations have no instance ids.
         """
-        if "ids" not in seen:
+        if "ids" not in observations:
             raise UsageError(
                 f"nie needs instance masks: make the environments with sensors={list(self.sensors)}"
             )
-        steps, count, size, _ = seen["ids"].shape
-        ids = seen["ids"].reshape(steps * count, -1).long().clamp(min=0)  # 1 and up are objects
-        points = _points(seen["depth"].reshape(steps * count, size, size), seen["horizon"])
+        depth, instances = observations["depth"], observations["ids"]
+        steps, count, size, _ = instances.shape
+        ids = instances.reshape(steps * count, -1).long().clamp(min=0)  # 1 and up are objects
+        points = _points(depth.reshape(steps * count, size, size), observations["horizon"])
         index = ids.unsqueeze(-1).expand_as(points)
         nothing = points.new_full((len(ids), int(ids.max()) + 2, 3), _NOWHERE)
         low = nothing.scatter_reduce(1, index, points, "amin")
@@ -125,10 +133,7 @@ class NIEAgent(PPOAgent):
         short = self._objects - wanted
         objects = functional.pad(places.masked_fill(~there, -1), (0, short), value=-1)
         corners = functional.pad(corners, (0, 0, 0, 0, 0, short))
-        return {
-            "objects": objects.view(steps, count, -1),
-            "corners": corners.view(steps, count, -1, _CORNERS, 3),
-        }
+        return objects.view(steps, count, -1), corners.view(steps, count, -1, _CORNERS, 3)
 
 
 def _points(depth: Tensor, horizon: Tensor) -> Tensor:

@@ -1,169 +1,228 @@
-"""What training and evaluation know of an agent. Shapes: T steps, n environments.
+"""Interface of agents to training and evaluation. Shapes: T steps, n environments.
 
-An agent is parameters and pure functions: what it remembers of an episode is a `State`, handed in
-and out. (The released code keeps the running option on the network: its first defect.)
+An agent is parameters and pure functions: its memory of an episode is a `State`, handed in and
+out. (The released code keeps the running option on the network: its first defect.)
 """
 
 from __future__ import annotations
 
+import copy
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 import torch
 from torch import Tensor, nn
 
 from internav_data.camp.networks import EpisodeSegments
 from internav_data.envs.sensors import DEFAULT_SENSORS
+from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
+    from typing import Self
 
     from torch.nn import Parameter
 
 State = dict[str, Tensor]
-"""What an agent remembers of each environment's episode: (n, …) by name; zeros at its start."""
+"""Memory of each environment's episode: tensors (n, …) by name; zeros at its start."""
 
 
 @dataclass(frozen=True, slots=True)
-class AgentStep:
-    """What an agent does in each environment, and why."""
+class StepRecord:
+    """Draws of an agent, as `evaluate` needs them to compute their probability once more.
+
+    An agent of more draws than one action a step has a record class of its own. Fields are tensors
+    (n, …) of one step or (T, n, …) of several; None where a value was not worked out.
+    """
+
+    choice: Tensor
+    """Number of the action that was drawn, int64."""
+
+    def map(self, function: Callable[[Tensor], Tensor]) -> Self:
+        """Return the record with a function applied to every tensor."""
+        tensors = {f.name: getattr(self, f.name) for f in fields(self)}
+        return replace(self, **{k: function(v) for k, v in tensors.items() if v is not None})
+
+    @classmethod
+    def stack(cls, records: Sequence[Self]) -> Self:
+        """Return records as one, with a new first dimension."""
+        names = [f.name for f in fields(cls) if getattr(records[0], f.name) is not None]
+        return cls(**{name: torch.stack([getattr(r, name) for r in records]) for name in names})
+
+    def statistics(self) -> dict[str, float]:
+        """Return the statistics of a rollout's decisions that are logged."""
+        return {}
+
+
+R = TypeVar("R", bound=StepRecord)
+
+
+@dataclass(frozen=True, slots=True)
+class AgentStep(Generic[R]):
+    """Actions of an agent in n environments, and their reasons."""
 
     action: Tensor
     """(n,) int64: 0 … 11, or -1 to wait."""
     log_prob: Tensor
-    """(n,): of all that was drawn."""
+    """(n,): log-probability of everything that was drawn."""
     value: Tensor
-    """(n,): what the critic expects from here on."""
-    record: dict[str, Tensor]
-    """(n, …): what `evaluate` needs to tell the same story again, and what logs are made of."""
+    """(n,): the critic's value before the action."""
+    record: R
+    """(n, …): tensors that `evaluate` needs to recompute the log-probability, and for logs."""
     state: State
-    """After this step."""
+    """(n, …): memory after this step."""
 
 
 @dataclass(frozen=True)
-class Batch:
-    """Steps of some environments, to be lived through again."""
+class Batch(Generic[R]):
+    """Steps of some environments, to be evaluated once more."""
 
     observations: dict[str, Tensor]
-    """(T, n, …)"""
+    """(T, n, …) by sensor."""
     starts: Tensor
     """(T, n) bool: an episode begins at this step."""
     state: State
-    """(n, …): before the first step."""
-    record: dict[str, Tensor]
-    """(T, n, …): those of the steps."""
+    """(n, …): memory before the first step."""
+    record: R
+    """(T, n, …): records of the steps."""
 
     @cached_property
-    def course(self) -> EpisodeSegments:
-        """How GRUs go over these steps."""
+    def segments(self) -> EpisodeSegments:
+        """Episode segments that GRUs run over."""
         return EpisodeSegments(self.starts)
 
-    def of(self, columns: Tensor) -> Batch:
-        """Return some of the environments; columns are their numbers, (m,)."""
+    def select(self, columns: Tensor) -> Batch[R]:
+        """Return the steps of some environments, by number (m,)."""
         return Batch(
-            {name: seen[:, columns] for name, seen in self.observations.items()},
+            {name: values[:, columns] for name, values in self.observations.items()},
             self.starts[:, columns],
-            {name: kept[columns] for name, kept in self.state.items()},
-            {name: noted[:, columns] for name, noted in self.record.items()},
+            {name: values[columns] for name, values in self.state.items()},
+            self.record.map(lambda values: values[:, columns]),
         )
 
 
 @dataclass(frozen=True, slots=True)
 class Evaluated:
-    """What an agent's present parameters say of steps that were taken."""
+    """Steps that were taken, under an agent's present parameters."""
 
     log_prob: Tensor
-    """(T, n): of all that was drawn."""
+    """(T, n): log-probability of everything that was drawn."""
     value: Tensor
-    """(T, n)"""
+    """(T, n): the critic's values."""
     entropy: Tensor
-    """(T, n): of all that could have been drawn."""
+    """(T, n): entropy of the distributions that were drawn from."""
     state: State
-    """(n, …): hidden states after the last step; without those that are not run again."""
+    """(n, …): memory after the last step; without hidden states that were not run again."""
     intent: Tensor | None = None
-    """(T, n, …): P(i), where it was worked out anew."""
+    """(T, n, …): P(i), where it was recomputed."""
     loss: Tensor | None = None
-    """(T, n): of what else is predicted (`nie`)."""
+    """(T, n): loss of other predictions (`nie`)."""
 
 
-class Agent(nn.Module, ABC):
-    """A learner; see `internav_data.camp.agents` for how one's own joins."""
+class Agent(nn.Module, ABC, Generic[R]):
+    """Learner; see `internav_data.camp.agents` for how to add one's own."""
 
     sensors: ClassVar[tuple[str, ...]] = DEFAULT_SENSORS
-    """Names of the sensors that it takes; see `internav_data.envs.sensors`."""
+    """Names of the sensors that the agent takes; see `internav_data.envs.sensors`."""
+    uses_intent: bool = False
+    """Whether its decisions take an intent P(i)."""
 
     @property
     def device(self) -> torch.device:
-        """Where the parameters lie."""
+        """Device of the parameters."""
         return next((p.device for p in self.parameters()), torch.device("cpu"))
 
     @abstractmethod
     def initial_state(self, count: int) -> State:
-        """Return the state of `count` environments that are about to begin: zeros."""
+        """Return the memory of `count` environments whose episodes begin: zeros."""
 
     @abstractmethod
     def act(
         self,
-        seen: dict[str, Tensor],
+        observations: dict[str, Tensor],
         state: State,
         starts: Tensor,
         uniforms: Tensor | None,
-    ) -> AgentStep:
+    ) -> AgentStep[R]:
         """Choose actions; gradients are not needed.
 
         Parameters
         ----------
-        seen
-            Observations, (n, …) by name.
+        observations
+            Tensors (n, …) by sensor.
         state
-            After the step before.
+            Memory after the step before.
         starts : (n,) bool
-            An episode begins here: its state is forgotten.
+            Environments whose episode begins: their memory is cleared.
         uniforms : (n, 2)
-            In [0, 1): what options and what actions are drawn by; None for the most probable.
+            Random numbers in [0, 1) that options and actions are drawn by; None for the most
+            probable.
         """
 
     @abstractmethod
-    def value(self, seen: dict[str, Tensor], state: State) -> Tensor:
-        """Return what the critic expects of observations (n, …) after `state`: (n,)."""
+    def value(self, observations: dict[str, Tensor], state: State) -> Tensor:
+        """Return the critic's values (n,) of observations (n, …) after `state`."""
 
     @abstractmethod
-    def evaluate(self, batch: Batch) -> Evaluated:
-        """Live through steps again, with gradients.
+    def evaluate(self, batch: Batch[R]) -> Evaluated:
+        """Run over recorded steps with the present parameters, with gradients.
 
-        Where `record` lacks what the agent made up on the way (P(i)), it is worked out anew.
+        Where the record lacks a value that the agent worked out (P(i)), it is recomputed.
         """
 
-    def labels(self, actions: Sequence[int]) -> dict[str, list[int]]:
+    def labels(self, actions: Sequence[int]) -> tuple[list[int], R]:
         """Return an expert's actions as this agent would take them.
 
-        "action" is what the environment gets; the rest is `record` for `evaluate`.
+        Returns
+        -------
+        actions
+            Actions of the environment, L of them; an agent may add waits.
+        record
+            Record (L, …) of the same steps for `evaluate`.
         """
-        return {"action": list(actions), "choice": list(actions)}
+        record: Any = StepRecord(torch.tensor(actions))
+        return list(actions), record
 
     def optimised(self) -> list[Parameter]:
         """Return the parameters that are trained."""
         return [parameter for parameter in self.parameters() if parameter.requires_grad]
 
     def critics(self) -> list[Parameter]:
-        """Return the parameters of the critics: all that is trained while they are new."""
+        """Return the critics' parameters, which are trained alone while they are new."""
         return []
 
     def synchronise(self) -> None:
-        """Copy the deciding network into the intent network, where there is one."""
+        """Copy the deciding policy into the intent policy, where there is one."""
+
+    def without_intent(self) -> Self:
+        """Return the same networks on the uniform intent (Table 4's test without intent).
+
+        Raises
+        ------
+        UsageError
+            The agent has no intent.
+        """
+        if not self.uses_intent:
+            raise UsageError("this agent has no intent to be evaluated without")
+        other = copy.copy(self)
+        other.uses_intent = False
+        return other
 
 
 def reset_where_done(state: State, starts: Tensor) -> State:
-    """Return a state that has forgotten the episodes that are over; starts (n,) bool."""
+    """Return a memory (n, …) that is zero where an episode begins; starts (n,) bool."""
     return {
-        name: kept.masked_fill(starts.reshape(-1, *[1] * (kept.ndim - 1)), 0)
-        for name, kept in state.items()
+        name: values.masked_fill(starts.reshape(-1, *[1] * (values.ndim - 1)), 0)
+        for name, values in state.items()
     }
 
 
-def one_step(seen: dict[str, Tensor]) -> tuple[dict[str, Tensor], EpisodeSegments]:
-    """Return observations (n, …) as (1, n, …), and the course of a step at which nobody begins."""
-    starts = torch.zeros(1, len(seen["goal"]), dtype=torch.bool, device=seen["goal"].device)
-    return {name: what.unsqueeze(0) for name, what in seen.items()}, EpisodeSegments(starts)
+def one_step(observations: dict[str, Tensor]) -> tuple[dict[str, Tensor], EpisodeSegments]:
+    """Return observations (n, …) as (1, n, …), and the segments of a step without a start."""
+    goal = observations["goal"]
+    starts = torch.zeros(1, len(goal), dtype=torch.bool, device=goal.device)
+    return {name: values.unsqueeze(0) for name, values in observations.items()}, EpisodeSegments(
+        starts
+    )
