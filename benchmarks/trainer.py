@@ -26,9 +26,9 @@ import torch
 
 from internav_data.camp.agents import make_agent
 from internav_data.camp.agents.options import ACTIONS_OF, NAVIGATE, STOP
-from internav_data.camp.collect import Collector, orders_of, uniforms_of
 from internav_data.camp.config import from_mapping, preset
 from internav_data.camp.ppo import update
+from internav_data.camp.rollout import Collector, orders_of, uniforms_of
 from internav_data.dataset import load_dataset
 from internav_data.envs import InterNavVectorEnv
 
@@ -123,7 +123,7 @@ def lived(
 def method_row(dataset: Path, method: str, config: CampConfig, rollouts: int) -> dict[str, Any]:
     """Train for some rollouts after one that warms up; say where the time went."""
     agent, env, collector = lived(dataset, method, config)
-    collector.begin(env.reset(seed=0)[0])
+    collector.loop.reset(seed=0)
     optimiser = torch.optim.Adam(agent.optimised(), config.stages.joint_learning_rate)
     count, steps = config.ppo.num_envs, config.ppo.num_steps
 
@@ -187,7 +187,7 @@ def one_update(
 ) -> tuple[float, dict[str, float]]:
     """Return the seconds that an update took, and what was said of it."""
     agent, env, collector = lived(dataset, "camp", config)
-    collector.begin(env.reset(seed=0)[0])
+    collector.loop.reset(seed=0)
     count = config.ppo.num_envs
     rollout = collector.collect(uniforms_of(0, 0, range(count), config.ppo.num_steps))
     env.close()
@@ -242,27 +242,27 @@ def naive_step(
     """Return log-probability, value, entropy and hidden states (5, hidden) of one sample."""
     if batch.starts[t, k]:
         hidden = torch.zeros_like(hidden)
-    now = {name: noted[t, k] for name, noted in batch.record.items()}
+    now = batch.record.map(lambda values: values[t, k])
     seen = {name: what[t : t + 1, k : k + 1] for name, what in batch.observations.items()}
     view = agent.encoders[0](seen)[0]
-    opened = (float(now["open"] == 1), float(now["open"] == 2), float(now["used"]) / 11)
+    opened = (float(now.open == 1), float(now.open == 2), float(now.used) / 11)
     told = torch.cat([view, torch.tensor([opened])], 1)
     after, acts = list(hidden), []
     for number, policy in enumerate(agent.policies):
         out, last = policy.gru(view if number == NAVIGATE else told, hidden[number][None])
         after[number] = last[0]
         acts.append(torch.log_softmax(policy.actor(out[0]), -1))
-    inputs = torch.cat([told, agent.plan.embed(now["intent"])[None]], 1)
+    inputs = torch.cat([told, agent.plan.embed(now.intent)[None]], 1)
     out, last = agent.plan.gru(inputs, hidden[GLOBAL][None])
     after[GLOBAL] = last[0]
     plan = torch.log_softmax(agent.plan.actor(out[0]), -1)
     log_prob, entropy = torch.zeros(()), torch.zeros(())
-    if now["decide"]:
-        log_prob = log_prob + plan[int(now["option"])]
+    if now.decide:
+        log_prob = log_prob + plan[int(now.option)]
         entropy = entropy - (plan.exp() * plan).sum()
-    if now["option"] != STOP:
-        own = acts[int(now["option"])]
-        log_prob = log_prob + own[ACTIONS_OF[int(now["option"])].index(int(now["choice"]))]
+    if now.option != STOP:
+        own = acts[int(now.option)]
+        log_prob = log_prob + own[ACTIONS_OF[int(now.option)].index(int(now.choice))]
         entropy = entropy - (own.exp() * own).sum()
     return log_prob, agent.plan.critic(out[0])[0], entropy, torch.stack(after)
 

@@ -119,13 +119,13 @@ def lively(agent):
 def collected(fake, config):
     """Return agent, collector and some successive rollouts."""
     from internav_data.camp.agents import make_agent
-    from internav_data.camp.collect import Collector, uniforms_of
+    from internav_data.camp.rollout import Collector, uniforms_of
 
     def make(method, rollouts=2, env=None, steps=8, changes=None, agent=None):
         agent = agent or lively(make_agent(method, config(**(changes or {}))))
         env = env or fake()
         collector = Collector(env, agent)
-        collector.begin(env.reset(seed=0)[0])
+        collector.loop.reset(seed=0)
         lived = [
             collector.collect(uniforms_of(0, r, range(env.num_envs), steps))
             for r in range(rollouts)

@@ -6,7 +6,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from internav_data.camp.agents import make_agent  # noqa: E402
-from internav_data.camp.collect import Collector, orders_of, uniforms_of  # noqa: E402
+from internav_data.camp.rollout import Collector, orders_of, uniforms_of  # noqa: E402
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def test_cuts_are_valued_before_the_reset_and_ends_are_not(diary, config, method
     """By what was seen last and the hidden states after the last step, worked out step by step."""
     env, agent = diary(), make_agent(method, config(agent={"initial_done_probability": 0.05}))
     collector = Collector(env, agent)
-    collector.begin(env.reset()[0])
+    collector.loop.reset()
     uniforms = uniforms_of(0, 0, range(4), 30)
     rollout = collector.collect(uniforms)
     assert rollout.truncated.any()
@@ -63,7 +63,7 @@ def test_cuts_are_valued_before_the_reset_and_ends_are_not(diary, config, method
 def test_who_is_done_is_reset_at_once_and_nobody_else(diary, config):
     env, agent = diary(), make_agent("camp", config())
     collector = Collector(env, agent)
-    collector.begin(env.reset()[0])
+    collector.loop.reset()
     rollout = collector.collect(uniforms_of(0, 0, range(4), 20))
     over = rollout.terminated | rollout.truncated
     rows = [t for t in range(20) if over[t].any()]
@@ -72,7 +72,7 @@ def test_who_is_done_is_reset_at_once_and_nobody_else(diary, config):
         assert mask.tolist() == over[row].tolist()
     assert torch.equal(rollout.batch.starts[1:], over[:-1])
     assert rollout.batch.starts[0].all()
-    assert torch.equal(collector.starts, over[-1])
+    assert collector.loop.starts.tolist() == over[-1].tolist()
 
 
 def test_buffers_that_are_written_again_do_no_harm(fake, config):
@@ -93,7 +93,7 @@ def test_buffers_that_are_written_again_do_no_harm(fake, config):
     for make in (fake, Reused):
         env, agent = make(), make_agent("camp", config())
         collector = Collector(env, agent)
-        collector.begin(env.reset()[0])
+        collector.loop.reset()
         lived.append(collector.collect(uniforms_of(0, 0, range(4), 20)))
     assert torch.equal(lived[0].log_probs, lived[1].log_probs)
     assert torch.equal(lived[0].final_values, lived[1].final_values)
@@ -145,7 +145,7 @@ def test_a_real_environment_is_lived_in(houses, config):
         for method in ("camp", "nie"):
             agent = make_agent(method, config(agent={"initial_interaction_probability": 0.3}))
             collector = Collector(env, agent, seed=5)
-            collector.begin(env.reset(seed=5)[0])
+            collector.loop.reset(seed=5)
             rollout = collector.collect(uniforms_of(0, 0, range(4), 40))
             now = agent.evaluate(rollout.batch)
             torch.testing.assert_close(now.log_prob, rollout.log_probs, atol=1e-5, rtol=0)

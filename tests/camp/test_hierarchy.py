@@ -1,11 +1,13 @@
 """CaMP's model, point by point."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch")
 
-from internav_data.camp.agents import Auxiliary, make_agent, without_intent  # noqa: E402
+from internav_data.camp.agents import AuxiliaryAgent, make_agent  # noqa: E402
 from internav_data.camp.agents.options import (  # noqa: E402
     ACTIONS_OF,
     DONE,
@@ -15,18 +17,25 @@ from internav_data.camp.agents.options import (  # noqa: E402
     STOP,
     WAIT,
 )
-from internav_data.camp.collect import Collector, uniforms_of  # noqa: E402
+from internav_data.camp.rollout import Collector, uniforms_of  # noqa: E402
 from internav_data.records.errors import UsageError  # noqa: E402
 
 ALLOWED = torch.zeros(4, 12, dtype=torch.bool)
 for _option, _actions in enumerate((*ACTIONS_OF, (DONE,))):
     ALLOWED[_option, list(_actions)] = True
+
+
+def with_intent(batch, intent):
+    """Return the steps with another recorded intent, or none."""
+    return dataclasses.replace(batch, record=dataclasses.replace(batch.record, intent=intent))
+
+
 VARIANTS = ["integrated", "policy", "recursive", "none"]
 
 
 def ran_of(agent, batch):
-    record = {name: batch.record[name] for name in ("open", "used")}
-    return agent.run(batch.observations, batch.course, batch.state, record)
+    record = batch.record
+    return agent.run(batch.observations, batch.segments, batch.state, record.open, record.used)
 
 
 def insist(agent, option, choice=None):
@@ -46,12 +55,12 @@ def test_mixtures_sum_to_one_and_masked_actions_have_no_chance(collected, method
     agent, _, (_, rollout) = collected(method, changes={"agent": {"intent": intent}})
     ran = ran_of(agent, rollout.batch)
     torch.testing.assert_close(ran.intent.sum(-1), torch.ones(8, 4))
-    chances = ran.acts.exp()
+    chances = ran.action_log_probs.exp()
     torch.testing.assert_close(chances.sum(-1), torch.ones(8, 4, 4))
     assert (chances[..., ~ALLOWED] == 0).all()
     assert method == "hrl" or (chances[..., ALLOWED] > 0).all()
     record = rollout.batch.record
-    assert ALLOWED[record["option"], record["choice"]].all()
+    assert ALLOWED[record.option, record.choice].all()
 
 
 def test_the_mixture_is_equation_7_by_hand(collected):
@@ -62,14 +71,17 @@ def test_the_mixture_is_equation_7_by_hand(collected):
     batch = rollout.batch
     record = batch.record
     ran = ran_of(agent, batch)
-    meant, acts = record["meant"].double().numpy(), ran.acts.exp().detach().double().numpy()
+    meant, acts = (
+        record.intended_option_probs.double().numpy(),
+        ran.action_log_probs.exp().detach().double().numpy(),
+    )
     right = np.zeros((8, 4, 12))
     for t in range(8):
         for k in range(4):
             for option, actions in enumerate((*ACTIONS_OF, (DONE,))):
                 for action in actions:
                     right[t, k, action] += meant[t, k, option] * acts[t, k, option, action]
-    assert record["intent"].numpy() == pytest.approx(right, abs=1e-5)
+    assert record.intent.numpy() == pytest.approx(right, abs=1e-5)
     assert (meant[..., PICK] * acts[..., PICK, 1]).max() > 1e-3
 
 
@@ -85,13 +97,16 @@ def test_what_is_drawn_has_the_probability_of_its_parts(collected, method):
         now = agent.evaluate(rollout.batch)
         for t in range(8):
             for k in range(4):
-                option, choice = record["option"][t, k], record["choice"][t, k]
-                decided = bool(record["open"][t, k] == 0)
-                right = ran.plan[t, k, option] if decided else torch.zeros(())
-                entropy = torch.distributions.Categorical(ran.plan[t, k].exp()).entropy() * decided
+                option, choice = record.option[t, k], record.choice[t, k]
+                decided = bool(record.open[t, k] == 0)
+                right = ran.option_log_probs[t, k, option] if decided else torch.zeros(())
+                entropy = (
+                    torch.distributions.Categorical(ran.option_log_probs[t, k].exp()).entropy()
+                    * decided
+                )
                 if option != STOP:
-                    right = right + ran.acts[t, k, option, choice]
-                    acts = ran.acts[t, k, option].exp()
+                    right = right + ran.action_log_probs[t, k, option, choice]
+                    acts = ran.action_log_probs[t, k, option].exp()
                     entropy = entropy + torch.distributions.Categorical(acts).entropy()
                 assert rollout.log_probs[t, k] == pytest.approx(right.item(), abs=1e-5)
                 assert now.entropy[t, k].item() == pytest.approx(entropy.item(), abs=1e-4)
@@ -145,10 +160,9 @@ def test_no_gradient_flows_from_intents_to_action_policies(collected):
     """Through what global decides nothing is learnt by those whose intents it was told."""
     agent, _, (rollout, _) = collected("camp")
     for again in (False, True):
-        if again:
-            del rollout.batch.record["intent"]
+        batch = with_intent(rollout.batch, None) if again else rollout.batch
         agent.zero_grad()
-        agent.evaluate(rollout.batch).value.sum().backward()
+        agent.evaluate(batch).value.sum().backward()
         for policy in agent.policies:
             for parameter in (*policy.gru.parameters(), *policy.actor.parameters()):
                 assert parameter.grad is None or not parameter.grad.any()
@@ -161,7 +175,7 @@ def test_who_does_not_execute_gets_no_gradient(collected, method):
     agent, _, (_, rollout) = collected(
         method, changes={"agent": {"initial_interaction_probability": 0.3}}
     )
-    option = rollout.batch.record["option"]
+    option = rollout.batch.record.option
     assert set(option.unique().tolist()) >= {NAVIGATE, PUSH, PICK}
 
     def gradients(weights):
@@ -194,7 +208,7 @@ def acted(agent, count=1, steps=14, starts_at=()):
         step = agent.act(seen, state, starts, torch.rand(count, 2))
         state, record = step.state, step.record
         names = ("option", "choice", "decide", "open", "used", "forced")
-        rows.append({name: record[name][0].item() for name in names})
+        rows.append({name: getattr(record, name)[0].item() for name in names})
         rows[-1]["action"] = step.action[0].item()
     return rows
 
@@ -218,7 +232,7 @@ def test_a_hand_back_is_one_step_of_waiting_and_ends_nothing(config, option, fak
     assert all(row["decide"] and not row["forced"] for row in rows)
     env = fake(length=50)
     collector = Collector(env, agent)
-    collector.begin(env.reset()[0])
+    collector.loop.reset()
     rollout = collector.collect(uniforms_of(0, 0, range(4), 6))
     assert not rollout.terminated.any()
     assert (np.stack(env.actions) == WAIT).all()
@@ -249,10 +263,10 @@ def test_with_push_and_pick_forbidden_it_is_navigate(config, fake):
     with torch.no_grad():
         camp.plan.actor.bias[STOP] = -60.0
     actions = []
-    for agent in (camp, Auxiliary(camp, [NAVIGATE] * 4)):
+    for agent in (camp, AuxiliaryAgent(camp, ["navigate"] * 4)):
         env = fake()
         collector = Collector(env, agent)
-        collector.begin(env.reset()[0])
+        collector.loop.reset()
         for rollout in range(3):
             collector.collect(uniforms_of(5, rollout, range(4), 20))
         actions.append(np.stack(env.actions))
@@ -263,9 +277,9 @@ def test_with_push_and_pick_forbidden_it_is_navigate(config, fake):
 def test_forbidden_options_are_never_opened_nor_meant(collected):
     _, _, lived = collected("camp", changes={"agent": {"forbidden": ["push"]}}, rollouts=3)
     for rollout in lived:
-        assert (rollout.batch.record["option"] != PUSH).all()
-        assert (rollout.batch.record["plan"][..., PUSH] == 0).all()
-        assert (rollout.batch.record["meant"][..., PUSH] == 0).all()
+        assert (rollout.batch.record.option != PUSH).all()
+        assert (rollout.batch.record.option_probs[..., PUSH] == 0).all()
+        assert (rollout.batch.record.intended_option_probs[..., PUSH] == 0).all()
 
 
 def test_hrl_decides_at_every_step_and_its_interactions_never_hand_back(collected):
@@ -273,15 +287,15 @@ def test_hrl_decides_at_every_step_and_its_interactions_never_hand_back(collecte
         "hrl", rollouts=4, changes={"agent": {"initial_interaction_probability": 0.3}}
     )
     assert not hasattr(agent, "intent")
-    options = torch.cat([rollout.batch.record["option"] for rollout in lived])
+    options = torch.cat([rollout.batch.record.option for rollout in lived])
     assert {PUSH, PICK} <= set(options.unique().tolist())
     for rollout in lived:
         record = rollout.batch.record
-        assert record["decide"].all()
-        assert not record["open"].any()
-        assert not record["used"].any()
-        acting = (record["option"] == PUSH) | (record["option"] == PICK)
-        assert (record["choice"][acting] != DONE).all()
+        assert record.decide.all()
+        assert not record.open.any()
+        assert not record.used.any()
+        acting = (record.option == PUSH) | (record.option == PICK)
+        assert (record.choice[acting] != DONE).all()
 
 
 @pytest.mark.parametrize("method", ["ppo", "ppo-intent", "nie", "hrl", "camp"])
@@ -295,25 +309,25 @@ def test_every_learner_ends_an_episode_with_the_same_chance(fake, config, method
         ),
     )
     collector = Collector(env, agent)
-    collector.begin(env.reset()[0])
+    collector.loop.reset()
     record = collector.collect(uniforms_of(0, 0, range(4), 1)).batch.record
-    assert record["done_probability"].numpy() == pytest.approx(chance, rel=0.03)
+    assert record.done_probability.numpy() == pytest.approx(chance, rel=0.03)
     if method in {"hrl", "camp"} and chance == 0.01:
-        plan = record["plan"][0, 0].tolist()
+        plan = record.option_probs[0, 0].tolist()
         assert plan[:3] == pytest.approx([0.9, 0.045, 0.045], rel=0.03)
 
 
 @pytest.mark.parametrize("method", ["camp", "ppo-intent"])
 def test_without_intent_the_trained_model_is_fed_the_plane(collected, method):
     agent, _, (rollout, _) = collected(method)
-    plain = without_intent(agent)
-    assert agent.told
+    plain = agent.without_intent()
+    assert agent.uses_intent
     assert {id(p) for p in plain.parameters()} == {id(p) for p in agent.parameters()}
     batch = rollout.batch
-    batch.record["intent"] = torch.full((8, 4, 12), 1.0 / 12)
+    batch = with_intent(batch, torch.full((8, 4, 12), 1.0 / 12))
     right = agent.evaluate(batch).value
     torch.testing.assert_close(plain.evaluate(batch).value, right)
-    batch.record["intent"] = torch.eye(12)[torch.zeros(8, 4, dtype=torch.int64)]
+    batch = with_intent(batch, torch.eye(12)[torch.zeros(8, 4, dtype=torch.int64)])
     torch.testing.assert_close(plain.evaluate(batch).value, right)
     assert not torch.allclose(agent.evaluate(batch).value, right)
 
@@ -321,7 +335,7 @@ def test_without_intent_the_trained_model_is_fed_the_plane(collected, method):
 def test_agents_without_intent_are_not_to_be_evaluated_without(config):
     for method in ("ppo", "hrl"):
         with pytest.raises(UsageError, match="no intent"):
-            without_intent(make_agent(method, config()))
+            make_agent(method, config()).without_intent()
 
 
 def test_recursive_intent_is_the_intent_policy_run_on_its_own_first_intent(collected):
@@ -330,12 +344,12 @@ def test_recursive_intent_is_the_intent_policy_run_on_its_own_first_intent(colle
     at = {name: what[:1] for name, what in batch.observations.items()}
     inputs = torch.cat([agent.encoders[0](at), torch.zeros(1, 4, 3)], -1)
     mind, intent = agent.intent, torch.full((1, 4, 12), 1.0 / 12)
-    acts = ran_of(agent, batch).acts[:1].exp()
+    acts = ran_of(agent, batch).action_log_probs[:1].exp()
     for _ in range(2):
         out, _ = mind.gru(torch.cat([inputs, mind.embed(intent)], -1))  # from zeros, twice
         meant = torch.softmax(mind.actor(out), -1)
         intent = (meant.unsqueeze(-1) * acts).sum(-2)
-    torch.testing.assert_close(intent[0], record["intent"][0], atol=1e-5, rtol=0)
+    torch.testing.assert_close(intent[0], record.intent[0], atol=1e-5, rtol=0)
 
 
 def test_unknown_methods_and_unfit_variants_are_refused(config):

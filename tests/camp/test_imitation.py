@@ -16,17 +16,18 @@ from internav_data.camp.agents.options import (  # noqa: E402
     PUSH,
     STOP,
     WAIT,
-    follow,
+    option_labels,
 )
-from internav_data.camp.cloning import Demonstrations, clone  # noqa: E402
+from internav_data.camp.cloning import Demonstrations, update  # noqa: E402
+from internav_data.camp.ppo import set_rate  # noqa: E402
 
 AHEAD, LEFT, RIGHT, DOWN, PUSHED, UP, DROP = 0, 1, 2, 3, 5, 9, 10
 N, P, I, S = NAVIGATE, PUSH, PICK, STOP
 
 
-def rows_of(actions, keeps=True):
-    label = follow(actions, keeps=keeps)
-    return list(zip(label["option"], label["choice"], label["action"], strict=True))
+def rows_of(actions, temporally_extended=True):
+    taken, label = option_labels(actions, temporally_extended=temporally_extended)
+    return list(zip(label.option.tolist(), label.choice.tolist(), taken, strict=True))
 
 
 def test_a_run_of_pushes_is_push_and_hands_back():
@@ -62,27 +63,28 @@ def test_a_move_between_pickup_and_drop_makes_two_interactions(between):
 
 
 def test_decisions_and_what_is_told_of_them():
-    label = follow([PUSHED, PUSHED, AHEAD], keeps=True)
-    assert label["decide"] == [1, 0, 0, 1]
-    assert label["open"] == [0, P, P, 0]
-    assert label["used"] == [0, 1, 2, 0]
+    _, label = option_labels([PUSHED, PUSHED, AHEAD], temporally_extended=True)
+    assert label.decide.tolist() == [True, False, False, True]
+    assert label.open.tolist() == [0, P, P, 0]
+    assert label.used.tolist() == [0, 1, 2, 0]
 
 
 @pytest.mark.parametrize("count", [10, 11, 12, 22, 23])
 def test_the_eleventh_action_closes_without_a_hand_back(count):
-    label = follow([PUSHED] * count, keeps=True)
-    assert label["action"].count(WAIT) == (1 if count % 11 else 0)
-    assert [k for k, decides in enumerate(label["decide"]) if decides] == list(range(0, count, 11))
-    assert max(label["used"]) <= 10
+    taken, label = option_labels([PUSHED] * count, temporally_extended=True)
+    assert taken.count(WAIT) == (1 if count % 11 else 0)
+    assert label.decide.nonzero().flatten().tolist() == list(range(0, count, 11))
+    assert label.used.max() <= 10
 
 
 def test_hrl_decides_at_every_step_and_never_waits():
     actions = [AHEAD, PUSHED, PUSHED, UP, LEFT, DROP, DONE]
-    label = follow(actions, keeps=False)
-    assert label["action"] == label["choice"] == actions
-    assert label["option"] == [N, P, P, I, I, I, S]
-    assert label["decide"] == [1] * 7
-    assert not any(label["open"]) and not any(label["used"])  # noqa: PT018
+    taken, label = option_labels(actions, temporally_extended=False)
+    assert taken == label.choice.tolist() == actions
+    assert label.option.tolist() == [N, P, P, I, I, I, S]
+    assert label.decide.all()
+    assert not label.open.any()
+    assert not label.used.any()
 
 
 def test_labels_are_what_the_model_could_have_done(config):
@@ -92,17 +94,17 @@ def test_labels_are_what_the_model_could_have_done(config):
     rng = np.random.default_rng(0)
     for _ in range(20):
         actions = [*rng.choice([0, 1, 5, 5, 5, 9, 10], 60).tolist(), DONE]
-        label = follow(actions, keeps=True)
+        taken, label = option_labels(actions, temporally_extended=True)
         opened = used = torch.zeros(1, dtype=torch.int64)
-        for k, option in enumerate(label["option"]):
-            assert (label["open"][k], label["used"][k]) == (opened.item(), used.item())
-            assert label["decide"][k] == (opened.item() == 0)
+        for k, option in enumerate(label.option.tolist()):
+            assert (label.open[k], label.used[k]) == (opened.item(), used.item())
+            assert label.decide[k] == (opened.item() == 0)
             assert opened.item() in {0, option}
-            opened, used, handed, _ = option_step(
-                torch.tensor([option]), torch.tensor([label["choice"][k]]), used
+            opened, used, handed_back, _ = option_step(
+                label.option[k : k + 1], label.choice[k : k + 1], used
             )
-            assert bool(handed) == (label["action"][k] == WAIT)
-        assert [a for a in label["action"] if a != WAIT] == actions
+            assert bool(handed_back) == (taken[k] == WAIT)
+        assert [action for action in taken if action != WAIT] == actions
 
 
 EXPERTS = {
@@ -138,32 +140,34 @@ def experts(fake):
 def test_frames_begin_where_episodes_do(experts, config):
     agent = make_agent("camp", config())
     shown = Demonstrations(experts(), agent, EXPERTS.__getitem__)
-    shown.begin(0)
-    batch = shown.collect(20, agent.initial_state(4))
+    shown.loop.reset(seed=0)
+    batch = shown.collect(20)
     ages = batch.observations["goal"][..., 1] / 0.5
     assert torch.equal(batch.starts, ages == 0)
     assert batch.starts[1:].any()
     which = batch.observations["goal"][..., 0] / 10
     for k in range(4):
-        labels = [follow(EXPERTS["abc"[int(w)]], keeps=True) for w in which[:, k]]
-        right = [own["choice"][int(age)] for own, age in zip(labels, ages[:, k], strict=True)]
-        assert batch.record["choice"][:, k].tolist() == right
+        labels = [agent.labels(EXPERTS["abc"[int(w)]])[1] for w in which[:, k]]
+        right = [own.choice[int(age)] for own, age in zip(labels, ages[:, k], strict=True)]
+        assert batch.record.choice[:, k].tolist() == right
 
 
 @pytest.mark.parametrize("method", ["ppo", "ppo-intent", "nie", "hrl", "camp"])
 def test_experts_are_learnt_by_every_learner(experts, config, method):
     agent = make_agent(method, config(network={"hidden": 32}))
-    cloning = dataclasses.replace(
-        config().cloning, frames=4 * 16 * 30, epochs=2, num_envs=4, num_steps=16,
-        learning_rate=2e-2, sync_every=10,
-    )  # fmt: skip
     optimiser = torch.optim.Adam(agent.optimised(), 1e-3)
     shown = Demonstrations(experts(), agent, EXPERTS.__getitem__)
     critic = [p.detach().clone() for p in agent.critics()]
-    told = list(clone(agent, optimiser, shown, cloning, 0))
-    assert len(told) == told[0]["updates"] == 60
-    assert told[0]["loss"] > 1.0
-    assert told[-1]["loss"] < 0.35 * told[0]["loss"]
+    losses = []
+    for number in range(60):
+        if number % 30 == 0:
+            shown.loop.reset(seed=0)
+        set_rate(optimiser, 2e-2, number / 60)
+        losses.append(update(agent, optimiser, shown, 16)["loss"])
+        if (number + 1) % 10 == 0:
+            agent.synchronise()
+    assert losses[0] > 1.0
+    assert losses[-1] < 0.35 * losses[0]
     assert all(torch.equal(a, b) for a, b in zip(critic, agent.critics(), strict=True))
 
 
@@ -177,9 +181,11 @@ def test_each_update_goes_on_from_the_last_ones_hidden_states(experts, config, m
         return said
 
     monkeypatch.setattr(agent, "evaluate", watched)
-    cloning = dataclasses.replace(config().cloning, frames=96, epochs=1, num_envs=4, num_steps=8)
     shown = Demonstrations(experts(), agent, EXPERTS.__getitem__)
-    list(clone(agent, torch.optim.Adam(agent.optimised()), shown, cloning, 0))
+    shown.loop.reset(seed=0)
+    optimiser = torch.optim.Adam(agent.optimised())
+    for _ in range(3):
+        update(agent, optimiser, shown, 8)
     assert len(lived) == 3
     assert not lived[0][0].any()
     for (_, after), (before, _) in itertools.pairwise(lived):
@@ -191,17 +197,16 @@ def test_each_update_goes_on_from_the_last_ones_hidden_states(experts, config, m
 def test_hidden_states_go_on_between_updates(experts, config):
     """Two batches of 8 after one another are one of 16."""
     agent = make_agent("camp", config())
-    state = agent.initial_state(4)
     shown = Demonstrations(experts(), agent, EXPERTS.__getitem__)
-    shown.begin(0)
+    shown.loop.reset(seed=0)
     parts = []
     for _ in range(2):
-        now = agent.evaluate(shown.collect(8, state))
-        state = now.state
+        now = agent.evaluate(shown.collect(8))
+        shown.state = now.state
         parts.append(now.log_prob)
     shown = Demonstrations(experts(), agent, EXPERTS.__getitem__)
-    shown.begin(0)
-    whole = agent.evaluate(shown.collect(16, agent.initial_state(4))).log_prob
+    shown.loop.reset(seed=0)
+    whole = agent.evaluate(shown.collect(16)).log_prob
     torch.testing.assert_close(torch.cat(parts), whole, atol=1e-5, rtol=0)
 
 
@@ -211,13 +216,14 @@ def test_the_datasets_experts_reach_their_goals_hand_backs_and_all(houses, confi
     from internav_data.envs.vector import InterNavVectorEnv
 
     env = InterNavVectorEnv(2, houses, image_size=16, autoreset=False)
-    ends = []
+    ends, waits = [], []
 
     class Watched:
         num_envs = 2
         reset = env.reset
 
         def step(self, actions):
+            waits.extend(actions == WAIT)
             said = env.step(actions)
             ends.extend(said[4]["metrics"]["success"][said[2]] if said[2].any() else [])
             assert not said[3].any()
@@ -225,13 +231,13 @@ def test_the_datasets_experts_reach_their_goals_hand_backs_and_all(houses, confi
 
     agent = make_agent("camp", config())
     shown = Demonstrations(Watched(), agent, experts_of(load_dataset(houses)))
-    shown.begin(3)
-    batch = shown.collect(150, agent.initial_state(2))
+    shown.loop.reset(seed=3)
+    batch = shown.collect(150)
     assert len(ends) >= 2
     assert all(ends)
-    option = batch.record["option"]
+    option = batch.record.option
     assert ((option == PUSH) | (option == PICK)).any()
-    assert (batch.record["action"] == WAIT).any()
+    assert any(waits)
     assert torch.isfinite(agent.evaluate(batch).log_prob).all()
 
 

@@ -16,8 +16,8 @@ from small_worlds import SIZE, Cue, Mixed  # noqa: E402
 
 from internav_data.camp.agents import make_agent  # noqa: E402
 from internav_data.camp.agents.flat import PPOAgent  # noqa: E402
-from internav_data.camp.collect import Collector, orders_of, uniforms_of  # noqa: E402
 from internav_data.camp.ppo import set_rate, update  # noqa: E402
+from internav_data.camp.rollout import Collector, orders_of, uniforms_of  # noqa: E402
 
 pytestmark = pytest.mark.learning
 
@@ -34,7 +34,7 @@ def settings(config):
 def lives(agent, env, settings):
     """Train an agent; yield the share of successes among its last episodes after each rollout."""
     collector = Collector(env, agent)
-    collector.begin(env.reset()[0])
+    collector.loop.reset()
     optimiser = torch.optim.Adam(agent.optimised(), RATE)
     ended = [False] * LAST
     for number in range(ROLLOUTS):

@@ -31,9 +31,9 @@ def agent(config):
 
 def test_corners_of_a_flat_thing_seen_straight_ahead(agent):
     """Pixels 10 and 11 of 16 lie between slopes 5/16 and 7/16 to the right; 6 and 7 above."""
-    sighted = agent.sighted(scene())
-    assert sighted["objects"][0, 0].tolist() == [2, -1, -1, -1, -1, -1]
-    corners = sighted["corners"][0, 0, 0]
+    objects, corners = agent.sighted(scene())
+    assert objects[0, 0].tolist() == [2, -1, -1, -1, -1, -1]
+    corners = corners[0, 0, 0]
     low, high = corners.min(0).values, corners.max(0).values
     assert low.tolist() == pytest.approx([2.0, -2 * 7 / 16, 2 * 1 / 16])
     assert high.tolist() == pytest.approx([2.0, -2 * 5 / 16, 2 * 3 / 16])
@@ -43,7 +43,7 @@ def test_corners_of_a_flat_thing_seen_straight_ahead(agent):
 def test_corners_are_level_when_the_camera_looks_down(agent):
     """The middle of a picture taken 30 degrees down at depth d is d cos 30 ahead, d sin 30 down."""
     seen = scene(horizon=2, pixels=((7, 9), (7, 9)))
-    corners = agent.sighted(seen)["corners"][0, 0, 0]
+    corners = agent.sighted(seen)[1][0, 0, 0]
     middle = corners.mean(0).tolist()
     assert middle[0] == pytest.approx(2 * math.cos(math.pi / 6), abs=0.1)
     assert middle[1] == pytest.approx(0.0, abs=1e-6)
@@ -55,13 +55,13 @@ def test_the_nearest_come_first_and_no_more_than_asked_for(agent):
     for k in range(8):
         seen["ids"][0, 0, 0, k] = 10 + k
         seen["depth"][0, 0, 0, k] = 1.5 - 0.1 * k
-    sighted = agent.sighted(seen)
-    assert sighted["objects"][0, 0].tolist() == [16, 15, 14, 13, 12, 11]
+    objects, _ = agent.sighted(seen)
+    assert objects[0, 0].tolist() == [16, 15, 14, 13, 12, 11]
 
 
 def test_at_the_start_nothing_is_foreseen_to_move(agent):
     corners = torch.randn(2, 5, 8, 3)
-    ahead = agent.foreseen(torch.randn(2, 5, 64), corners)
+    ahead = agent.predicted(torch.randn(2, 5, 64), corners)
     torch.testing.assert_close(ahead, corners.unsqueeze(-3).expand(2, 5, 12, 8, 3))
 
 
@@ -69,18 +69,18 @@ def test_the_loss_is_how_far_things_in_sight_went_unforeseen(collected):
     """0.1 m ahead for all corners of one thing: L1 is 0.1 / 3, times the weight 3."""
     agent, _, (rollout, _) = collected("nie")
     record = rollout.batch.record
-    record["corners"] = torch.zeros_like(record["corners"])
-    record["objects"] = torch.full_like(record["objects"], -1)
-    record["objects"][..., 0] = 4
-    record["corners"][1:, :, 0, :, 0] += 0.1
-    record["objects"][5:, 1, 0] = 9  # another thing: nothing is known of where 4 went
+    record.corners.zero_()
+    record.objects.fill_(-1)
+    record.objects[..., 0] = 4
+    record.corners[1:, :, 0, :, 0] += 0.1
+    record.objects[5:, 1, 0] = 9  # another thing: nothing is known of where 4 went
     rollout.batch.starts[1:] = False
     rollout.batch.starts[3, 2] = True  # another episode
     loss = agent.evaluate(rollout.batch).loss
     right = torch.zeros(8, 4)
     right[0] = 0.1
     torch.testing.assert_close(loss, right)
-    record["corners"][1:, :, 0, :, 0] += torch.arange(7)[:, None, None] * 0.1
+    record.corners[1:, :, 0, :, 0] += torch.arange(7)[:, None, None] * 0.1
     loss = agent.evaluate(rollout.batch).loss
     right[:7] = 0.1
     right[2, 2] = right[4, 1] = 0.0
@@ -91,7 +91,7 @@ def test_nobody_in_sight_changes_nothing(agent):
     seen = {**scene(), "rgb": torch.zeros(1, 1, SIZE, SIZE, 3, dtype=torch.uint8)}
     seen |= {"goal": torch.ones(1, 1, 2), "held": torch.zeros(1, 1).long()}
     seen["ids"][:] = -1
-    features = agent.features(seen, agent.sighted(seen))
+    features = agent.summarised(agent.encoder(seen), *agent.sighted(seen))
     assert torch.isfinite(features).all()
     assert not features[..., -64:].any()
 

@@ -8,10 +8,14 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from internav_data.camp.agents import Auxiliary, make_agent  # noqa: E402
-from internav_data.camp.collect import Collector, orders_of, uniforms_of  # noqa: E402
+from internav_data.camp.agents import AuxiliaryAgent, make_agent  # noqa: E402
 from internav_data.camp.ppo import explained_variance, set_rate, update  # noqa: E402
-from internav_data.camp.rollout import Rollout  # noqa: E402
+from internav_data.camp.rollout import (  # noqa: E402
+    Collector,
+    Rollout,
+    orders_of,
+    uniforms_of,
+)
 from internav_data.records.errors import NotFiniteError  # noqa: E402
 
 MIDDLE = 3e-3
@@ -47,7 +51,7 @@ def test_the_first_ratio_is_one_and_an_update_changes_what_is_optimised(collecte
 
 def test_auxiliary_tasks_learn_with_critics_of_their_own(collected, config):
     hierarchy = make_agent("camp", config())
-    agent = Auxiliary(hierarchy, ["navigate", "push", "pick", "push"])
+    agent = AuxiliaryAgent(hierarchy, ["navigate", "push", "pick", "push"])
     _, _, (rollout,) = collected("", rollouts=1, agent=agent)
     before = parameters(hierarchy)
     assert learnt(agent, rollout, config().ppo)["ratio_error"] < 1e-5
@@ -99,7 +103,7 @@ def _part(agent, optimiser, rollout, config, columns):
     returns = (advantages + rollout.values)[:, columns]
     advantages = (advantages - advantages.mean()) / (advantages.std(correction=0) + 1e-8)
     advantages = advantages[:, columns]
-    now = agent.evaluate(rollout.batch.of(torch.tensor(columns)))
+    now = agent.evaluate(rollout.batch.select(torch.tensor(columns)))
     ratio = (now.log_prob - rollout.log_probs[:, columns]).exp()
     gain = torch.minimum(ratio * advantages, ratio.clamp(0.8, 1.2) * advantages)
     loss = -gain.mean() + 0.25 * (now.value - returns).square().mean()
@@ -165,7 +169,7 @@ def _columns(rollout, part):
         for f in dataclasses.fields(Rollout)
         if f.name not in {"batch", "last_value", "finished"}
     }
-    batch = rollout.batch.of(torch.tensor(part))
+    batch = rollout.batch.select(torch.tensor(part))
     return Rollout(batch, last_value=rollout.last_value[part], **tensors)
 
 
@@ -245,7 +249,7 @@ def test_a_critic_learns_what_is_paid(config, fake):
     env = Paying(done_ends=False)
     agent = make_agent("ppo", config())
     collector = Collector(env, agent)
-    collector.begin(env.reset()[0])
+    collector.loop.reset()
     ppo = dataclasses.replace(config().ppo, gamma=1.0, clip_coef=0.2, ent_coef=0.0)
     optimiser = adam(agent, 1e-2)
     for number in range(30):

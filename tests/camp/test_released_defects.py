@@ -9,8 +9,8 @@ torch = pytest.importorskip("torch")
 
 from internav_data.camp.agents import AGENTS, Agent, make_agent  # noqa: E402
 from internav_data.camp.agents.options import NAVIGATE, PICK, PUSH, option_step  # noqa: E402
-from internav_data.camp.collect import Collector, orders_of, uniforms_of  # noqa: E402
 from internav_data.camp.ppo import update  # noqa: E402
+from internav_data.camp.rollout import Collector, orders_of, uniforms_of  # noqa: E402
 from internav_data.records.errors import NotFiniteError  # noqa: E402
 
 
@@ -26,10 +26,10 @@ def test_defect_1_no_option_lives_on_a_module(collected):
         now = agent.evaluate(rollout.batch)
         torch.testing.assert_close(now.log_prob, rollout.log_probs, atol=1e-5, rtol=0)
         record, starts = rollout.batch.record, rollout.batch.starts
-        assert not record["open"][starts].any()
-        assert not record["used"][starts].any()
-        assert record["decide"][starts].all()
-        acting = (record["option"] == PUSH) | (record["option"] == PICK)
+        assert not record.open[starts].any()
+        assert not record.used[starts].any()
+        assert record.decide[starts].all()
+        acting = (record.option == PUSH) | (record.option == PICK)
         inside |= bool((rollout.truncated & acting).any())
     assert inside, "a time-out hit an interaction"
     assert {k: v for k, v in vars(agent).items() if not k.startswith("_")} == before
@@ -40,11 +40,10 @@ def test_defect_2_the_mixture_is_a_distribution(collected):
     agent, _, (_, rollout) = collected("camp")
     batch = rollout.batch
     ran = agent.run(
-        batch.observations, batch.course, batch.state,
-        {name: batch.record[name] for name in ("open", "used")},
+        batch.observations, batch.segments, batch.state, batch.record.open, batch.record.used
     )  # fmt: skip
     torch.testing.assert_close(ran.intent.sum(-1), torch.ones(8, 4))
-    acts, meant = ran.acts.exp(), ran.meant
+    acts, meant = ran.action_log_probs.exp(), ran.intended_option_probs
     for look in (3, 4):
         right = meant[..., NAVIGATE] * acts[..., NAVIGATE, look]
         torch.testing.assert_close(ran.intent[..., look], right)
@@ -65,7 +64,7 @@ def test_defect_3_cut_off_from_the_goal_is_a_failure_that_counts(fake, config):
     agent = make_agent("ppo", config())
     env = CutOff()
     collector = Collector(env, agent)
-    collector.begin(env.reset()[0])
+    collector.loop.reset()
     rollout = collector.collect(uniforms_of(0, 0, range(4), 40))
     over = rollout.terminated | rollout.truncated
     assert len(rollout.finished) == int(over.sum()) > 4
@@ -123,7 +122,7 @@ def test_defect_7_what_is_no_number_stops_and_is_named(fake, config, wrong, wher
 
     env = Broken(done_ends=False)
     collector = Collector(env, make_agent("camp", config()), seed=40)
-    collector.begin(env.reset()[0])
+    collector.loop.reset()
     with pytest.raises(NotFiniteError, match=rf"environment 2 \(seed 42\): {where}"):
         collector.collect(uniforms_of(0, 0, range(4), 8))
 

@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip("torch")
 
 from internav_data.camp.config import from_mapping, preset
-from internav_data.camp.stages import PARTS, order_seed, plan
+from internav_data.camp.stages import PARTS, order_seed, schedule
 from internav_data.records.errors import UsageError
 
 
@@ -19,7 +19,7 @@ def steps_of(stages, config):
 @pytest.mark.parametrize("name", ["small", "paper"])
 def test_every_method_gets_the_same_steps(name):
     config = preset(name)
-    deep, flat = (plan(config, PARTS, hierarchical=deep) for deep in (True, False))
+    deep, flat = (schedule(config, PARTS, hierarchical=deep) for deep in (True, False))
     assert sum(steps_of(deep, config).values()) == sum(steps_of(flat, config).values())
     assert sum(steps_of(deep, config).values()) == pytest.approx(
         config.stages.total_timesteps, rel=1e-2
@@ -30,7 +30,7 @@ def test_every_method_gets_the_same_steps(name):
 
 def test_the_papers_stages_are_one_policy_after_the_other():
     config = preset("paper")
-    stages = plan(config, PARTS, hierarchical=True)
+    stages = schedule(config, PARTS, hierarchical=True)
     assert [stage.name for stage in stages] == [
         "auxiliary-navigate", "auxiliary-push", "auxiliary-pick", "single", "all",
     ]  # fmt: skip
@@ -53,12 +53,12 @@ def test_the_papers_stages_are_one_policy_after_the_other():
 
 
 def test_small_trains_the_tasks_side_by_side_and_decays_in_each_stage():
-    stages = plan(preset("small"), PARTS, hierarchical=True)
+    stages = schedule(preset("small"), PARTS, hierarchical=True)
     assert [stage.name for stage in stages] == ["auxiliary", "single", "all"]
     assert stages[0].tasks == ("navigate",) * 6 + ("push",) * 5 + ("pick",) * 5
     assert {(stage.decay_from, stage.decay_to) for stage in stages} == {(0.0, 1.0)}
     assert [stage.critic for stage in stages] == ["auxiliary", "main", "main"]
-    flat = plan(preset("small"), PARTS, hierarchical=False)
+    flat = schedule(preset("small"), PARTS, hierarchical=False)
     assert {stage.critic for stage in flat} == {"main"}
     assert {stage.rate for stage in flat} == {3e-4}
     assert not any(stage.tasks for stage in flat)
@@ -66,23 +66,23 @@ def test_small_trains_the_tasks_side_by_side_and_decays_in_each_stage():
 
 def test_a_part_alone_is_that_part_of_the_whole():
     config = preset("small")
-    whole = plan(config, PARTS, hierarchical=True)
-    assert [plan(config, (part,), hierarchical=True)[0] for part in PARTS] == whole
+    whole = schedule(config, PARTS, hierarchical=True)
+    assert [schedule(config, (part,), hierarchical=True)[0] for part in PARTS] == whole
 
 
 @pytest.mark.parametrize("parts", [(), ("al",), ("all", "single"), ("auxiliary", "all")])
 def test_parts_follow_each_other(parts):
     with pytest.raises(UsageError, match="--stages"):
-        plan(preset("small"), parts, hierarchical=True)
+        schedule(preset("small"), parts, hierarchical=True)
 
 
 def test_what_leaves_nothing_to_do_is_refused():
     tiny = from_mapping(preset("small"), {"stages": {"total_timesteps": 1000}}, "test")
     with pytest.raises(UsageError, match="less than one update of 1024"):
-        plan(tiny, ("auxiliary",), hierarchical=True)
+        schedule(tiny, ("auxiliary",), hierarchical=True)
     two = from_mapping(preset("small"), {"ppo": {"num_envs": 2, "num_minibatches": 1}}, "test")
     with pytest.raises(UsageError, match="3 at least"):
-        plan(two, PARTS, hierarchical=True)
+        schedule(two, PARTS, hierarchical=True)
 
 
 def test_orders_of_episodes_differ_by_stage_and_seed():

@@ -1,10 +1,12 @@
 """What an agent did is told again, to the last probability, by every learner."""
 
+import dataclasses
+
 import pytest
 
 torch = pytest.importorskip("torch")
 
-from internav_data.camp.agents import Auxiliary, make_agent  # noqa: E402
+from internav_data.camp.agents import AuxiliaryAgent, make_agent  # noqa: E402
 from internav_data.camp.networks import EpisodeSegments  # noqa: E402
 
 LEARNERS = [
@@ -40,7 +42,7 @@ def test_log_probabilities_and_values_are_those_of_the_rollout(
         now = agent.evaluate(rollout.batch)
         torch.testing.assert_close(now.log_prob, rollout.log_probs, atol=1e-5, rtol=0)
         torch.testing.assert_close(now.value, rollout.values, atol=1e-5, rtol=0)
-        parts = rollout.batch.of(torch.tensor([2, 0]))
+        parts = rollout.batch.select(torch.tensor([2, 0]))
         mine = agent.evaluate(parts).log_prob
         torch.testing.assert_close(mine, rollout.log_probs[:, [2, 0]], atol=1e-5, rtol=0)
     assert any(rollout.batch.starts[1:].any() for rollout in lived)
@@ -52,13 +54,16 @@ def test_log_probabilities_and_values_are_those_of_the_rollout(
 def test_auxiliary_tasks_are_replayed_too(collected, config, shared):
     hierarchy = make_agent("camp", config(network={"shared_encoder": shared}))
     agent, _, lived = collected(
-        "", rollouts=3, agent=Auxiliary(hierarchy, ["navigate", "push", "pick", "push"]), steps=16
+        "",
+        rollouts=3,
+        agent=AuxiliaryAgent(hierarchy, ["navigate", "push", "pick", "push"]),
+        steps=16,
     )
     for rollout in lived:
         now = agent.evaluate(rollout.batch)
         torch.testing.assert_close(now.log_prob, rollout.log_probs, atol=1e-5, rtol=0)
         torch.testing.assert_close(now.value, rollout.values, atol=1e-5, rtol=0)
-    assert lived[0].batch.record["used"].max() > 1
+    assert lived[0].batch.record.used.max() > 1
 
 
 @pytest.mark.parametrize("method", ["ppo-intent", "camp"])
@@ -69,8 +74,9 @@ def test_intents_worked_out_again_are_those_recorded(collected, curious, method,
     )
     for rollout in lived:
         batch = rollout.batch
-        recorded = batch.record.pop("intent")
-        again = agent.evaluate(batch)
+        recorded = batch.record.intent
+        record = dataclasses.replace(batch.record, intent=None)
+        again = agent.evaluate(dataclasses.replace(batch, record=record))
         torch.testing.assert_close(again.intent, recorded, atol=1e-5, rtol=0)
         torch.testing.assert_close(again.log_prob, rollout.log_probs, atol=1e-5, rtol=0)
         assert recorded.std(0).max() > 1e-3  # intents differ from step to step
@@ -102,13 +108,13 @@ def test_a_chunk_is_one_call():
 
 def test_a_rollout_goes_on_where_the_last_one_stopped(collected):
     """Two rollouts of 8 are one of 16."""
-    from internav_data.camp.collect import uniforms_of
+    from internav_data.camp.rollout import uniforms_of
 
     agent, collector, short = collected("camp", rollouts=2, steps=8)
-    env = type(collector.env)()
+    env = type(collector.loop.env)()
     uniforms = torch.cat([uniforms_of(0, r, range(4), 8) for r in range(2)])
     whole = type(collector)(env, agent)
-    whole.begin(env.reset()[0])
+    whole.loop.reset()
     long = whole.collect(uniforms)
     torch.testing.assert_close(long.log_probs, torch.cat([r.log_probs for r in short]))
     torch.testing.assert_close(long.last_value, short[1].last_value)

@@ -86,8 +86,10 @@ class Recorder:
         self.seen.append({name: what.clone() for name, what in seen.items()})
         age = torch.where(starts, torch.zeros(()), state["age"]) + 1
         action = torch.where(age >= 4, 11, 1)
-        record = {"plan": torch.tensor([[0.7, 0.1, 0.1, 0.1]]).repeat(len(age), 1)}
-        record["option"] = torch.zeros(len(age), dtype=torch.int64)
+        record = types.SimpleNamespace(
+            option_probs=torch.tensor([[0.7, 0.1, 0.1, 0.1]]).repeat(len(age), 1),
+            option=torch.zeros(len(age), dtype=torch.int64),
+        )
         return types.SimpleNamespace(action=action, state={"age": age}, record=record)
 
 
