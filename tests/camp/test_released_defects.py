@@ -76,13 +76,19 @@ def test_defect_3_cut_off_from_the_goal_is_a_failure_that_counts(fake, config):
 
 def test_defect_4_a_move_counts_once():
     """Pushes and looks after a move add nothing to the path."""
-    from internav_data.envs.tasks import EpisodeStatistics, metrics
+    from types import SimpleNamespace
 
-    tally = EpisodeStatistics(moves=4)
-    tally.tried["push"] = tally.done["push"] = 7
-    said = metrics(tally, success=True, shortest_path_m=1.0, steps=12, distance_m=0.0)
-    assert said["path_m"] == 1.0
-    assert said["spl"] == 1.0
+    from internav_data.envs.tasks import InteractiveNavigation, TaskConfig
+
+    world = SimpleNamespace(i=0, j=0, lattice=None)
+    distances = SimpleNamespace(at=lambda _i, _j: 0.0)
+    task = InteractiveNavigation(world, distances, TaskConfig(), shortest_path_m=1.0)
+    task.success, statistics = True, task.statistics
+    statistics.moves, statistics.steps = 4, 12
+    statistics.tried["push"] = statistics.done["push"] = 7
+    found = task.metrics()
+    assert found["path_m"] == 1.0
+    assert found["spl"] == 1.0
 
 
 def test_defect_5_no_synchronisation_within_an_update(collected, config, monkeypatch):
