@@ -6,7 +6,7 @@ camp-eval my-agent data/mine
 
 import sys
 
-from internav_data.camp.checkpoint import export_agent
+from internav_data import export_agent
 
 run, folder = sys.argv[1:3]
 print("wrote", export_agent(run, folder))

@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING
 from internav_data.core.lazy import lazy_imports
 
 if TYPE_CHECKING:
-    from internav_data.camp.checkpoint import load_agent
+    from internav_data.camp.checkpoint import export_agent, load_agent
     from internav_data.dataset import Dataset, compute_stats, load_dataset
+    from internav_data.evaluation import evaluate
     from internav_data.generation import generate_episodes, generate_house
     from internav_data.records.version import __version__
 
@@ -26,6 +27,8 @@ __all__ = [
     "Dataset",
     "__version__",
     "compute_stats",
+    "evaluate",
+    "export_agent",
     "generate_episodes",
     "generate_house",
     "load_agent",
@@ -35,8 +38,9 @@ __all__ = [
 __getattr__, __dir__ = lazy_imports(
     __name__,
     {
-        "camp.checkpoint": ["load_agent"],
+        "camp": ["export_agent", "load_agent"],
         "dataset": ["Dataset", "compute_stats", "load_dataset"],
+        "evaluation": ["evaluate"],
         "generation": ["generate_episodes", "generate_house"],
         "records.version": ["__version__"],
     },

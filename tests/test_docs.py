@@ -103,7 +103,7 @@ def test_examples_run(example, small_dataset, small_run, tmp_path):
 def test_the_agent_that_ships_plays(small_dataset):
     from internav_data import load_dataset
     from internav_data.camp.policy import candidate
-    from internav_data.evaluation.evaluate import EvaluationConfig, evaluate
+    from internav_data.evaluation.evaluator import EvaluationConfig, evaluate
 
     dataset, settings = load_dataset(small_dataset), EvaluationConfig(limit=2, max_steps=20)
     shipped = ROOT / "examples" / "camp-small"

@@ -59,6 +59,26 @@ assert len(ds.to_table()) == 1
     assert not modules_after(code) & (HEAVY - {"pandas"})
 
 
+@pytest.mark.parametrize("package", ["camp", "evaluation"])
+def test_public_names_of_a_room_are_lazy(package):
+    """Each can be imported from the room, and importing the room alone imports nothing heavy."""
+    from importlib import import_module
+
+    if package == "camp":
+        pytest.importorskip("torch")
+    module = import_module(f"internav_data.{package}")
+    for name in module.__all__:
+        assert getattr(module, name) is not None
+    assert set(module.__all__) <= set(dir(module))
+    before = modules_after("import typing, importlib")
+    new = modules_after(f"import internav_data.{package}") - before
+    assert new - sys.stdlib_module_names == {"internav_data"}
+
+
+def test_evaluation_needs_no_torch():
+    assert "torch" not in modules_after("from internav_data import evaluate")
+
+
 def test_facade_names_what_it_has():
     import internav_data
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from internav_data.dataset import Dataset
     from internav_data.evaluation.archive import Evaluation
-    from internav_data.evaluation.evaluate import EvaluationConfig
+    from internav_data.evaluation.evaluator import EvaluationConfig
     from internav_data.evaluation.statements import Methods
 
 _REPORT = "report.html"
@@ -122,7 +122,7 @@ def evaluate_command(**given: Any) -> int:  # noqa: ANN401 - the options above
         forget_evaluations,
         write_evaluation,
     )
-    from internav_data.evaluation.evaluate import evaluate
+    from internav_data.evaluation.evaluator import evaluate
     from internav_data.evaluation.report import methods_of
     from internav_data.evaluation.videos import videos
 
@@ -213,7 +213,7 @@ def _dataset(given: dict[str, Any]) -> Dataset[Any]:
 
 
 def _settings(given: dict[str, Any]) -> EvaluationConfig:
-    from internav_data.evaluation.evaluate import EvaluationConfig
+    from internav_data.evaluation.evaluator import EvaluationConfig
 
     names = ("seed", "batch", "workers", "max_steps", "limit")
     return EvaluationConfig(**{name: given[name] for name in names})

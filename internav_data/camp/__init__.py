@@ -1,1 +1,70 @@
-"""CaMP and its baselines: trained on the shards, measured like the paper."""
+"""Trainer of CaMP and its baselines; needs torch.
+
+Read it in the order `config`, `networks`, `agents`, `rollout`, `ppo`, `train`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from internav_data.core.lazy import lazy_imports
+
+if TYPE_CHECKING:
+    from internav_data.camp.agents import (
+        Agent,
+        AgentStep,
+        Batch,
+        Evaluated,
+        State,
+        StepRecord,
+        make_agent,
+    )
+    from internav_data.camp.agents.protocol import one_step, reset_where_done
+    from internav_data.camp.checkpoint import export_agent, load_agent
+    from internav_data.camp.config import CampConfig, preset
+    from internav_data.camp.networks import (
+        Encoder,
+        RecurrentActorCritic,
+        drawn,
+        entropy_of,
+        log_prob_of,
+    )
+    from internav_data.camp.rollout import Collector, Rollout, uniforms_of
+
+__all__ = [
+    "Agent",
+    "AgentStep",
+    "Batch",
+    "CampConfig",
+    "Collector",
+    "Encoder",
+    "Evaluated",
+    "RecurrentActorCritic",
+    "Rollout",
+    "State",
+    "StepRecord",
+    "drawn",
+    "entropy_of",
+    "export_agent",
+    "load_agent",
+    "log_prob_of",
+    "make_agent",
+    "one_step",
+    "preset",
+    "reset_where_done",
+    "uniforms_of",
+]
+
+__getattr__, __dir__ = lazy_imports(
+    __name__,
+    {
+        "agents": [
+            "Agent", "AgentStep", "Batch", "Evaluated", "State", "StepRecord", "make_agent",
+        ],
+        "agents.protocol": ["one_step", "reset_where_done"],
+        "checkpoint": ["export_agent", "load_agent"],
+        "config": ["CampConfig", "preset"],
+        "networks": ["Encoder", "RecurrentActorCritic", "drawn", "entropy_of", "log_prob_of"],
+        "rollout": ["Collector", "Rollout", "uniforms_of"],
+    },
+)  # fmt: skip

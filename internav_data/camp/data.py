@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from internav_data.camp.policy import AgentPolicy
 from internav_data.dataset import load_dataset
 from internav_data.dataset.select import condition
-from internav_data.evaluation.evaluate import EvaluationConfig, evaluate
+from internav_data.evaluation.evaluator import EvaluationConfig, evaluate
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 
 from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.evaluation.archive import About
-from internav_data.evaluation.evaluate import episode_generator
+from internav_data.evaluation.evaluator import episode_generator
 from internav_data.evaluation.reference_policies import REFERENCE_POLICIES, reference_policy
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import ACTIONS
@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 
     from internav_data.dataset import Dataset
     from internav_data.envs.types import Observations
-    from internav_data.evaluation.evaluate import EvaluationConfig, Policy
-    from internav_data.evaluation.policies import Note
+    from internav_data.evaluation.evaluator import EvaluationConfig, Note, Policy
     from internav_data.records import Episode
 
 _CHECKPOINT: Final = "internav_data.camp.checkpoint"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from internav_data.evaluation.evaluate import episode_generator
+from internav_data.evaluation.evaluator import episode_generator
 from internav_data.records.errors import UsageError
 from internav_data.world import ACTION_COUNT, Action
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.dataset import Dataset
-    from internav_data.evaluation.evaluate import Policy
+    from internav_data.evaluation.evaluator import Policy
     from internav_data.navigation import Lattice
     from internav_data.records import Episode
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from internav_data.dataset import load_dataset
-from internav_data.evaluation.evaluate import EvaluationConfig, evaluate
+from internav_data.evaluation.evaluator import EvaluationConfig, evaluate
 from internav_data.evaluation.report import episodes_by_id, picked, push_model_of
 
 if TYPE_CHECKING:
@@ -16,9 +16,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.dataset import Dataset
-    from internav_data.evaluation.evaluate import Policy
+    from internav_data.evaluation.evaluator import Note, Policy
     from internav_data.evaluation.metrics import EpisodeResult
-    from internav_data.evaluation.policies import Note
     from internav_data.records import Episode
 
 SIZE: Final = 320

@@ -18,7 +18,7 @@ CONFIGS = {
     "generation.config": "GenerationConfig",
     "houses.config": "HouseConfig",
     "episodes.config": "EpisodeConfig",
-    "evaluation.evaluate": "EvaluationConfig",
+    "evaluation.evaluator": "EvaluationConfig",
     "camp.config": "CampConfig",
 }
 

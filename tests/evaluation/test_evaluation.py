@@ -6,7 +6,7 @@ import pytest
 from internav_data.dataset import load_dataset
 from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.envs.single import InterNavEnv
-from internav_data.evaluation.evaluate import EvaluationConfig, chosen, episode_generator, evaluate
+from internav_data.evaluation.evaluator import EvaluationConfig, chosen, episode_generator, evaluate
 from internav_data.evaluation.reference_policies import (
     RandomPolicy,
     ScriptedPolicy,

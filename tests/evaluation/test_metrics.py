@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from internav_data.dataset import from_table, to_table
-from internav_data.evaluation.evaluate import EvaluationConfig, evaluate
+from internav_data.evaluation.evaluator import EvaluationConfig, evaluate
 from internav_data.evaluation.metrics import GROUPS, MEASURES, RESULTS, result_of, summary
 from internav_data.evaluation.reference_policies import reference_policy
 from internav_data.verification.checked_layout import CheckedLayout

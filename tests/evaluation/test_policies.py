@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from internav_data.camp.policy import AgentPolicy, candidate, reference_policies_beside, row_name
-from internav_data.evaluation.evaluate import EvaluationConfig, episode_generator, evaluate
+from internav_data.evaluation.evaluator import EvaluationConfig, episode_generator, evaluate
 from internav_data.records.errors import UsageError
 
 torch = pytest.importorskip("torch")

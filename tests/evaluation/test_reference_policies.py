@@ -4,7 +4,7 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from internav_data.evaluation.evaluate import EvaluationConfig, evaluate
+from internav_data.evaluation.evaluator import EvaluationConfig, evaluate
 from internav_data.evaluation.metrics import summary
 from internav_data.evaluation.reference_policies import (
     nearest,

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from internav_data.evaluation.archive import About, Evaluation
-from internav_data.evaluation.evaluate import EvaluationConfig, evaluate
+from internav_data.evaluation.evaluator import EvaluationConfig, evaluate
 from internav_data.evaluation.reference_policies import reference_policy
 from internav_data.evaluation.report import (
     data_of,

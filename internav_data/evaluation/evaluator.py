@@ -32,6 +32,10 @@ if TYPE_CHECKING:
 
     Tell = Callable[[int, int], None]
 
+Note = tuple[str, tuple[str, ...], tuple[float, ...], int]
+"""Distribution that a policy drew from: a title, names, a probability for each, and the number of
+the one that was drawn (-1: none)."""
+
 STEPS_AT_MOST = 10_000
 """Upper bound of `EvaluationConfig.max_steps`."""
 
