@@ -57,7 +57,7 @@ def best_ms(work: Callable[[], object], runs: int) -> float:
 
 
 def plain_lattice(solid: NDArray[Any], house: House, shape: tuple[int, int]) -> nx.Graph:
-    """Return nodes and swept edges by shapely distances, found through a search tree."""
+    """Return nodes and swept edges by shapely distances to polygons `solid` (n,), in a tree."""
     i, j = (a.ravel() for a in np.indices(shape))
     tree = shapely.STRtree(solid)
     points = shapely.points(SPACING_M * np.column_stack([i, j]).astype(float))
@@ -83,7 +83,7 @@ def plain_lattice(solid: NDArray[Any], house: House, shape: tuple[int, int]) -> 
 
 
 def plain_distance(solid: NDArray[Any], p: Vec2, q: Vec2) -> float | None:
-    """Return the shortest path's length by a visibility graph of the grown union's corners."""
+    """Return the shortest path's length among polygons `solid` (n,) by a visibility graph."""
     area = shapely.union_all(shapely.buffer(solid, CLEARANCE_M, quad_segs=CHORDS))
     core = shapely.union_all(shapely.buffer(solid, CLEARANCE_M - 1e-6, quad_segs=CHORDS))
     shapely.prepare(core)
@@ -145,7 +145,7 @@ def agree(ours: float | None, plain: float | None) -> bool:
 def path_times(
     times: dict[str, list[float]], polygons: Polygons, solid: NDArray[Any], asked: list[Any]
 ) -> int:
-    """Time shortest paths; the plain side, which takes long, answers one question of each kind.
+    """Time shortest paths among polygons `solid` (n,); the plain side answers one of each kind.
 
     Returns the number of answers that differ.
     """

@@ -259,7 +259,10 @@ DIALECT_OF_ROOM = {
 }
 """Names that were replaced in one room only: the word is good elsewhere."""
 
-STRICT_SHAPES = frozenset({"envs", "geometry", "navigation", "physics", "render", "world"})
+STRICT_SHAPES = frozenset(
+    {"envs", "geometry", "navigation", "physics", "planner", "render"}
+    | {"verification", "views", "world"}
+)
 """Rooms where a public function of arrays without a shape in its docstring is a finding."""
 
 FIRST_WORD = re.compile(r"[A-Za-z]+")

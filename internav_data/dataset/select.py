@@ -89,7 +89,7 @@ def read_columns(
 
 
 def matching_rows(store: Store, files: Sequence[DataFile], filters: Filters) -> NDArray[np.int64]:
-    """Return the numbers of the episodes for which the filters hold, ascending.
+    """Return the numbers of the episodes for which the filters hold, (n,) int64, ascending.
 
     Only the filters' columns are read; pyarrow evaluates the conditions.
 

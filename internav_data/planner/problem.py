@@ -135,7 +135,11 @@ class PlanningProblem:
     def path(
         self, masks: Ints, banned: int, prices: Ints, costs: Costs, pose: int
     ) -> tuple[Ints, Ints]:
-        """Return the poses down a field to the goal, and the bits entered on each step."""
+        """Return the poses down a field to the goal, (n,) int64, and the bits entered on each step.
+
+        `masks` (3, nodes) and `prices` (62,) int64, `costs` (poses,) int32, as the methods above
+        return them.
+        """
         poses, entered = descend(self.fixed, masks, banned, prices, self.ny, costs, pose)
         return poses, entered
 
@@ -151,7 +155,10 @@ class PlanningProblem:
         return back.reshape(-1, 4)[:, [2, 3, 0, 1]].reshape(-1), back
 
     def walk(self, masks: Ints, back: Costs, pose: int) -> list[int]:
-        """Return the poses from the start of a reverse field (see `reach`) to a pose."""
+        """Return the poses from the start of a reverse field to a pose.
+
+        `back` (poses,) int32 as `reach` returns it; `masks` (3, nodes) int64.
+        """
         none = np.zeros(MAX_OBJECTS, dtype=np.int64)
         poses, _ = descend(self.fixed, masks, EVERYTHING, none, self.ny, back, turned_round(pose))
         return [turned_round(p) for p in reversed(poses.tolist())]

@@ -63,7 +63,7 @@ class CheckedLayout:
 
     @cached_property
     def components(self) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
-        """Component of every lattice node, -1 where not free."""
+        """Component of every lattice node, (n,) int64; -1 where not free."""
         return self.lattice.components()
 
     @cached_property

@@ -80,7 +80,7 @@ class Replay:
     def frames(
         self, *, size: int = SIZE, fps: float = FPS, panel: Panel | None = None
     ) -> Iterator[Image]:
-        """Draw the replay; parameters and frames as in `replay_frames`.
+        """Draw the replay as frames (h, w, 3) uint8; parameters as in `replay_frames`.
 
         Raises
         ------
