@@ -62,9 +62,9 @@ assets: st.SearchStrategy[Asset] = records(Asset)
 
 def plain(cls: type[Any], **values: Any) -> Any:
     """Return a record of zeros, empty strings and nothing, but for the values given."""
-    from internav_data.dataset.encode import _zero
+    from internav_data.dataset.encode import zero_value
 
-    made = {field.name: _zero(field.node, field.nullable) for field in record_node(cls).fields}
+    made = {field.name: zero_value(field.node, field.nullable) for field in record_node(cls).fields}
     if cls is House:
         made["assets"] = {}
     assert values.keys() <= {f.name for f in dataclasses.fields(cls)}

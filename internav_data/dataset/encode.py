@@ -72,7 +72,7 @@ def _encode(node: Node, values: list[Any], path: str, *, nullable: bool) -> pa.A
             field.node,
             # What lies under a null is never written, but Arrow wants something there.
             [
-                _zero(field.node, field.nullable) if v is None else getattr(v, field.name)
+                zero_value(field.node, field.nullable) if v is None else getattr(v, field.name)
                 for v in values
             ],
             f"{path}.{field.name}",
@@ -128,7 +128,8 @@ def _encode_sequence(
     )
 
 
-def _zero(node: Node, nullable: bool) -> Any:  # noqa: ANN401 - a value of any column
+def zero_value(node: Node, nullable: bool) -> Any:  # noqa: ANN401 - a value of any column
+    """Return the value of a column that says nothing: null, 0, "" or an empty sequence."""
     if nullable:
         return None
     if isinstance(node, Leaf):
@@ -139,5 +140,5 @@ def _zero(node: Node, nullable: bool) -> Any:  # noqa: ANN401 - a value of any c
         return ()
     if isinstance(node, Keyed):
         return {}
-    values = {f.name: _zero(f.node, f.nullable) for f in node.fields}
+    values = {f.name: zero_value(f.node, f.nullable) for f in node.fields}
     return node.cls(**values)

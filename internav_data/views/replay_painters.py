@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 AGENT: Final[RGB] = (196, 36, 112)
 """Colour of the agent and its trail."""
 _EDGE: Final[RGB] = (206, 204, 198)
-_GHOST: Final[RGB] = (120, 84, 10)
+GHOST: Final[RGB] = (120, 84, 10)
 _TARGET: Final[RGB] = (235, 60, 30)
 _MARGIN_M: Final = 0.7
 """Margin around a house on its map."""
@@ -100,7 +100,8 @@ class MapPainter:
         high = wide * height / self.size[0]
         x, y = (x0 + x1 - wide) / 2.0, (y0 + y1 - high) / 2.0
         self._low = (x, y)
-        self._canvas = Canvas((x, y), (x + wide, y + high), max(self.size), PAPER)
+        self.canvas = Canvas((x, y), (x + wide, y + high), max(self.size), PAPER)
+        """Canvas of the map: where a metre of the floor is drawn."""
         self._silhouettes: dict[tuple[int, Pose], list[Silhouette]] = {}
         self._first = {k: story.moments[0].pose(k) for k in self._moving()}
         self._walls = np.array([
@@ -116,7 +117,7 @@ class MapPainter:
         return (*self._story.moved, *self._story.moments[0].world.obstacles)
 
     def _static_map(self) -> Image:
-        story, canvas = self._story, self._canvas
+        story, canvas = self._story, self.canvas
         house, episode = story.model.house, story.episode
         gone = {story.model.object_ids[k] for k in story.moved}
         still = replace(house, objects=tuple(t for t in house.objects if t.object_id not in gone))
@@ -138,7 +139,7 @@ class MapPainter:
 
     def draw(self, shot: Shot) -> Image:
         """Return the map at a shot, (h, w, 3) uint8 RGB."""
-        canvas = self._canvas
+        canvas = self.canvas
         key = (tuple(shot.poses.items()), shot.target)
         if key == self._furnished[0]:
             canvas.image[:] = self._furnished[1]
@@ -165,7 +166,7 @@ class MapPainter:
         return found
 
     def _paint_objects(self, shot: Shot) -> None:
-        canvas, first = self._canvas, len(self._story.model.items)
+        canvas, first = self.canvas, len(self._story.model.items)
         for item, pose in shot.poses.items():
             parts = self._parts(item, pose)
             if not parts:
@@ -190,7 +191,7 @@ class MapPainter:
         for item, pose in poses.items():
             if pose != self._first[item]:
                 ring = _hull(self._parts(item, self._first[item]))
-                self._canvas.dashes(np.vstack([ring, ring[:1]]), _GHOST, 1.6, 0.07)
+                self.canvas.dashes(np.vstack([ring, ring[:1]]), GHOST, 1.6, 0.07)
 
     def _paint_arrows(self, poses: Mapping[int, Pose | None]) -> None:
         """Draw arrows from the first poses of objects to their present ones."""
@@ -205,32 +206,32 @@ class MapPainter:
             tail, tip = np.array((begin.x, begin.y)), np.array((pose.x, pose.y))
             ahead = (tip - tail) / float(np.linalg.norm(tip - tail))
             aside = np.array((-ahead[1], ahead[0])) * 0.07
-            self._canvas.line(np.array([tail, tip - 0.1 * ahead]), _GHOST, 1.8)
+            self.canvas.line(np.array([tail, tip - 0.1 * ahead]), GHOST, 1.8)
             back = tip - 0.16 * ahead
-            self._canvas.fill(np.array([tip, back + aside, back - aside]), _GHOST)
+            self.canvas.fill(np.array([tip, back + aside, back - aside]), GHOST)
 
     def _paint_trail(self, shot: Shot) -> None:
         if len(shot.trail) > 1:
-            self._canvas.line(shot.trail, PAPER, 5.0)
-            self._canvas.line(shot.trail, AGENT, 2.6)
+            self.canvas.line(shot.trail, PAPER, 5.0)
+            self.canvas.line(shot.trail, AGENT, 2.6)
 
     def _paint_cone(self, shot: Shot) -> None:
         """Tint the camera's field of view up to the agent's reach."""
         at = np.array((shot.x, shot.y))
         left, right = shot.yaw_deg - _HALF_VIEW_DEG, shot.yaw_deg + _HALF_VIEW_DEG
-        arc = self._canvas.arc((shot.x, shot.y), REACH_M, left, right)
-        cone = np.vstack([at, at + (arc - at) * _visible_shares(at, arc, self._walls)[:, None]])
-        window = self._canvas.window(
+        arc = self.canvas.arc((shot.x, shot.y), REACH_M, left, right)
+        cone = np.vstack([at, at + (arc - at) * visible_shares(at, arc, self._walls)[:, None]])
+        window = self.canvas.window(
             (float(cone[:, 0].min()), float(cone[:, 1].min())),
             (float(cone[:, 0].max()), float(cone[:, 1].max())),
         )
-        part = self._canvas.image[window].copy()
-        self._canvas.fill(cone, AGENT)
-        tinted = self._canvas.image[window]
+        part = self.canvas.image[window].copy()
+        self.canvas.fill(cone, AGENT)
+        tinted = self.canvas.image[window]
         tinted[:] = cv2.addWeighted(part, 0.74, tinted, 0.26, 0.0)
 
     def _paint_agent(self, shot: Shot) -> None:
-        canvas, at = self._canvas, np.array((shot.x, shot.y))
+        canvas, at = self.canvas, np.array((shot.x, shot.y))
         radius = max(_RADIUS_M, _MIN_RADIUS_PX / canvas.scale)
         turn = math.radians(shot.yaw_deg)
         ahead = np.array([math.cos(turn), math.sin(turn)]) * radius
@@ -249,7 +250,7 @@ def _hull(parts: list[Silhouette]) -> Floats:
     return np.asarray(cv2.convexHull(corners), np.float64).reshape(-1, 2)
 
 
-def _visible_shares(at: Floats, ends: Floats, walls: Floats) -> Floats:
+def visible_shares(at: Floats, ends: Floats, walls: Floats) -> Floats:
     """Return the shares (n,) of segments from a point (2,) to ends (n, 2) before a wall (m, 4).
 
     Walls are axis-parallel boxes, intersected by the slab method (Kay and Kajiya 1986).

@@ -64,81 +64,81 @@ class Mixed:
         self._pictures = _pictures()
         zeros = np.zeros((9, count), int)
         # The corridor is lane 0; the goal is at far = 0 beside it, on the side `side` (1: right).
-        self._far, self._lane, self._turns, self._kind, self._at, self._side = zeros[:6]
-        self._there, self._held, self._age = zeros[6:]
+        self.far, self.lane, self.turns, self.kind, self.at, self.side = zeros[:6]
+        self.there, self._held, self._age = zeros[6:]
 
     @property
     def _blocked(self):
-        return (self._there > 0) & (self._at < self._far)
+        return (self.there > 0) & (self.at < self.far)
 
     def _metres(self, far, lane):
-        return _CELL_M * np.hypot(far, lane - self._side)
+        return _CELL_M * np.hypot(far, lane - self.side)
 
     def _cell(self, steps):
         """Return the cell so many steps ahead."""
-        far = self._far - steps * np.array([1, 0, -1, 0])[self._turns]
-        return far, self._lane + steps * np.array([0, 1, 0, -1])[self._turns]
+        far = self.far - steps * np.array([1, 0, -1, 0])[self.turns]
+        return far, self.lane + steps * np.array([0, 1, 0, -1])[self.turns]
 
     def _what(self, far, lane):
         """Return what lies in cells: -1 for nothing."""
-        beside = (lane == self._side) & ((self._kind == BLOCK) | (far == 0))
+        beside = (lane == self.side) & ((self.kind == BLOCK) | (far == 0))
         free = (far >= 0) & (far <= 8) & ((lane == 0) | beside)
-        taken = (self._there > 0) & (lane == 0) & (far == self._at)
-        return np.where(taken, self._kind, np.where(free, -1, _WALL))
+        taken = (self.there > 0) & (lane == 0) & (far == self.at)
+        return np.where(taken, self.kind, np.where(free, -1, _WALL))
 
-    def _look(self):
+    def look(self):
         ahead = np.zeros(self.num_envs, int)
         for steps in range(_SIGHT, 0, -1):
             what = self._what(*self._cell(steps))
             ahead = np.where(what < 0, ahead, 1 + _SIGHT * what + steps - 1)
         left, right = (self._lane_open(turn) for turn in (3, 1))
         rgb, depth, ids = (pictures[ahead, left, right] for pictures in self._pictures)
-        bearing = np.arctan2(self._lane - self._side, self._far) + np.pi / 2 * self._turns
+        bearing = np.arctan2(self.lane - self.side, self.far) + np.pi / 2 * self.turns
         bearing = (bearing + np.pi) % (2 * np.pi) - np.pi
-        goal = np.stack([self._metres(self._far, self._lane), bearing], 1).astype(np.float32)
+        goal = np.stack([self._metres(self.far, self.lane), bearing], 1).astype(np.float32)
         seen = {"rgb": rgb, "depth": depth, "goal": goal, "held": self._held.copy()}
         seen |= {"horizon": np.ones(self.num_envs, np.int64)}
         return {**seen, "ids": ids} if self._ids else seen
 
     def _lane_open(self, turn):
         """Return where the cell beside is free."""
-        turns = (self._turns + turn) % 4
-        far = self._far - np.array([1, 0, -1, 0])[turns]
-        return (self._what(far, self._lane + np.array([0, 1, 0, -1])[turns]) < 0).astype(int)
+        turns = (self.turns + turn) % 4
+        far = self.far - np.array([1, 0, -1, 0])[turns]
+        return (self._what(far, self.lane + np.array([0, 1, 0, -1])[turns]) < 0).astype(int)
 
     def reset(self, *, seed=None, options=None):
         mask = (options or {}).get("reset_mask", np.ones(self.num_envs, bool))
         count, draw = int(mask.sum()), self._rng.integers
-        self._far[mask] = draw(2, 7, count)
-        self._turns[mask], self._kind[mask] = draw(0, 4, count), draw(0, 3, count)
-        self._at[mask] = np.maximum(self._far[mask] - draw(1, 4, count), 1)
-        self._side[mask] = draw(0, 2, count) * 2 - 1
-        self._there[mask] = 1
-        self._lane[mask] = self._held[mask] = self._age[mask] = 0
-        return self._look(), {"seed": seed}
+        self.far[mask] = draw(2, 7, count)
+        self.turns[mask], self.kind[mask] = draw(0, 4, count), draw(0, 3, count)
+        self.at[mask] = np.maximum(self.far[mask] - draw(1, 4, count), 1)
+        self.side[mask] = draw(0, 2, count) * 2 - 1
+        self.there[mask] = 1
+        self.lane[mask] = self._held[mask] = self._age[mask] = 0
+        return self.look(), {"seed": seed}
 
     def step(self, actions):
         far, lane = self._cell(1)
         what, blocked = self._what(far, lane), self._blocked
-        before = self._metres(self._far, self._lane)
+        before = self._metres(self.far, self.lane)
         moved = (actions == AHEAD) & (what < 0)
         pushed = (actions == PUSH) & (what == BOX)
         picked = (actions == PICKUP) & (what == THING)
         dropped = (actions == DROP) & (self._held > 0) & (what < 0) & (lane == 0)
-        reached = (actions == DONE) & (self._far == 0) & (self._lane == self._side)
-        self._there[pushed | picked] = 0
-        self._there[dropped], self._at[dropped] = 1, far[dropped]
+        reached = (actions == DONE) & (self.far == 0) & (self.lane == self.side)
+        self.there[pushed | picked] = 0
+        self.there[dropped], self.at[dropped] = 1, far[dropped]
         self._held += picked.astype(int) - dropped
         opened = blocked.astype(int) - self._blocked
-        self._far[moved], self._lane[moved] = far[moved], lane[moved]
-        self._turns = (self._turns + (actions == RIGHT) - (actions == LEFT)) % 4
+        self.far[moved], self.lane[moved] = far[moved], lane[moved]
+        self.turns = (self.turns + (actions == RIGHT) - (actions == LEFT)) % 4
         self._age += 1
-        nearer = before - self._metres(self._far, self._lane)
+        nearer = before - self._metres(self.far, self.lane)
         rewards = 10.0 * reached + opened * (pushed | picked | dropped) + nearer - 0.01
         ended = actions == DONE
         cut = (self._age >= _LONGEST) & ~ended
-        infos = {"metrics": {"success": reached, "kind": self._kind.copy()}}
-        return self._look(), rewards, ended, cut, infos
+        infos = {"metrics": {"success": reached, "kind": self.kind.copy()}}
+        return self.look(), rewards, ended, cut, infos
 
 
 class Cue:
@@ -158,13 +158,13 @@ class Cue:
     def __init__(self, count):
         self.num_envs = count
         self._rng = np.random.default_rng(0)
-        self._right, self._age = np.zeros((2, count), int)
+        self.right, self._age = np.zeros((2, count), int)
 
-    def _look(self):
+    def look(self):
         shape = (self.num_envs, SIZE, SIZE)
         rgb, depth = np.full((*shape, 3), 60, np.uint8), np.full((*shape, 1), _FAR_M, np.float32)
         for right, columns in enumerate((slice(2, 14), slice(18, 30))):
-            rgb[(self._age == 0) & (self._right == right), 10:22, columns] = _COLOURS[right]
+            rgb[(self._age == 0) & (self.right == right), 10:22, columns] = _COLOURS[right]
         left = np.maximum(self.steps_to_fork - self._age, 0)
         goal = np.stack([_CELL_M * left, np.zeros(self.num_envs)], 1).astype(np.float32)
         nothing = np.zeros(self.num_envs, np.int64)
@@ -172,15 +172,15 @@ class Cue:
 
     def reset(self, *, seed=None, options=None):
         mask = (options or {}).get("reset_mask", np.ones(self.num_envs, bool))
-        self._right[mask] = self._rng.integers(0, 2, int(mask.sum()))
+        self.right[mask] = self._rng.integers(0, 2, int(mask.sum()))
         self._age[mask] = 0
-        return self._look(), {"seed": seed}
+        return self.look(), {"seed": seed}
 
     def step(self, actions):
         chosen = (self._age >= self.steps_to_fork) & ((actions == LEFT) | (actions == RIGHT))
-        reached = chosen & ((actions == RIGHT) == (self._right > 0))
+        reached = chosen & ((actions == RIGHT) == (self.right > 0))
         self._age += 1
         ended = chosen | (actions == DONE)
         cut = (self._age >= 3 * self.steps_to_fork) & ~ended
         infos = {"metrics": {"success": reached}}
-        return self._look(), 10.0 * reached - 0.01, ended, cut, infos
+        return self.look(), 10.0 * reached - 0.01, ended, cut, infos

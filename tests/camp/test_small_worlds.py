@@ -22,8 +22,8 @@ def begun(kind, side=1):
     """Two cells of the corridor to the thing in the way, two more to its end, one to the goal."""
     env = Mixed(1, ids=True)
     env.reset()
-    env._far[:], env._lane[:], env._turns[:] = 4, 0, 0
-    env._kind[:], env._at[:], env._side[:], env._there[:] = kind, 2, side, 1
+    env.far[:], env.lane[:], env.turns[:] = 4, 0, 0
+    env.kind[:], env.at[:], env.side[:], env.there[:] = kind, 2, side, 1
     return env
 
 
@@ -68,7 +68,7 @@ def test_what_is_put_down_in_the_way_closes_it_again():
 
 
 def test_kinds_are_told_apart_by_sight():
-    views = {kind: begun(kind)._look() for kind in (BOX, THING, BLOCK)}
+    views = {kind: begun(kind).look() for kind in (BOX, THING, BLOCK)}
     assert [tuple(views[k]["rgb"][0, 17, 16]) for k in (BOX, BLOCK)] == [(220, 40, 40), (150,) * 3]
     assert tuple(views[THING]["rgb"][0, 19, 16]) == (40, 200, 60)
     assert [int(views[k]["ids"].max()) for k in views] == [1, 2, 3]
@@ -89,6 +89,6 @@ def test_a_cue_is_gone_after_the_first_step_and_leaves_no_trace():
     for _ in range(env.steps_to_fork):
         seen, *_ = env.step(rng.integers(0, 11, 64))
         assert all(len(np.unique(what.reshape(64, -1), axis=0)) == 1 for what in seen.values())
-    right = env._right.copy()
+    right = env.right.copy()
     *_, infos = env.step(np.full(64, RIGHT))
     assert (infos["metrics"]["success"] == (right > 0)).all()

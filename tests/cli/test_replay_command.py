@@ -1,3 +1,4 @@
+import dataclasses
 import json
 import os
 import subprocess
@@ -110,15 +111,16 @@ def test_what_cannot_be_filmed_is_one_line(dataset, tmp_path, monkeypatch, capsy
     assert not list(tmp_path.iterdir()), "nothing is written"
 
 
-def test_an_episode_without_an_expert_says_what_to_do(dataset, monkeypatch):
-    from dataclasses import replace
-
+def test_an_episode_without_an_expert_says_what_to_do(dataset, tmp_path):
     from internav_cli import replay
 
+    from internav_data.dataset import Identity, assemble, load_dataset, open_staging, stage_scene
     from internav_data.records.errors import UsageError
 
-    house, episode, assets, model = replay._stored(dataset, 2, 0)
-    none = replace(episode, expert=None)
-    monkeypatch.setattr(replay, "_stored", lambda *_: (house, none, assets, model))
-    with pytest.raises(UsageError, match=r"scene-000002/0000 has no expert.*--actions FILE"):
-        replay.command.main([str(dataset), "2/0"], standalone_mode=False)
+    data = load_dataset(dataset, filters=[("scene_id", "=", "scene-000000")])
+    none = [dataclasses.replace(episode, expert=None) for episode in data]
+    identity = Identity("internav-gen", "0", 0, 1, "0" * 64, data.manifest.config)
+    stage_scene(open_staging(tmp_path, identity), 0, data.scene("scene-000000"), none)
+    assemble(tmp_path, identity, list(data.assets.values()), 1)
+    with pytest.raises(UsageError, match=r"scene-000000/0000 has no expert.*--actions FILE"):
+        replay.command.main([str(tmp_path), "0/0"], standalone_mode=False)

@@ -245,12 +245,13 @@ def test_experts_reach_the_goal_by_the_push_model_of_their_dataset(small, tmp_pa
     if model == "kick":
         out = tmp_path / "d"
         overrides = ["episodes_per_scene=3", "house.rooms=1-2", "episodes.push_model=kick"]
-        generate(out, load_config(overrides=overrides), 1, workers=1)
+        generate(out, load_config(overrides=overrides), 3, workers=1)
     env = make(out)
     assert open_source(out).push_model == model
-    env.reset(seed=0)
-    assert env.unwrapped._slot.run.world.push_model == model
+    pushed = None
     for episode in load_dataset(out):
+        if episode.expert.pushes:
+            pushed = episode
         env.reset(options={"episode_id": episode.episode_id})
         for action in episode.expert.actions:
             *_, terminated, _, info = env.step(action)
@@ -259,6 +260,16 @@ def test_experts_reach_the_goal_by_the_push_model_of_their_dataset(small, tmp_pa
         assert info["metrics"]["success"]
         assert info["metrics"]["steps"] == episode.expert.steps
         assert info["metrics"]["path_m"] == episode.expert.path_m
+    other = "kick" if model == "force" else "force"
+    seen = [depths(make(out, **by), pushed) for by in ({}, {"push_model": model})]
+    assert np.array_equal(*seen)
+    assert not np.array_equal(seen[0], depths(make(out, push_model=other), pushed))
+
+
+def depths(env, episode):
+    """Depth images along an expert's way: they show how far things were pushed."""
+    env.reset(options={"episode_id": episode.episode_id})
+    return np.array([env.step(action)[0]["depth"] for action in episode.expert.actions])
 
 
 def test_no_dataset(tmp_path):

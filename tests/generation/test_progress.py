@@ -1,5 +1,7 @@
 import io
 
+import pytest
+
 from internav_data.core.progress import clock
 from internav_data.generation.progress import GenerationProgress
 
@@ -22,15 +24,27 @@ def test_clock():
     ]
 
 
-def begun(stream, ago):
-    progress = GenerationProgress(stream)
-    progress.begin(scenes=100, done=40, episodes_left=600)
-    progress._began -= ago
-    progress._told -= ago
-    return progress
+@pytest.fixture
+def begun(monkeypatch):
+    """Make a progress that began some seconds ago, by a clock that stands still."""
+
+    def make(stream, ago):
+        wait(1000.0)
+        progress = GenerationProgress(stream)
+        progress.begin(scenes=100, done=40, episodes_left=600)
+        wait(ago)
+        return progress
+
+    def wait(seconds):
+        now[0] += seconds
+
+    now = [0.0]
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    make.wait = wait
+    return make
 
 
-def test_the_line_tells_speed_and_time_left():
+def test_the_line_tells_speed_and_time_left(begun):
     progress = begun(None, 10.0)
     for _ in range(10):
         progress.scene(10, expected=10)
@@ -39,12 +53,12 @@ def test_the_line_tells_speed_and_time_left():
     assert line.startswith("51/100 scenes (51%), 10.0 episodes/s, 49 s left, 1 quarantined")
 
 
-def test_a_first_run_that_compiles_says_so():
+def test_a_first_run_that_compiles_says_so(begun):
     assert "compiling" not in begun(None, 2.0).line()
     assert "compiling" in begun(None, 20.0).line()
 
 
-def test_a_terminal_gets_one_line_that_renews_itself():
+def test_a_terminal_gets_one_line_that_renews_itself(begun):
     stream = Terminal()
     progress = begun(stream, 1.0)
     progress.tick()
@@ -54,20 +68,21 @@ def test_a_terminal_gets_one_line_that_renews_itself():
     assert stream.getvalue().endswith("\r" + " " * 19 + "\rscene-000007 is quarantined\n")
 
 
-def test_a_file_gets_a_plain_line_now_and_then():
+def test_a_file_gets_a_plain_line_now_and_then(begun):
     stream = io.StringIO()
     progress = begun(stream, 1.0)
     progress.tick()
     assert stream.getvalue() == ""
-    progress._told -= 60.0
+    begun.wait(60.0)
     progress.tick()
     progress.end()
     assert stream.getvalue().count("\n") == 1
     assert "\r" not in stream.getvalue()
 
 
-def test_silence_without_a_stream():
+def test_silence_without_a_stream(begun, capfd):
     progress = begun(None, 100.0)
     progress.tick()
     progress.say("nothing")
     progress.end()
+    assert capfd.readouterr() == ("", "")

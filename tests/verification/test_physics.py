@@ -363,9 +363,9 @@ def test_what_carries_something_is_not_picked_up(scenes):
     scene = CheckedScene(CheckedLayout(house, Shapes(assets)), FORCE)
     check = OutcomeCheck(scene, episodes[0], outcome, "", lambda *_: True)
     under, over = at("Pot_1", 3.0), at("Bar_1", 3.1)
-    assert check._carries([under, over], 0)
-    assert not check._carries([under, over], 1)
-    assert not check._carries([under, at("Bar_1", 3.6)], 0)
+    assert check.carries([under, over], 0)
+    assert not check.carries([under, over], 1)
+    assert not check.carries([under, at("Bar_1", 3.6)], 0)
 
 
 def test_furniture_that_was_moved_is_no_longer_where_it_stood():

@@ -152,7 +152,7 @@ def test_the_map_shows_the_agent_where_it_stands(tried, frames):
     from internav_data.views.replay_painters import AGENT, MapPainter
 
     painter = MapPainter(tried.story, SIZE)
-    canvas = painter._canvas
+    canvas = painter.canvas
     shot = list(shots(tried.story, 12.0))[-1]
     picture = painter.draw(shot)
     assert picture.shape == (SIZE, painter.size[0], 3)
@@ -174,16 +174,16 @@ def share_of(picture, canvas, low, high, colour):
 
 
 def test_the_map_shows_the_trail_and_where_things_stood(tried):
-    from internav_data.views.replay_painters import _GHOST, AGENT, MapPainter
+    from internav_data.views.replay_painters import AGENT, GHOST, MapPainter
 
     painter = MapPainter(tried.story, 400)
     all_shots = list(shots(tried.story, 12.0))
     first, last = painter.draw(all_shots[0]), painter.draw(all_shots[-1])
     trail = ((2.95, 1.5), (3.05, 1.7))
-    assert share_of(last, painter._canvas, *trail, AGENT) > 0.3
-    assert share_of(first, painter._canvas, *trail, AGENT) == 0.0
+    assert share_of(last, painter.canvas, *trail, AGENT) > 0.3
+    assert share_of(first, painter.canvas, *trail, AGENT) == 0.0
     stood = ((4.75, 2.18), (5.25, 2.27))  # the chair's back
-    assert share_of(last, painter._canvas, *stood, _GHOST) > 0.1
+    assert share_of(last, painter.canvas, *stood, GHOST) > 0.1
     for shot in all_shots[2::4]:
         fresh = MapPainter(tried.story, 400)
         assert np.array_equal(fresh.draw(shot), painter.draw(shot)), "of the shot alone"

@@ -8,7 +8,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from internav_data.views.replay_painters import _visible_shares
+from internav_data.views.replay_painters import visible_shares
 
 REACH_M = 1.25
 spots = st.floats(-2.0, 2.0).map(lambda v: round(v, 2))
@@ -24,7 +24,7 @@ def test_rays_end_where_shapely_says(x, y, boxes):
     turns = [math.radians(d) for d in range(0, 360, 15)]
     ends = np.array([(x + REACH_M * math.cos(t), y + REACH_M * math.sin(t)) for t in turns])
     ends = np.where(np.abs(ends - (x, y)) < 1e-12, (x, y), ends)
-    shares = _visible_shares(np.array((x, y)), ends, walls)
+    shares = visible_shares(np.array((x, y)), ends, walls)
     for end, share in zip(ends, shares, strict=True):
         ray = shapely.LineString([(x, y), end])
         inside = [shapely.box(*wall).buffer(-1e-6) for wall in walls]
@@ -42,5 +42,5 @@ def test_rays_end_where_shapely_says(x, y, boxes):
 
 def test_along_a_wall_nothing_is_hidden():
     wall = np.array([(0.0, 1.0, 3.0, 1.1)])
-    along = _visible_shares(np.array((0.5, 0.5)), np.array([(1.5, 0.5)]), wall)
+    along = visible_shares(np.array((0.5, 0.5)), np.array([(1.5, 0.5)]), wall)
     assert along == pytest.approx([1.0])

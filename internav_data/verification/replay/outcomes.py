@@ -83,7 +83,7 @@ class OutcomeCheck:
         if not world.items[index].dynamics.pickable:
             reason = "not pickable"
         else:
-            reason = "something rests on it" if self._carries(world.items, index) else ""
+            reason = "something rests on it" if self.carries(world.items, index) else ""
         if self._ends(reason, 0.0, 0.0) and not reason:
             self._distances(world, {index: None})
 
@@ -95,7 +95,7 @@ class OutcomeCheck:
         self.expect("seconds", seconds, outcome.seconds)
         return self.expect("success", not reason, outcome.success)
 
-    def _carries(self, items: Sequence[MovableObject], index: int) -> bool:
+    def carries(self, items: Sequence[MovableObject], index: int) -> bool:
         """Return whether another movable object rests on an item."""
         placed = {
             k: (item.asset.asset_id, item.pose)
