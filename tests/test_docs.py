@@ -150,3 +150,11 @@ def test_names_in_the_glossary_exist_where_it_says():
             assert path.exists(), f"{term}: {path}"
         for name in re.findall(r"`(\w+)`", term):
             assert any(defines(path, name) for path in paths), f"{name} is not in {where}"
+
+
+def test_names_in_definitions_of_the_glossary_exist():
+    sources = [path.read_text() for path in PACKAGE.rglob("*.py")]
+    words = set(re.findall(r"\w+", " ".join(sources)))
+    for term, definition, _, _ in table_rows("docs/glossary.md"):
+        for name in re.findall(r"`([\w.]+)`", definition):
+            assert set(name.split(".")) <= words, f"{term}: no {name} in the package"
