@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import subprocess
 import sys
 
@@ -59,14 +60,12 @@ assert len(ds.to_table()) == 1
     assert not modules_after(code) & (HEAVY - {"pandas"})
 
 
-@pytest.mark.parametrize("package", ["camp", "evaluation"])
+@pytest.mark.parametrize("package", ["camp", "evaluation", "physics"])
 def test_public_names_of_a_room_are_lazy(package):
     """Each can be imported from the room, and importing the room alone imports nothing heavy."""
-    from importlib import import_module
-
     if package == "camp":
         pytest.importorskip("torch")
-    module = import_module(f"internav_data.{package}")
+    module = importlib.import_module(f"internav_data.{package}")
     for name in module.__all__:
         assert getattr(module, name) is not None
     assert set(module.__all__) <= set(dir(module))
@@ -85,3 +84,23 @@ def test_facade_names_what_it_has():
     assert set(internav_data.__all__) <= set(dir(internav_data))
     with pytest.raises(AttributeError, match="no_such_name"):
         internav_data.no_such_name  # noqa: B018 - the access is the test
+
+
+def test_actions_and_names_of_engines_need_nothing_heavy():
+    code = """
+from internav_data.episodes import EpisodeConfig
+from internav_data.physics import ENGINES
+from internav_data.world import ACTIONS, Action, StepResult
+EpisodeConfig().check()
+"""
+    assert not modules_after(code) & HEAVY
+
+
+def test_push_and_settle_are_functions_whatever_was_imported_before():
+    """A module that were called like one of them would hide it once it is imported."""
+    import internav_data.physics.pushing
+    import internav_data.physics.settling
+    from internav_data.physics import push, settle
+
+    assert push is internav_data.physics.pushing.push
+    assert settle is internav_data.physics.settling.settle

@@ -163,6 +163,7 @@ def _draw(
         return "no two nodes far enough apart"
     if not spawn(draft, pool, generator(seed, Purpose.SPAWN, *key)):
         return "condition not reached"
+    # Drawn last, from the first stream: spawning does not depend on the agent's heading.
     yaw_deg = QUARTER_TURNS[int(place.integers(4))]
     world = World(
         site.model,
@@ -187,6 +188,8 @@ def _draw_endpoints(
     Rooms are drawn first, then a node in each: if nodes were drawn at once, large rooms would be in
     most pairs and long room paths rare.
     """
+    # Furniture may shut a room off from the largest component: two rooms of it are needed, or the
+    # only one of a house of one room.
     rooms = np.unique(site.rooms)
     if len(rooms) < min(2, len(site.house.rooms)):
         return None
@@ -196,6 +199,7 @@ def _draw_endpoints(
         shortest_path_m = site.tangent_graph.distance(
             _point(_node(site, first)), _point(_node(site, second))
         )
+        # Rounded first: the validator sees the stored length.
         if shortest_path_m is not None and round_m(shortest_path_m) >= config.min_shortest_path_m:
             return _begin(site, mode, config, first, second, round_m(shortest_path_m))
     return None
@@ -212,6 +216,7 @@ def _begin(
     """Gather the facts about a start and a goal before any obstacle is spawned."""
     start, goal = _node(site, first), _node(site, second)
     here, there = _point(start), _point(goal)
+    # Within one component of the lattice there is a path; None only guards the type.
     shortest_path_steps = site.lattice.distance(start, goal)
     if shortest_path_steps is None:
         return None
@@ -247,6 +252,7 @@ def _point(node: tuple[int, int]) -> tuple[float, float]:
 
 def _recorded(draft: EpisodeDraft, index: int, world: World, expert: Expert | None) -> Episode:
     """Turn a finished draft into an episode; its predicates are judged on the rounded poses."""
+    # The lattice distance is known from spawning; outcomes need both distances before any of them.
     house, obstructed_path_m = draft.site.house, world.obstructed_path_m()
     outcomes = outcomes_of(world, (draft.steps, obstructed_path_m))
     return Episode(

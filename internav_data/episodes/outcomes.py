@@ -85,6 +85,7 @@ class _Lifted:
 
     def laid(self, pose: Pose) -> Distances:
         """Return the distances with the object at a pose and all others as before."""
+        # Cut off without the object, cut off with it.
         best_steps, best_path_m = self.distances
         if best_steps is None and best_path_m is None:
             return None, None
@@ -100,10 +101,12 @@ class _Lifted:
 def _pushed(world: World, index: int, heading: int, before: Distances, lifted: _Lifted) -> Outcome:
     if not world.items[index].dynamics.pushable:
         return _failed(PUSHES[heading], "not pushable", before)
+    # Without the agent: an outcome is a fact about the object, wherever an agent may stand.
     pushed = world.simulate_push(index, heading, agent=False)
     if not pushed.success:
         return _failed(PUSHES[heading], pushed.reason, before, pushed.seconds)
     if pushed.moved:
+        # Other objects moved too: the world without this one says nothing about their new poses.
         there = world.copy()
         there.put([(index, pushed.pose), *pushed.moved])
         steps, obstructed_path_m = there.steps(), there.obstructed_path_m()
@@ -126,6 +129,7 @@ def _picked(world: World, index: int, before: Distances, lifted: _Lifted) -> Out
         return _failed(PICK, "not pickable", before)
     if carries(world, index):
         return _failed(PICK, "something rests on it", before)
+    # A held object blocks nothing, so these are the distances while it is carried.
     steps, obstructed_path_m = lifted.distances
     opened = before[0] is None and steps is not None
     return Outcome(

@@ -64,6 +64,7 @@ class SpawnSite:
 
         () without a path.
         """
+        # Door to door these recur in every episode of the house.
         key = (first, second)
         if key not in self._paths_between:
             path = self.tangent_graph.path(first, second)

@@ -124,6 +124,7 @@ def _try_spot(draft: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> Non
     asset = pool[int(rng.integers(len(pool)))]
     path = draft.node_paths[int(rng.integers(len(draft.node_paths)))]
     segment = int(rng.integers(len(path.points) - 1))
+    # Uniform along the path, normally distributed across it (paper, section 5.1).
     along, lateral = float(rng.random()), float(rng.standard_normal()) * draft.config.lateral_std_m
     yaw_deg = YAW_STEP_DEG * int(rng.integers(360 // YAW_STEP_DEG))
     spot = _spot(draft.site, path.points[segment], path.points[segment + 1], along, lateral)
@@ -139,6 +140,7 @@ def _try_spot(draft: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> Non
     settled = settle(Body.of(asset, pose), gap, lambda: _near(draft, shifted), draft.config.engine)
     if settled.refusal:
         return
+    # Settling may have moved it by up to 5 cm: it must still not touch anything.
     exact = footprint(asset, settled.pose)
     if _distance(draft, exact, gap) <= 0.0:
         return
@@ -156,6 +158,7 @@ def _spot(
         if left <= leg and leg > 0.0:
             ux, uy = (b[0] - a[0]) / leg, (b[1] - a[1]) / leg
             x, y = a[0] + left * ux, a[1] + left * uy
+            # (-uy, ux) is the leg's normal, to the left.
             spot = (x - lateral * uy, y + lateral * ux)
             return spot if room_of(site.house, *spot) == room_of(site.house, x, y) else None
         left -= leg
@@ -172,6 +175,7 @@ def _distance(draft: EpisodeDraft, polygons: Polygons, stop_at: float) -> float:
 
 def _place(draft: EpisodeDraft, spawned: Spawned) -> None:
     """Add an obstacle unless it covers start or goal, or cuts off a path to be lengthened."""
+    # On trial: the lattice counts its blockers, so that removing it again restores every count.
     handle = draft.lattice.add(spawned.footprint)
     free = draft.lattice.free
     steps = draft.lattice.distance(draft.start, draft.goal)

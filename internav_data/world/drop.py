@@ -92,6 +92,7 @@ def drop(
     plan = _standing(held.asset, heading)
     for gap in GAPS_M:
         for ahead in _AHEAD:
+            # By quarter turns of one table, so that all four headings give the same spots exactly.
             ux, uy = turned(heading, *ahead)
             spot = _spot(plan, agent, ux, uy, gap)
             pose = Pose(*spot, 0.0, turn)
@@ -121,6 +122,7 @@ def _fits(plan: Polygons, spot: Vec2, agent: Vec2, obstructions: DropObstruction
     there = Polygons(plan.vertices + np.array(spot), plan.offsets)
     if any(clearance(there, other, ROOM_M) < ROOM_M for other in obstructions.solid):
         return False
+    # Nor does the agent reach through a wall into the next room.
     walls = obstructions.walls
     return not _crosses(*agent, *spot, walls.vertices, walls.offsets)
 

@@ -95,6 +95,8 @@ class HouseModel:
         dop8s = [dop8_of_rectangle(w.x_min, w.y_min, w.x_max, w.y_max) for w in house.walls]
         walls = wall_footprints(house.walls)
         plans, items, object_ids = [walls], [], []
+        # Movable furniture counts as an item with a handle of its own in the lattice, all else as
+        # fixed; rugs block nothing and are left out.
         for thing in house.objects:
             asset = house.assets[thing.asset_id]
             if is_movable(asset):
@@ -151,12 +153,13 @@ class HouseModel:
         clear = self.tangent_graph()
         if clear.can_stand(here):
             return clear.distance(here, goal)
+        # Nodes of the goal's component.
         steps = self.lattice.distances(*_node(goal))
         nodes = np.argwhere(steps >= 0)
         if not len(nodes):
             return None
         x, y = SPACING_M * nodes[:, 0] - here[0], SPACING_M * nodes[:, 1] - here[1]
-        # The first of equally near ones, in order of i, then j.
+        # Rounded, so that no tie hangs on the last bits: the first of equals by i, then j.
         best = int(np.argmin(np.round(x * x + y * y, 9)))
         there = (SPACING_M * int(nodes[best, 0]), SPACING_M * int(nodes[best, 1]))
         path = clear.distance(there, goal)

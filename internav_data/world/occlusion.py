@@ -86,6 +86,7 @@ def _visibility_points(asset: Asset) -> tuple[Floats, Ints]:
     room = min(MAX_POINTS - len(centres), len(corners))
     # Evenly spaced rows touch every part where there are at least as many as parts.
     rows = [k * len(corners) // room for k in range(room)]
+    # Centres lie inside their parts, so a part must not hide its own points.
     owner = np.repeat(np.arange(parts), np.diff(starts))
     points = np.vstack([centres, corners[rows]])
     owners = np.concatenate([np.arange(len(centres)), owner[rows]]).astype(np.int64)

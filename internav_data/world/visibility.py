@@ -164,6 +164,7 @@ class Occluders:
         self._shapes = shapes
         planes = [shape.planes for shape in shapes]
         counts = [0]
+        # All shapes' planes in one array: index of each shape's first part, and where parts begin.
         self._first = []
         height = 0
         for shape in shapes:

@@ -56,6 +56,7 @@ TOUCH_M: Final = 0.005
 MAX_DROP_M: Final = 2.5
 """Bound of a drop's reach, metres: the widest gap, the largest pickable object, and room."""
 
+# Moves are most of all actions and have one result each: made once.
 _STEPPED: Final = StepResult(Action.MOVE_AHEAD, success=True)
 _BLOCKED: Final = StepResult(Action.MOVE_AHEAD, success=False, reason="something is in the way")
 _AHEAD: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))
@@ -95,12 +96,14 @@ def _push(world: World, action: Action) -> StepResult:
     target = world.target(pick=False)
     if target < 0:
         return _failed(action, "nothing to push in sight and reach")
+    # The four pushes are relative to the agent's heading, physics knows those of the house.
     pushed = world.simulate_push(target, (world.quarter + action.quarter_turns) % 4)
     if not pushed.success:
         reason: Reason = pushed.reason
         return StepResult(
             action, success=False, reason=reason, target=target, seconds=pushed.seconds
         )
+    # An object may fall over the agent's collider, or come to rest over its disc after rounding.
     moved = tuple(sorted([(target, pushed.pose), *pushed.moved]))
     if _lies_on_agent(world, moved):
         return StepResult(
@@ -421,6 +424,7 @@ class World:
     def _loose(self) -> tuple[TangentGraph, Polygons]:
         """Return the tangent graph among furniture that has not moved, and all other footprints."""
         home = self.model.items
+        # Identity suffices: `put` gives furniture that is put back the model's own object again.
         displaced = tuple(k for k, item in enumerate(home) if self.items[k] is not item)
         loose = [self.items[k].footprint for k in (*displaced, *self.obstacles)]
         return self.model.tangent_graph(displaced), Polygons.joined(loose)
@@ -446,6 +450,7 @@ class World:
         if not wanted:
             return -1
         shapes = [placed_occlusion_shape(body.asset, body.pose) for body in map(self.body, near)]
+        # Objects beyond reach cannot hide a point within it.
         fixed = [self.model.fixed[k] for k in touching(self.model.dop8s, round_here)]
         occluders = Occluders(
             shapes + [placed_occlusion_shape(body.asset, body.pose) for body in fixed]
@@ -472,6 +477,8 @@ class World:
         """
         gap = math.inf
         if agent:
+            # An object may stand closer than the collider's radius: the collider must not begin
+            # inside it.
             x, y = self.position
             loose = touching(self._dop8s, dop8_of_square(x, y, AGENT_M))
             gap = min((self.distance_to(k, x, y) for k in loose), default=math.inf)
@@ -520,6 +527,7 @@ class World:
 
     def digest(self) -> str:
         """Return the SHA-256 (hex) of the state: equal worlds have equal digests."""
+        # Each part is preceded by its length, so that no two states give the same bytes.
         node = (self.i, self.j, self.quarter, self.horizon_deg, self.held, *self.goal)
         parts = [self.model.house.scene_id.encode(), self.push_model.encode(), self.engine.encode()]
         parts += [struct.pack("<7i", *node), repr(self.interaction).encode()]
