@@ -11,6 +11,7 @@ from internav_data.catalog.shapes import Paint, ring
 if TYPE_CHECKING:
     from internav_data.catalog.sampling import UniformSampler
     from internav_data.catalog.shapes import Sketch
+    from internav_data.records import Vec2
 
 _CRUSTS = ((196, 140, 82), (168, 112, 62), (210, 162, 104), (142, 92, 54))
 _APPLES = ((190, 44, 44), (206, 72, 54), (142, 176, 66), (212, 180, 78), (162, 36, 52))
@@ -19,40 +20,51 @@ _TOMATOES = ((206, 58, 42), (190, 44, 40), (218, 88, 48), (212, 66, 58))
 
 def bread(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw a loaf along y: from a tin, or freely formed with cuts across."""
-    crust, x, y = Paint(sampler.pick(_CRUSTS), "food"), w / 2, d / 2
-    cut = crust.shade(1.22)
+    crust, half = Paint(sampler.pick(_CRUSTS), "food"), (w / 2, d / 2)
     if sampler.chance(0.5):
-        low = [(-0.9 * x, 0.0), (0.9 * x, 0.0), (0.92 * x, 0.55 * h), (-0.92 * x, 0.55 * h)]
-        s.prism("y", low, (-0.97 * y, 0.97 * y), crust)
-        dome = [
-            (a * x, b * h)
-            for a, b in (
-                (-0.9, 0.5),
-                (-1, 0.66),
-                (-0.88, 0.85),
-                (-0.5, 0.98),
-                (0.5, 0.98),
-                (0.88, 0.85),
-                (1, 0.66),
-                (0.9, 0.5),
-            )
-        ]
-        s.prism("y", dome, (-y, y), crust.shade(0.88))
-        slot = [(-0.3 * x, 0.95 * h), (0.3 * x, 0.95 * h), (0.2 * x, h), (-0.2 * x, h)]
-        s.prism("y", slot, (-0.8 * y, 0.8 * y), cut)
-        heel = [
-            (a * 0.88 * x, b * h)
-            for a, b in (
-                (-0.95, 0.05),
-                (0.95, 0.05),
-                (1, 0.66),
-                (0.7, 0.88),
-                (-0.7, 0.88),
-                (-1, 0.66),
-            )
-        ]
-        s.prism("y", heel, (-y - 0.001, -0.9 * y), Paint((236, 214, 170), "food"))
-        return
+        _tin_loaf(s, half, h, crust)
+    else:
+        _free_loaf(s, half, h, crust)
+
+
+def _tin_loaf(s: Sketch, half: Vec2, h: float, crust: Paint) -> None:
+    """Draw a loaf from a tin: straight sides, a dome with a slot, a cut heel."""
+    x, y = half
+    low = [(-0.9 * x, 0.0), (0.9 * x, 0.0), (0.92 * x, 0.55 * h), (-0.92 * x, 0.55 * h)]
+    s.prism("y", low, (-0.97 * y, 0.97 * y), crust)
+    dome = [
+        (a * x, b * h)
+        for a, b in (
+            (-0.9, 0.5),
+            (-1, 0.66),
+            (-0.88, 0.85),
+            (-0.5, 0.98),
+            (0.5, 0.98),
+            (0.88, 0.85),
+            (1, 0.66),
+            (0.9, 0.5),
+        )
+    ]
+    s.prism("y", dome, (-y, y), crust.shade(0.88))
+    slot = [(-0.3 * x, 0.95 * h), (0.3 * x, 0.95 * h), (0.2 * x, h), (-0.2 * x, h)]
+    s.prism("y", slot, (-0.8 * y, 0.8 * y), crust.shade(1.22))
+    heel = [
+        (a * 0.88 * x, b * h)
+        for a, b in (
+            (-0.95, 0.05),
+            (0.95, 0.05),
+            (1, 0.66),
+            (0.7, 0.88),
+            (-0.7, 0.88),
+            (-1, 0.66),
+        )
+    ]
+    s.prism("y", heel, (-y - 0.001, -0.9 * y), Paint((236, 214, 170), "food"))
+
+
+def _free_loaf(s: Sketch, half: Vec2, h: float, crust: Paint) -> None:
+    """Draw a freely formed loaf with three cuts across."""
+    x, y = half
     rings = [
         ring(0, 0, z * h, r * x, r * y, n)
         for z, r, n in ((0, 0.72, 8), (0.3, 1.0, 8), (0.62, 0.9, 8), (0.92, 0.48, 8))
@@ -69,7 +81,7 @@ def bread(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> N
                 for z in (0.5 * h, tall - 0.06 * h)
             ]
             + [(0, cy + b * 0.03 * y, tall + 0.03 * h) for b in (-1, 1)],
-            cut,
+            crust.shade(1.22),
         )
 
 

@@ -10,7 +10,7 @@ from internav_data.catalog.shapes import ring
 
 if TYPE_CHECKING:
     from internav_data.catalog.sampling import UniformSampler
-    from internav_data.catalog.shapes import Paint, Sketch
+    from internav_data.catalog.shapes import Paint, Sketch, Span
 
 
 def chair(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
@@ -32,23 +32,45 @@ def chair(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> N
         else (sampler.fabric() if sampler.chance(0.3) else wood)
     )
     s.cushion((-x, x), (front, back), (seat - 0.035, seat + 0.015), seat_paint, 0.3)
-    behind = (back - thick, back), (y - thick, y)
+    span = (back, y)
     if style == "padded":
-        s.slab((-x, x), *behind, (seat, h), wood)
-        s.slab(
-            (-0.86 * x, 0.86 * x),
-            (back - 1.7 * thick, back),
-            (y - 1.7 * thick, y),
-            (seat + 0.08, h - 0.04),
-            seat_paint,
-        )
-        return
+        _padded_back(s, x, span, (seat, h), thick, (wood, seat_paint))
+    else:
+        _open_back(s, x, span, (seat, h), thick, style, wood)
+
+
+def _padded_back(
+    s: Sketch, x: float, span: Span, z: Span, thick: float, paints: tuple[Paint, Paint]
+) -> None:
+    """Draw a leaning board with a pad; `span` is its y at the seat and at the top."""
+    wood, cover = paints
+    back, y = span
+    s.slab((-x, x), (back - thick, back), (y - thick, y), z, wood)
+    s.slab(
+        (-0.86 * x, 0.86 * x),
+        (back - 1.7 * thick, back),
+        (y - 1.7 * thick, y),
+        (z[0] + 0.08, z[1] - 0.04),
+        cover,
+    )
+
+
+def _open_back(
+    s: Sketch, x: float, span: Span, z: Span, thick: float, style: str, wood: Paint
+) -> None:
+    """Draw two leaning posts with slats, a panel or spindles between them.
+
+    `span` is the back's y at the seat and at the top, `z` the two heights.
+    """
+    back, y = span
+    seat, h = z
+    behind = (back - thick, back), (y - thick, y)
     for side in (-1, 1):
         post = (side * x - (thick if side > 0 else 0), side * x + (0 if side > 0 else thick))
         s.slab(post, *behind, (seat, h), wood)
 
     def rail(low: float, high: float) -> None:
-        a, b = ((z - seat) / (h - seat) * lean + back for z in (low, high))
+        a, b = ((z - seat) / (h - seat) * (y - back) + back for z in (low, high))
         spans = ((a - 0.8 * thick, a - 0.2 * thick), (b - 0.8 * thick, b - 0.2 * thick))
         s.slab((-x, x), *spans, (low, high), wood.shade(0.94))
 

@@ -10,6 +10,7 @@ from internav_data.catalog.shapes import Paint, ring
 if TYPE_CHECKING:
     from internav_data.catalog.sampling import UniformSampler
     from internav_data.catalog.shapes import Sketch
+    from internav_data.records import Vec2
 
 _CARDBOARD = (
     Paint((198, 156, 106), "paper"),
@@ -52,33 +53,45 @@ def _span(a: float, b: float) -> tuple[float, float]:
 
 def alarm_clock(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
     """Draw an alarm clock: twin bells, digital, or a round face on a block."""
-    paint, x, y = sampler.plastic(), w / 2, d / 2
+    paint, half = sampler.plastic(), (w / 2, d / 2)
     style = "digital" if w > 1.25 * h else sampler.pick(("bells", "bells", "block"))
     if style == "digital":
-        s.taper(
-            ((-x, x), (-y, y), 0), ((-0.97 * x, 0.97 * x), (-0.3 * y, 0.9 * y), h * 0.94), paint
-        )
-        shift = 0.7 * y / (0.94 * h)
-        low, high = 0.2 * h, 0.8 * h
-        s.slab(
-            (-0.84 * x, 0.84 * x),
-            (-y + low * shift - 0.003, -y + low * shift + 0.008),
-            (-y + high * shift - 0.003, -y + high * shift + 0.008),
-            (low, high),
-            SCREEN,
-        )
-        for k in range(4):
-            cx = (-0.55 + 0.36 * k + (0.04 if k > 1 else 0)) * x
-            a, b = 0.34 * h, 0.66 * h
-            s.slab(
-                (cx - 0.1 * x, cx + 0.1 * x),
-                (-y + a * shift - 0.005, -y + a * shift + 0.004),
-                (-y + b * shift - 0.005, -y + b * shift + 0.004),
-                (a, b),
-                Paint((236, 92, 70), "screen"),
-            )
-        s.box((-0.4 * x, 0.4 * x), (0.1 * y, 0.6 * y), (0.93 * h, h), paint.shade(0.8))
+        _digital_clock(s, half, h, paint)
         return
+    _dial(s, half, h, style, paint)
+    if style == "bells":
+        _bells(s, half, h, sampler)
+
+
+def _digital_clock(s: Sketch, half: Vec2, h: float, paint: Paint) -> None:
+    """Draw a wedge with four glowing digits on its leaning front."""
+    x, y = half
+    s.taper(((-x, x), (-y, y), 0), ((-0.97 * x, 0.97 * x), (-0.3 * y, 0.9 * y), h * 0.94), paint)
+    shift = 0.7 * y / (0.94 * h)
+    low, high = 0.2 * h, 0.8 * h
+    s.slab(
+        (-0.84 * x, 0.84 * x),
+        (-y + low * shift - 0.003, -y + low * shift + 0.008),
+        (-y + high * shift - 0.003, -y + high * shift + 0.008),
+        (low, high),
+        SCREEN,
+    )
+    for k in range(4):
+        cx = (-0.55 + 0.36 * k + (0.04 if k > 1 else 0)) * x
+        a, b = 0.34 * h, 0.66 * h
+        s.slab(
+            (cx - 0.1 * x, cx + 0.1 * x),
+            (-y + a * shift - 0.005, -y + a * shift + 0.004),
+            (-y + b * shift - 0.005, -y + b * shift + 0.004),
+            (a, b),
+            Paint((236, 92, 70), "screen"),
+        )
+    s.box((-0.4 * x, 0.4 * x), (0.1 * y, 0.6 * y), (0.93 * h, h), paint.shade(0.8))
+
+
+def _dial(s: Sketch, half: Vec2, h: float, style: str, paint: Paint) -> None:
+    """Draw a round clock with its hands: on a block, or on two feet under bells."""
+    x, y = half
     foot, top = 0.1 * h, (0.78 if style == "bells" else 1.0) * h
     if style == "block":
         s.box((-x, x), (-y, y), (0, foot), paint.shade(0.8))
@@ -104,16 +117,20 @@ def alarm_clock(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler
         (middle - 0.05 * radius, middle + 0.05 * radius),
         BLACK,
     )
-    if style == "bells":
-        for side in (-1, 1):
-            cx = side * 0.55 * x
-            s.ball(
-                (cx - 0.4 * x, cx + 0.4 * x),
-                (-0.6 * y, 0.6 * y),
-                (0.66 * h, 0.95 * h),
-                sampler.pick((BRASS, STEEL)),
-            )
-        s.box((-0.5 * x, 0.5 * x), (-0.12 * y, 0.12 * y), (0.95 * h, h), STEEL)
+
+
+def _bells(s: Sketch, half: Vec2, h: float, sampler: UniformSampler) -> None:
+    """Draw two bells and the hammer over them."""
+    x, y = half
+    for side in (-1, 1):
+        cx = side * 0.55 * x
+        s.ball(
+            (cx - 0.4 * x, cx + 0.4 * x),
+            (-0.6 * y, 0.6 * y),
+            (0.66 * h, 0.95 * h),
+            sampler.pick((BRASS, STEEL)),
+        )
+    s.box((-0.5 * x, 0.5 * x), (-0.12 * y, 0.12 * y), (0.95 * h, h), STEEL)
 
 
 def laptop(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
