@@ -1,4 +1,4 @@
-"""What things are: the obstacles, the furniture, and a user's own meshes."""
+"""Assets: obstacles and furniture, drawn from a table of types, and a user's own meshes."""
 
 from internav_data.catalog.asset_types import ASSET_TYPES, FURNITURE, OBSTACLES, AssetType
 from internav_data.catalog.collection import VERSION, Catalogue, catalogue

@@ -23,15 +23,15 @@ VERSION = 1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Catalogue:
-    """All assets. Equal content has an equal digest."""
+    """All assets of houses and episodes. Equal content has an equal digest."""
 
     version: int
     digest: str
     """sha256 of version and all assets."""
     assets: Mapping[str, Asset]
-    """By asset_id, in its order."""
+    """Assets by asset_id, sorted."""
     spawnable: tuple[Asset, ...]
-    """The 655 obstacles and a user's own, sorted by asset_id."""
+    """Assets that episodes may spawn: 655 and a user's own, sorted by asset_id."""
     types: Mapping[str, tuple[Asset, ...]]
     """Assets by type, both sorted."""
 
@@ -55,7 +55,7 @@ def catalogue(asset_dirs: tuple[Path, ...] = ()) -> Catalogue:
     Raises
     ------
     UsageError
-        When a folder cannot be read as assets, or two hold the same asset_id.
+        When a folder cannot be read as assets, or two folders hold the same asset_id.
     """
     assets = {asset.asset_id: asset for asset in own_assets()}
     for directory in asset_dirs:

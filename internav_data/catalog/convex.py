@@ -1,4 +1,7 @@
-"""Cutting a mesh into convex pieces of few corners."""
+"""Convex decomposition of a mesh into pieces of few corners.
+
+Method: coacd (Wei et al. 2022), collision-aware approximate convex decomposition.
+"""
 
 from __future__ import annotations
 
@@ -15,13 +18,13 @@ if TYPE_CHECKING:
     from internav_data.core.typing import Floats, Ints
 
 MAX_CORNERS = 32
-"""Corners of a piece: footprints and Bullet slow down beyond."""
+"""Largest number of corners of a piece: footprints and Bullet slow down beyond."""
 _CONVEX_SHARE = 0.97
-"""A mesh that fills that much of its hull is taken for convex, and not cut."""
+"""Share of its hull's volume from which a mesh counts as convex and is not cut."""
 _THRESHOLD = 0.08
 """coacd's concavity at which it stops cutting."""
 _MIN_SHARE = 1e-3
-"""Pieces that are smaller than this share of the whole are crumbs."""
+"""Smallest share of the total volume: smaller pieces are dropped."""
 _MIN_THICKNESS_M = 1e-3
 _SEED = 0
 
@@ -36,6 +39,8 @@ class Piece:
 
 def convex_pieces(path: Path, vertices: Floats, faces: Ints, max_parts: int) -> list[Piece]:
     """Cut a mesh into at most `max_parts` convex pieces, largest first.
+
+    `vertices` is (n, 3) float64 in metres, `faces` (m, 3) int64.
 
     The same mesh gives the same pieces: coacd's seed is fixed and pieces are ordered by volume.
 
@@ -98,7 +103,7 @@ def _cut(path: Path, mesh: Any, max_parts: int) -> list[Floats]:  # noqa: ANN401
 
 
 def _piece(points: Floats) -> Piece | None:
-    """Hull of points with few corners; None where they enclose nothing."""
+    """Return the hull of points (n, 3) with few corners; None where they enclose no volume."""
     from scipy.spatial import ConvexHull, QhullError  # noqa: PLC0415 - only for users with meshes
 
     try:
@@ -111,7 +116,7 @@ def _piece(points: Floats) -> Piece | None:
 
 
 def _fewer(corners: Floats) -> Floats:
-    """Choose the corners that keep most of a hull.
+    """Choose at most 32 of a hull's corners (n, 3): farthest-point sampling.
 
     The extremes of the axes come first, so that the bounding box stays, then always the corner
     that lies farthest from those chosen.

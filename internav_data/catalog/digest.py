@@ -1,4 +1,4 @@
-"""A catalogue's digest: sha256 over every field of every asset, in one written form."""
+"""Digest of a catalogue: sha256 over every field of every asset, in a canonical form."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def digest_of(version: int, assets: Iterable[Asset]) -> str:
-    """Digest of assets in the given order, as hexadecimal digits.
+    """Return the sha256 of assets in the given order, as hexadecimal digits.
 
     JSON without spaces; numbers are stored rounded, so that their shortest decimal form is exact.
     """

@@ -1,7 +1,7 @@
 """Assets of one type: sizes, roles, masses, frictions, parts.
 
-Within a type, numbers are drawn by rank: the smallest, the middle and the largest asset have the
-table's minimum, median and maximum, and only who gets which is random.
+Within a type, sizes are drawn by rank: the smallest, the middle and the largest asset have the
+table's minimum, median and maximum; random is only which asset gets which rank.
 """
 
 from __future__ import annotations
@@ -26,23 +26,27 @@ SEED = 0
 
 _FRICTION: Range = (0.4, 0.6, 0.8)
 _COARSE_M = 0.002
-"""Sizes of furniture are whole multiples of this; halves then lie on the parts' grid."""
+"""Sizes are integer multiples of this, so that their halves lie on the parts' grid."""
 _FINE_M = 0.0004
-"""The same for what is thinner than `_THIN_M`, as rugs are."""
+"""The same for lengths below `_THIN_M`, as the height of rugs."""
 _THIN_M = 0.05
 _MASS_POWER = 0.75
-"""Mass grows slower than volume: large things are hollower."""
+"""Exponent of mass over volume: large assets are hollower."""
 _MASS_LIMITS = (0.5, 2.0)
+"""Smallest and largest ratio of an asset's mass to its type's."""
 
 
 def shares(ranks: NDArray[np.int64]) -> list[float]:
-    """Turn ranks 0…n-1 into shares 0…1; a single asset is the median."""
+    """Turn ranks 0 to n - 1 into shares 0 to 1; a single asset is the median, 0.5."""
     last = max(1, len(ranks) - 1)
     return [float(rank) / last if len(ranks) > 1 else 0.5 for rank in ranks]
 
 
 def from_share(span: Range, share: float) -> float:
-    """Value at a share of a distribution that is dense around its median, thin at its ends."""
+    """Return the quantile of a distribution that is dense around its median, thin at its ends.
+
+    `span` is minimum, median and maximum; shares 0, 0.5 and 1 give exactly these.
+    """
     low, median, high = span
     t = abs(2.0 * share - 1.0)
     reach = t * (0.35 + 0.65 * t)
@@ -54,6 +58,7 @@ def _sizes(asset_type: AssetType, rng: Generator) -> list[Vec3]:
     common = rng.random(count)
     axes = []
     for span in (asset_type.width, asset_type.depth, asset_type.height):
+        # A common and an own part: `likeness` mixes them, and only the ranks of the mix count.
         own = rng.random(count)
         latent = asset_type.likeness * common + (1.0 - asset_type.likeness) * own
         ranks = np.argsort(np.argsort(latent, kind="stable"), kind="stable")

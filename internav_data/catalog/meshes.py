@@ -1,4 +1,4 @@
-"""Triangles of parts and assets: the same polyhedra that physics and footprints see."""
+"""Triangles of parts and assets: the polyhedra that physics and footprints use."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def hull_faces(corners: Floats) -> Ints:
-    """Triangles (m, 3) of the convex hull of points (n, 3), counter-clockwise from outside."""
+    """Return the hull's triangles (m, 3) of points (n, 3), counter-clockwise from outside."""
     from scipy.spatial import ConvexHull  # noqa: PLC0415 - imported when used
 
     hull = ConvexHull(corners)
@@ -29,7 +29,7 @@ def hull_faces(corners: Floats) -> Ints:
 
 @lru_cache(maxsize=8)
 def _fixed_faces(shape: Shape) -> Ints:
-    """Topology of boxes, cylinders and spheres: that of the unit solid."""
+    """Return the triangles of a box, cylinder or sphere: those of the unit solid."""
     from internav_data.records import Part  # noqa: PLC0415 - as a value only here
 
     origin, whole = (0.0, 0.0, 0.0), (2.0, 2.0, 2.0)

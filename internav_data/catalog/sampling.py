@@ -1,4 +1,4 @@
-"""A design's random choices and its palettes."""
+"""Random choices of a design, and its palettes."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ _BATCH = 64
 
 
 class UniformSampler:
-    """Uniform numbers only, drawn in batches: the same for any release of numpy's samplers."""
+    """Sampler of uniform numbers alone, in batches: the same for any release of numpy."""
 
     def __init__(self, rng: Generator) -> None:
         self._rng = rng
@@ -104,7 +104,7 @@ class UniformSampler:
         return Paint(self.pick(_FABRICS), "fabric")
 
     def cover(self) -> Paint:
-        """Return what seats are covered with: cloth, one in three times leather."""
+        """Return a seat's cover: cloth, in three of ten cases leather."""
         return Paint(self.pick(_LEATHERS), "leather") if self.chance(0.3) else self.fabric()
 
     def plastic(self) -> Paint:

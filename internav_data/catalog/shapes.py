@@ -32,7 +32,7 @@ _ROTATION: dict[Axis, Quaternion] = {
 
 
 class Paint(NamedTuple):
-    """What a part's surface is."""
+    """Colour and material of a part's surface."""
 
     colour: RGB
     material: str
@@ -60,13 +60,13 @@ def _bounds(points: Iterable[Vec3]) -> tuple[Vec3, Vec3]:
 
 
 def ring(x: float, y: float, z: float, rx: float, ry: float, sides: int = 12) -> list[Vec3]:
-    """Corners of a level ellipse, first at +x, counter-clockwise."""
+    """Return the corners of a level ellipse, first at +x, counter-clockwise; metres."""
     turns = (2.0 * math.pi * k / sides for k in range(sides))
     return [(x + rx * math.cos(t), y + ry * math.sin(t), z) for t in turns]
 
 
 class Sketch:
-    """Solids drawn so far. All lengths in metres."""
+    """Sketch of an asset: the solids drawn so far. All lengths in metres."""
 
     def __init__(self) -> None:
         self._marks: list[_Mark] = []
@@ -172,6 +172,7 @@ class Sketch:
         starts = (-size[0] / 2.0, -size[1] / 2.0, 0.0)
         scales = [size[k] / (high[k] - low[k]) for k in range(3)]
 
+        # Ends are snapped, not middles and sizes: parts that touch in the drawing still touch.
         def snapped(point: Vec3) -> tuple[int, int, int]:
             a, b, c = (
                 round((starts[k] + (point[k] - low[k]) * scales[k]) / GRID_M) for k in range(3)

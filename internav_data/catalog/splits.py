@@ -1,4 +1,4 @@
-"""Shares of the assets for training, validation and test, as --unseen-assets wants them."""
+"""Split of the assets into training, validation and test, for `--unseen-assets`."""
 
 from __future__ import annotations
 

@@ -115,7 +115,10 @@ def _asset(path: Path, note: MeshNote) -> Asset:
 
 
 def _laid_flat(pieces: list[Piece]) -> list[Piece]:
-    """Turn pieces onto the face of their common hull that they rest on most surely."""
+    """Turn pieces onto the face of their common hull with the most probable stable pose.
+
+    The probabilities are trimesh's (Goldberg et al. 1999), without noise of the centre of mass.
+    """
     import trimesh  # noqa: PLC0415 - only for users with meshes
 
     hull = trimesh.convex.convex_hull(np.vstack([piece.corners for piece in pieces]))
@@ -129,7 +132,7 @@ def _laid_flat(pieces: list[Piece]) -> list[Piece]:
 
 
 def _read(path: Path) -> tuple[Floats, NDArray[np.int64], RGB]:
-    """Read vertices (n, 3), triangles (m, 3) and a mean colour, bounded and from memory."""
+    """Read vertices (n, 3) float64, triangles (m, 3) int64 and a mean colour, size-limited."""
     if path.is_symlink() or not path.is_file():
         raise UsageError(f"{path}: not a plain file; copy the mesh itself into the folder")
     size = path.stat().st_size
@@ -161,7 +164,7 @@ def _read(path: Path) -> tuple[Floats, NDArray[np.int64], RGB]:
 
 
 def _mean_colour(mesh: Any) -> RGB:  # noqa: ANN401 - trimesh is imported when used
-    """Mean of the material's or the faces' colours, grey where there are none."""
+    """Return the mean of the material's or the faces' colours, grey where there are none."""
     try:
         visual = mesh.visual
         if not getattr(visual, "defined", False):
@@ -173,9 +176,11 @@ def _mean_colour(mesh: Any) -> RGB:  # noqa: ANN401 - trimesh is imported when u
 
 
 def _fitted(path: Path, pieces: list[Any], colour: RGB) -> tuple[tuple[Part, ...], Vec3]:
-    """Centre pieces on x = y = 0 and z = 0, in stored numbers, the box exact."""
+    """Set pieces on z = 0, centred on x = y = 0, in multiples of 0.1 mm; return parts and size."""
     corners = np.vstack([piece.corners for piece in pieces])
     low, high = corners.min(axis=0), corners.max(axis=0)
+    # Integer steps of 0.2 mm: sizes are even numbers of them, so that the middle is on the grid,
+    # and corners are scaled to fill the rounded box exactly.
     steps = np.maximum(2, 2 * np.rint((high - low) / (2.0 * _GRID_M)).astype(np.int64))
     start = np.array([-steps[0] // 2, -steps[1] // 2, 0])
     parts = []

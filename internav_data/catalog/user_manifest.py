@@ -1,4 +1,4 @@
-"""A user's `assets.toml`: what the meshes of a folder are.
+"""Reader of a user's `assets.toml`: type, mass, friction and size of the meshes of a folder.
 
 Tables: `[default]` holds for every mesh, `["duck.obj"]` for one file. Keys of both:
 
@@ -36,7 +36,7 @@ _MAX_MASS_KG = 1e5
 
 @dataclass(frozen=True, slots=True)
 class MeshNote:
-    """What a user says about one mesh; None where the reader decides."""
+    """Settings of one mesh; None where the reader decides."""
 
     type: str | None = None
     mass_kg: float | None = None

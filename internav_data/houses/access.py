@@ -1,4 +1,8 @@
-"""Which rooms can have a door between them, and which should."""
+"""Doors between rooms: the walls in which one is possible, and the pairs of rooms that get one.
+
+The doors of a house are a spanning tree of its rooms (every room can be reached) and further doors
+that close loops (there is more than one path).
+"""
 
 from __future__ import annotations
 
@@ -17,7 +21,7 @@ if TYPE_CHECKING:
     from internav_data.houses.plan import FloorGrid, RoomEdge, WallSegment
 
 JAMB_CM = 10
-"""Least distance of an opening from the centre line of a wall that meets its own."""
+"""Smallest distance of an opening from the centre line of a wall that meets its own."""
 DEPTH_CM = HALF_WALL_CM + DOOR_CLEAR_CM + HALF_WALL_CM
 """Centre-line depth that a room needs behind a door."""
 
@@ -27,21 +31,22 @@ _UNKNOWN_COST = (1.2, 4.0, 14.0)
 
 @dataclass(frozen=True, slots=True)
 class WallSpan:
-    """A stretch of wall in which an opening may lie; centimetres."""
+    """Stretch of wall in which an opening may lie; centimetres."""
 
     along_x: bool
     at: int
+    """y of a wall along x, x of one along y."""
     low: int
     high: int
 
     @property
     def length(self) -> int:
-        """Centimetres."""
+        """Length, centimetres."""
         return self.high - self.low
 
 
 def door_cost(first: str, second: str) -> float:
-    """Return how unusual a door between two types of room is."""
+    """Return the cost of a door between two types of room: unusual doors are dear."""
     key = type_pair(first, second)
     if key in ROOM_PAIRS:
         return ROOM_PAIRS[key].door_cost
@@ -49,12 +54,13 @@ def door_cost(first: str, second: str) -> float:
 
 
 def _deep_enough(grid: FloorGrid, segment: WallSegment, m: int, side: int) -> bool:
-    """Whether the room on one side of a wall is deep enough for a door beside grid cell m."""
+    """Return whether the room on one side (-1, +1) of a wall is deep enough beside grid line m."""
     lines = grid.ys if segment.along_x else grid.xs
     room = segment.before if side < 0 else segment.after
     if room == OUTSIDE:
         return True
     k = lines.index(segment.at)
+    # Walk away from the wall, cell by cell, until the depth is reached or the room ends.
     step = -1 if side < 0 else 0
     while 0 <= k + step < len(lines) - 1:
         owner = grid.at(m, k + step) if segment.along_x else grid.at(k + step, m)
@@ -68,9 +74,10 @@ def _deep_enough(grid: FloorGrid, segment: WallSegment, m: int, side: int) -> bo
 
 
 def spans(grid: FloorGrid, segment: WallSegment) -> list[WallSpan]:
-    """Stretches of a wall where doors have their clear depth on both sides."""
+    """Return the stretches of a wall where doors have their clear depth on both sides."""
     stops = grid.xs if segment.along_x else grid.ys
     out: list[WallSpan] = []
+    # A run of good grid cells is one span: `start` is where the present run begins.
     start: int | None = None
     for m in range(len(stops) - 1):
         if stops[m] < segment.low or stops[m] >= segment.high:
@@ -87,7 +94,7 @@ def spans(grid: FloorGrid, segment: WallSegment) -> list[WallSpan]:
 
 
 def possible_doors(grid: FloorGrid, width_cm: int) -> dict[RoomEdge, list[WallSpan]]:
-    """Where doors of at least a width can be, by pair of rooms (ascending), longest span first."""
+    """Return the wall spans of at least a width by pair of rooms, ascending, longest span first."""
     out: dict[RoomEdge, list[WallSpan]] = {}
     for segment in grid.segments:
         if OUTSIDE in {segment.before, segment.after} or segment.length < width_cm:
@@ -104,7 +111,7 @@ def possible_doors(grid: FloorGrid, width_cm: int) -> dict[RoomEdge, list[WallSp
 def _ensuite(
     types: Sequence[str], edges: Sequence[RoomEdge], rng: Generator
 ) -> tuple[int, int] | None:
-    """Of several bathrooms, one may belong to a bedroom: (bathroom, bedroom)."""
+    """Choose (bathroom, bedroom) where one of several bathrooms belongs to a bedroom, else None."""
     bathrooms = [k for k, name in enumerate(types) if name == "bathroom"]
     if len(bathrooms) < 2 or float(rng.random()) < 0.15:  # noqa: PLR2004 - one bath is for all
         return None
@@ -132,8 +139,10 @@ def door_tree(
     for a, b in edges:
         cost = door_cost(types[a], types[b]) + jitter * float(rng.random())
         if ensuite is not None and ensuite[0] in {a, b} and set(ensuite) != {a, b}:
+            # Dearer than any other door: no path leads through an ensuite bathroom.
             cost += 40.0
         weighted.append((cost, a, b))
+    # Rooms that doors join already have the same number here.
     group = list(range(len(types)))
     chosen: list[RoomEdge] = []
     for _, a, b in sorted(weighted):
@@ -153,7 +162,10 @@ def loop_doors(
     share: float,
     rng: Generator,
 ) -> list[RoomEdge]:
-    """Further doors that make ways round: between public rooms, and from bedroom to bathroom."""
+    """Draw further doors that close loops: between public rooms, and pairs with a `loop_share`.
+
+    `share` is the share of the doors wished for that are built, `HouseConfig.loops`.
+    """
     out: list[tuple[int, int]] = []
     for a, b in sorted(set(edges) - set(tree)):
         draw = float(rng.random())

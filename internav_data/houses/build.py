@@ -90,7 +90,7 @@ def _rooms(
 
 
 def _ceiling_cm(key: SceneKey) -> int:
-    """Draw a height for the whole house: mostly 2.5 to 2.8 m."""
+    """Draw the ceiling height of a house: mostly 2.5 to 2.8 m."""
     rng = key.generator(Purpose.FLOOR_PLAN, draw=FloorPlanStream.CEILING)
     low, high = CEILING_CM
     draw = float(rng.random())

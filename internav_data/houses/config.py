@@ -1,4 +1,4 @@
-"""What a user may ask of a house."""
+"""Settings of houses, and the reader of the option `rooms`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ COUNT_HELP = "a count (4), a range (2-5) or a programme (kitchen,living,bedroom:
 
 @dataclass(frozen=True, slots=True)
 class RoomsRequest:
-    """What `rooms` asks for: counts to choose from, or a programme; both empty for the quota."""
+    """Request of the option `rooms`: counts to choose from, a programme, or neither."""
 
     counts: tuple[int, ...] = ()
     programme: tuple[str, ...] = ()
@@ -25,7 +25,7 @@ class RoomsRequest:
 
 @dataclass(frozen=True, slots=True)
 class HouseConfig:
-    """How houses are built. Every field is a lever a user may turn."""
+    """Settings of house generation."""
 
     preset: HousePreset = "paper"
     """`paper`: generous rooms of about 24 m², calibrated to the paper's Table 2; `realistic`:
@@ -44,17 +44,17 @@ class HouseConfig:
     scale_large: Annotated[float, Bounds(0.7, 2.0)] = 1.0
     """Further factor for houses of 6-10 rooms."""
     furnishing: Annotated[float, Bounds(0.0, 2.0)] = 1.0
-    """How much stands in a room beside what it cannot do without: 0 bare, 1 lived in, 2 crowded."""
+    """Amount of furniture beyond the indispensable: 0 bare, 1 lived in, 2 crowded."""
     loops: Annotated[float, Bounds(0.0, 1.0)] = 0.95
-    """Share of the sensible further doors that are built, so that there are ways round."""
+    """Share of the sensible further doors that are built, so that paths have alternatives."""
     wide_openings: Annotated[float, Bounds(0.0, 1.0)] = 0.95
     """Share of wide, double and open doorways where they make sense. `paper` only."""
     wings: Annotated[float, Bounds(0.0, 1.0)] = 1.0
     """Share of drawn plans whose living room leads to rooms of its own: longer room paths."""
     rooms_on_way_medium: Annotated[float, Bounds(2.0, 5.0)] = 2.7
-    """Rooms on the way between two random points that plans of 3-5 rooms aim at. `paper` only."""
+    """Mean number of rooms on a path, at which plans of 3-5 rooms aim. `paper` only."""
     rooms_on_way_large: Annotated[float, Bounds(2.0, 6.0)] = 4.2
-    """The same for 6-10 rooms. Doors of loops shorten it again."""
+    """The same for 6-10 rooms. Doors of loops shorten paths again."""
     hall_from: Annotated[int, Bounds(0, 11)] = 0
     """Houses of this many rooms and more have a hall; 0 for the preset's own: 7 in `paper`, as
     suits Table 2, 5 in `realistic`."""
@@ -98,7 +98,7 @@ class HouseConfig:
         return self.scale * by_size
 
     def rooms_on_path(self, rooms: int) -> float | None:
-        """Return how many rooms a way through a house of so many should cross; None: any."""
+        """Return the mean number of rooms on a path that a house of so many aims at; None: any."""
         medium, large = 3, 6
         if self.preset != "paper" or rooms < medium:
             return None
@@ -111,8 +111,7 @@ def parse_rooms(text: str) -> RoomsRequest:
     Raises
     ------
     UsageError
-        For what is no count, range or programme, or one that no house of 1 to 10 rooms can be.
-
+        For text that is no count, range or programme, or one that no house of 1 to 10 rooms has.
     """
     text = text.strip()
     if not text:

@@ -26,11 +26,26 @@ class WallFace:
     turn: int
     """Quarter turns that carry local x onto the wall's direction."""
     length: float
+    """Length, metres."""
     windows: int
+    """Number of windows in the face."""
 
 
 def poses_along(edge: WallFace, along: Floats) -> Floats:
-    """Return spots (n, 3) at distances along a wall face: x, y, quarter turns."""
+    """Return poses at distances along a wall face.
+
+    Parameters
+    ----------
+    edge
+        Wall face of a room.
+    along
+        (n,) float64: distances from the face's start, metres.
+
+    Returns
+    -------
+    ndarray
+        (n, 3) float64: x and y in metres, quarter turns.
+    """
     dx, dy = ((1, 0), (0, 1), (-1, 0), (0, -1))[edge.turn]
     out = np.empty((len(along), 3))
     for k, p in enumerate(along):
@@ -41,12 +56,16 @@ def poses_along(edge: WallFace, along: Floats) -> Floats:
 def wall_faces(
     corners: Sequence[tuple[int, int]], openings: Sequence[Opening]
 ) -> tuple[WallFace, ...]:
-    """Wall faces of a room: its polygon moved inwards by half a wall."""
+    """Return the wall faces of a room: its polygon, moved inwards by half a wall.
+
+    Corners are centimetres, counter-clockwise; faces are metres.
+    """
     count = len(corners)
     directions = []
     for k in range(count):
         (ax, ay), (bx, by) = corners[k], corners[(k + 1) % count]
         directions.append(((bx > ax) - (bx < ax), (by > ay) - (by < ay)))
+    # The inward normal of an edge is its direction turned left; a corner moves along both.
     inner = []
     for k in range(count):
         (ux, uy), (vx, vy) = directions[k - 1], directions[k]

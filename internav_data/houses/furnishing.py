@@ -1,4 +1,4 @@
-"""One room while it is furnished: what stands in it, what must stay clear, where its walls are."""
+"""State of one room while it is furnished: items, keep-out boxes, free nodes, wall faces."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from internav_data.core.typing import Floats
     from internav_data.houses.pieces import Group
     from internav_data.houses.plan import FloorGrid, FloorPlan, Opening
+    from internav_data.houses.room_types import Placement
 
 CAPACITY = 160
 """Largest number of boxes in one room."""
@@ -34,10 +35,10 @@ MIN_FREE = 0.45
 JOINED = 0.93
 """Share of the free nodes that are joined to the doors: pockets are small."""
 SMALL_NODES = 60
-"""Rooms with fewer nodes than this are small: bathrooms, storage."""
+"""Rooms with fewer nodes than this are small, and get the values below: bathrooms, storage."""
 MIN_FREE_SMALL, JOINED_SMALL = 0.25, 0.84
 WINDOW_DEPTH_M = 0.45
-"""What stands nearer to a window than this must be lower than its sill."""
+"""Depth before a window in which items must be lower than its sill."""
 
 
 @dataclass(slots=True)
@@ -100,14 +101,28 @@ class RoomState:
         return True
 
     def along_walls(
-        self, group: Group, rng: Generator, prefer: str, *, step: float = 0.1
+        self, group: Group, rng: Generator, placement: Placement, *, step: float = 0.1
     ) -> Floats:
-        """Spots with the group's back to a wall, the best liked first.
+        """Return poses with the group's back to a wall, the preferred one first.
 
-        `prefer` is "corner", "centre", "far" (from doors), "sun" (near windows) or "any".
+        Parameters
+        ----------
+        group
+            Group in its own frame: the wall is y = 0.
+        rng
+            Random numbers of the room: preferences are jittered, so that rooms differ.
+        placement
+            "corner", "centre" (of a wall), "sun" (near windows) or "any".
+        step
+            Distance between poses, metres.
+
+        Returns
+        -------
+        ndarray
+            (m, 3) float64: x and y in metres, quarter turns.
         """
         poses: list[Floats] = []
-        likes: list[Floats] = []
+        penalties: list[Floats] = []
         # A finger's breadth to the walls on either side, as to the one behind.
         left, right = group.left - BACK_GAP_M, group.right + BACK_GAP_M
         for edge in self.wall_faces:
@@ -118,24 +133,31 @@ class RoomState:
             along: Floats = np.arange(count, dtype=np.float64) * step - left
             along[-1] = edge.length - right
             ends = np.minimum(along + left, edge.length - along - right)
-            like = 0.6 * rng.random(count)
-            if prefer == "corner":
-                like += 3.0 * ends
-            elif prefer == "centre":
-                like += 1.2 * np.abs(along + 0.5 * (left + right) - edge.length / 2) - 0.15 * spare
-            elif prefer == "sun":
-                like += 0.3 * ends - 0.8 * min(edge.windows, 1)
-            like += 0.8 * float(rng.random())
+            # Metres, roughly: a corner 0.2 m nearer outweighs the jitter.
+            penalty = 0.6 * rng.random(count)
+            if placement == "corner":
+                penalty += 3.0 * ends
+            elif placement == "centre":
+                penalty += (
+                    1.2 * np.abs(along + 0.5 * (left + right) - edge.length / 2) - 0.15 * spare
+                )
+            elif placement == "sun":
+                penalty += 0.3 * ends - 0.8 * min(edge.windows, 1)
+            # One draw for the whole wall, so that rooms do not all begin at the same one.
+            penalty += 0.8 * float(rng.random())
             poses.append(poses_along(edge, along))
-            likes.append(like)
+            penalties.append(penalty)
         if not poses:
             return np.empty((0, 3))
-        order = np.argsort(np.concatenate(likes), kind="stable")
+        order = np.argsort(np.concatenate(penalties), kind="stable")
         found: Floats = np.concatenate(poses)[order]
         return found
 
     def in_the_open(self, group: Group, rng: Generator) -> Floats:
-        """Spots away from the walls, nearest to the middle of the room first."""
+        """Return poses away from the walls, nearest to the middle of the room first.
+
+        The shape is (m, 3) float64: x and y in metres, quarter turns.
+        """
         x0, y0, x1, y1 = (float(v) for v in self.inner)
         xs = np.arange(round(x0 / SPACING_M), round(x1 / SPACING_M) + 1) * SPACING_M
         ys = np.arange(round(y0 / SPACING_M), round(y1 / SPACING_M) + 1) * SPACING_M
@@ -143,18 +165,21 @@ class RoomState:
         first = int(float(rng.random()) * 4)
         grids = []
         for turn in (first, (first + 1) % 4):
-            like = np.hypot(x - (x0 + x1) / 2, y - (y0 + y1) / 2) + 0.7 * rng.random(len(x))
-            # Long things lie along the room's longer side.
+            penalty = np.hypot(x - (x0 + x1) / 2, y - (y0 + y1) / 2) + 0.7 * rng.random(len(x))
+            # Long groups lie along the room's longer side.
             lengthwise = (turn % 2 == 0) == (x1 - x0 >= y1 - y0)
-            like += 0.0 if lengthwise == (group.right - group.left >= group.depth) else 0.8
-            grids.append(np.column_stack([x, y, np.full(len(x), float(turn)), like]))
+            penalty += 0.0 if lengthwise == (group.right - group.left >= group.depth) else 0.8
+            grids.append(np.column_stack([x, y, np.full(len(x), float(turn)), penalty]))
         every = np.concatenate(grids)
         found: Floats = every[np.argsort(every[:, 3], kind="stable")][:, :3]
         return np.ascontiguousarray(found)
 
 
 def _box_beside(opening: Opening, side: int, depth_cm: float, bottom: float, top: float) -> Floats:
-    """Box beside an opening, on the side of lower (-1) or higher (+1) coordinates."""
+    """Box (6,) beside an opening, on the side of lower (-1) or higher (+1) coordinates.
+
+    Depth in centimetres, bottom and top in metres.
+    """
     face = opening.at + side * HALF_WALL_CM
     near, far = sorted((face, face + side * depth_cm))
     flat = (
@@ -166,7 +191,7 @@ def _box_beside(opening: Opening, side: int, depth_cm: float, bottom: float, top
 
 
 def _side_of(grid: FloorGrid, room: int, opening: Opening) -> int:
-    """On which side of an opening a room lies."""
+    """Side of an opening on which a room lies: -1 for lower, +1 for higher coordinates."""
     stops, lines = (grid.xs, grid.ys) if opening.along_x else (grid.ys, grid.xs)
     m = next(k for k in range(len(stops) - 1) if stops[k + 1] > opening.low)
     k = lines.index(opening.at)
@@ -176,6 +201,8 @@ def _side_of(grid: FloorGrid, room: int, opening: Opening) -> int:
 
 def _door_cell(opening: Opening, side: int, origin: NDArray[np.int64]) -> tuple[int, int]:
     """Return the node of a door's channel that lies furthest in the room."""
+    # 25 cm is the lattice's spacing, 20 cm the disc's radius. Across the wall: the last node from
+    # which the disc still lies in the clear depth. Along it: the node nearest to the middle.
     along = round((opening.low + opening.high) / 2 / 25)
     if not opening.low + 20 <= along * 25 <= opening.high - 20:
         along += 1 if along * 25 < opening.low + 20 else -1
@@ -270,5 +297,5 @@ def _other_rooms(grid: FloorGrid, room: int, ceiling_m: float) -> list[Floats]:
 
 
 def quarter_quaternion(turn: int) -> tuple[float, float, float, float]:
-    """Quaternion of a number of quarter turns."""
+    """Return the quaternion (x, y, z, w) of a number of quarter turns about z."""
     return yaw_quaternion(90.0 * (turn % 4))

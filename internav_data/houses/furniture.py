@@ -1,4 +1,4 @@
-"""Furnish a house: room by room, rule by rule, each group at the first spot where it fits."""
+"""Furnish a house: room by room, rule by rule, each group at the first pose where it fits."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from internav_data.records import SceneKey
 
 CERTAIN = 1.0
-"""Rules of this share are what a room cannot do without."""
+"""Share from which on a rule is indispensable: its group is tried at any furnishing."""
 MAX_GROUPS = 4
-"""Most groups that one rule puts into one room."""
+"""Largest number of groups that one rule puts into one room."""
 
 
 def furnish(
@@ -34,11 +34,27 @@ def furnish(
     density: float,
     catalogue: Catalogue,
 ) -> tuple[SceneObject, ...]:
-    """Return the things of a house, by room and group."""
+    """Return the furniture of a house, by room and group.
+
+    Parameters
+    ----------
+    key
+        Key of the scene's random numbers.
+    floor_plan
+        Rooms to furnish.
+    openings
+        Doors and windows: items keep clear of them.
+    ceiling_m
+        Height of the rooms, metres.
+    density
+        `HouseConfig.furnishing`.
+    catalogue
+        Assets to choose from.
+    """
     objects: list[SceneObject] = []
     for room in range(len(floor_plan.types)):
         state = room_state(floor_plan, room, openings, ceiling_m)
-        # Each room has numbers of its own: another room's luck does not change it.
+        # Each room has random numbers of its own: furnishing one changes no other.
         rng = key.generator(Purpose.FURNITURE, draw=room)
         _furnish_room(state, frozenset(floor_plan.types), Picker(catalogue, rng), density)
         objects += _scene_objects(state, len(objects), _groups(objects))
@@ -50,7 +66,7 @@ def _groups(objects: Sequence[SceneObject]) -> int:
 
 
 def _times(rule: FurnitureRule, picker: Picker, area_m2: float, density: float) -> int:
-    """How many groups of a rule to try."""
+    """Draw the number of groups of a rule to try: its expected number, rounded at random."""
     draw = float(picker.rng.random())
     if area_m2 < rule.min_m2:
         return 0
@@ -91,7 +107,7 @@ def _try_rule(state: RoomState, rule: FurnitureRule, room: RoomContext, picker: 
 
 
 def _scene_objects(state: RoomState, first: int, first_group: int) -> list[SceneObject]:
-    """Turn a room's groups into things with ids, in the order they were placed."""
+    """Turn a room's groups into objects with ids, in the order they were placed."""
     out: list[SceneObject] = []
     for number, (group, x, y, turn) in enumerate(state.placed):
         base = first + len(out)

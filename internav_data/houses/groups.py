@@ -1,6 +1,6 @@
-"""Groups of furniture by what people do there: sleep, sit, eat, cook, wash, work, keep things.
+"""Makers of furniture groups for sleeping, working, washing and storing.
 
-Each maker returns the variants of one group, the one most wished for first.
+Each maker returns the variants of one group, the preferred one first.
 """
 
 from __future__ import annotations
@@ -28,27 +28,30 @@ DOUBLE_BED_M = 1.3
 """Beds from this width on are for two."""
 SIDE_GAP_M = 0.03
 EYE_LEVEL_M = 1.25
-"""Lower edge of what hangs on a wall."""
+"""Lower edge of pictures and mirrors on a wall."""
 
 
 @dataclass(frozen=True, slots=True)
 class RoomContext:
-    """What a maker may know of the room it furnishes."""
+    """Facts about a room that the makers of groups may use."""
 
     area_m2: float
+    """Area between the wall faces."""
     short_m: float
+    """Shorter side of the largest rectangle in the room."""
     long_m: float
+    """Longer side of the room's bounding box."""
     types: frozenset[str]
     """All types of room in the house."""
 
 
 def narrow(limit: float) -> Callable[[Asset], bool]:
-    """Return a test for assets at most so wide."""
+    """Return a predicate for assets at most `limit` metres wide."""
     return lambda asset: asset.size[0] <= limit
 
 
 def within(low: float, high: float) -> Callable[[Asset], bool]:
-    """Return a test for assets of some width."""
+    """Return a predicate for assets of a width from `low` to `high` metres."""
     return lambda asset: low <= asset.size[0] <= high
 
 
@@ -86,7 +89,7 @@ def bed(p: Picker, room: RoomContext) -> list[Group]:
 
 
 def _narrow_beds(p: Picker) -> list[Group]:
-    """Make the smallest bed, head or side to the wall, for where no other finds a place."""
+    """Make the smallest bed, head or side to the wall, for rooms in which no other fits."""
     asset = p.smallest("Bed")
     if asset is None:
         return []
@@ -98,14 +101,14 @@ def _narrow_beds(p: Picker) -> list[Group]:
 def _plain(
     *kinds: str, front: float = 0.3, share: float = 0.9
 ) -> Callable[[Picker, RoomContext], list[Group]]:
-    """One piece against a wall: any of some types."""
+    """Return a maker of one piece against a wall, of any of some types."""
 
     def make(p: Picker, room: RoomContext) -> list[Group]:
         del room
         out: list[Group] = []
         start = int(float(p.rng.random()) * len(kinds))
         for kind in kinds[start:] + kinds[:start]:
-            # The smallest of its kind where the one drawn finds no place.
+            # The smallest of its kind where the one drawn does not fit.
             for asset in (p.one(kind), p.smallest(kind)):
                 if asset is not None:
                     item = against(asset)
@@ -151,7 +154,7 @@ def vanity(p: Picker, room: RoomContext) -> list[Group]:
 
 
 def side_table(p: Picker, room: RoomContext) -> list[Group]:
-    """Make a small table against a wall, with something on it."""
+    """Make a small table against a wall, with a small item on it."""
     del room
     asset = p.one("SideTable")
     if asset is None:

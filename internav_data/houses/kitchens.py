@@ -1,4 +1,4 @@
-"""Kitchens: runs of counters with stove, sink and fridge, and islands."""
+"""Makers of kitchen groups: runs of counters with stove, sink and fridge, and islands."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _FOODS = ("Microwave", "Bread", "Apple", "Lettuce", "Tomato", "Pot")
 
 
 def _run(p: Picker, kinds: tuple[str, ...], longest: float) -> Group | None:
-    """Pieces side by side along a wall; counters as long as the wall allows."""
+    """Make pieces side by side along a wall; counters as long as the wall allows."""
     fixed: list[Asset | None] = [p.one(kind) if kind != "CounterTop" else None for kind in kinds]
     counters = kinds.count("CounterTop")
     spare = longest - sum(a.size[0] + SEAM_M for a in fixed if a is not None)
@@ -72,7 +72,7 @@ _SHORT_RUNS: tuple[tuple[str, ...], ...] = (
 
 
 def kitchen_run(p: Picker, room: RoomContext) -> list[Group]:
-    """Make everything one cooks with along one wall, as much as fits, then less."""
+    """Make a run with fridge, stove, counters and sink along one wall: the fullest first."""
     start = 0 if room.area_m2 > 12 else 1  # noqa: PLR2004 - m², a roomy kitchen
     kinds = list(_RUNS[start:])
     if p.chance(0.5):
@@ -82,7 +82,7 @@ def kitchen_run(p: Picker, room: RoomContext) -> list[Group]:
 
 
 def short_run(p: Picker, room: RoomContext) -> list[Group]:
-    """Make stove and sink where no whole run found room."""
+    """Make stove and sink, for kitchens in which no run fits."""
     runs = [
         _run(p, k, length)
         for k in _SHORT_RUNS

@@ -1,4 +1,8 @@
-"""Kinds of floor plans: sliced blocks, halls as spines, notches, L-shapes, and plain rows."""
+"""Layouts of floor plans: sliced blocks, halls as spines, notches, L-shapes, and plain rows.
+
+Layouts are rectangles by room, centimetres, centre line to centre line. Blocks are slicing
+floorplans (Otten 1982): a rectangle is cut in two until every room has its own.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +49,7 @@ def _min_depth(specs: Sequence[RoomSpec], rooms: Sequence[int]) -> int:
 
 
 def sliced_layout(specs: Sequence[RoomSpec], rng: Generator) -> Layout:
-    """One block cut by a slicing tree."""
+    """Draw one block, cut by a slicing tree."""
     order = sorted(range(len(specs)), key=lambda k: (_position(specs[k]), k))
     if float(rng.random()) < 0.35:  # noqa: PLR2004 - other orders now and then
         order = _shuffled(rng, order)
@@ -155,7 +159,7 @@ def _fill_band(
 def _end_zone(
     specs: Sequence[RoomSpec], rest: Sequence[int], wings: float, rng: Generator
 ) -> list[int]:
-    """Rooms at the hall's end: living rooms, and in wings what they lead to; () for none."""
+    """Choose the rooms at the hall's end: living rooms, and in wings the rooms they lead to."""
     draw, reach = float(rng.random()), 1 + int(float(rng.random()) * 3)
     if len(rest) <= 3 or draw > 0.85:  # noqa: PLR2004 - four rooms have an end to spare
         return []
@@ -212,7 +216,7 @@ def hall_layout(specs: Sequence[RoomSpec], rng: Generator, wings: float = 0.0) -
 
 
 def row_layout(specs: Sequence[RoomSpec]) -> Layout:
-    """Rooms in a row, along a hall where there is one: plain, and possible for any programme."""
+    """Lay rooms in a row, along a hall where there is one: plain, possible for any programme."""
     halls = [k for k, spec in enumerate(specs) if spec.type == "hall"]
     along = halls[0] if halls and len(specs) > 2 else None  # noqa: PLR2004 - two need no hall
     # Public rooms in the middle, so that fewer private ones are passed through.

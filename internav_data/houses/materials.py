@@ -1,4 +1,4 @@
-"""Floors, walls and ceilings: which surfaces a house has."""
+"""Floor and wall materials of a house."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Doors and windows: where the walls of a floor plan open."""
+"""Doors and windows: kinds, widths and positions of the openings in the walls of a plan."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def _kind(types: tuple[str, str], config: HouseConfig, rng: Generator) -> tuple[
 
 
 def _placed(span: WallSpan, width: int, rng: Generator) -> int:
-    """Low end of an opening: near one end of the wall, so that furniture keeps its length."""
+    """Draw the low end of an opening: near an end of the wall, so that furniture has its length."""
     spare = span.length - width
     draw, where = float(rng.random()), float(rng.random())
     offset = min(spare, 5 + int(20 * where))
@@ -51,7 +51,7 @@ def _placed(span: WallSpan, width: int, rng: Generator) -> int:
 
 
 def draw_doors(key: SceneKey, config: HouseConfig, floor_plan: FloorPlan) -> list[Opening]:
-    """Doors of the tree and of the loops, and the entrance, in order of their rooms."""
+    """Draw the doors of the tree and of the loops, and the entrance, in order of their rooms."""
     rng = key.generator(Purpose.DOORS)
     grid, types = floor_plan.grid, floor_plan.types
     loops = loop_doors(types, sorted(floor_plan.spans), floor_plan.tree, config.loops, rng)
@@ -78,7 +78,7 @@ def _fitting(length: int, config: HouseConfig) -> tuple[DoorKind, int]:
 def _entrance(
     grid: FloorGrid, types: Sequence[str], config: HouseConfig, rng: Generator
 ) -> Opening | None:
-    """One closed door to the outside: at a hall's end if there is one."""
+    """Draw one closed door to the outside: at a hall's end if there is one."""
     width = 100 if config.preset == "paper" else 92
     best: tuple[float, WallSpan, int] | None = None
     for segment in grid.segments:
@@ -103,7 +103,7 @@ def _entrance(
 def draw_windows(
     key: SceneKey, floor_plan: FloorPlan, doors: Sequence[Opening], ceiling_cm: int
 ) -> list[Opening]:
-    """Windows in the outer walls, more of them where people stay."""
+    """Draw windows in the outer walls, more of them in habitable rooms."""
     rng = key.generator(Purpose.WINDOWS)
     grid, out = floor_plan.grid, []
     for segment in grid.segments:

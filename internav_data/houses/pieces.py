@@ -1,11 +1,11 @@
-"""Pieces of furniture and the groups they form, before they stand in a room.
+"""Pieces of furniture and the groups they form, in a frame of their own.
 
 A group's frame: the wall is y = 0 and runs along x, the room lies at y > 0.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -42,7 +42,7 @@ class PlacedAsset:
     turn: int
     z: float = 0.0
     support: int = -1
-    """Index in the group of what it stands on."""
+    """Index in the group of the item it stands on; -1 for the floor or a wall."""
 
     @property
     def half(self) -> tuple[float, float]:
@@ -53,15 +53,15 @@ class PlacedAsset:
 
 @dataclass(frozen=True)
 class Group:
-    """Things that belong together, and the boxes (n, 6) in front of them that stay clear."""
+    """Items that belong together, and the rectangles in front of them that stay clear."""
 
     items: tuple[PlacedAsset, ...]
     clear: tuple[tuple[float, float, float, float], ...] = ()
-    related: bool = field(default=True)
+    """Rectangles x0, y0, x1, y1 in metres."""
 
     @cached_property
     def boxes(self) -> Floats:
-        """Bounding boxes of the items, (n, 6): x0, y0, x1, y1, z0, z1."""
+        """Bounding boxes of the items, (n, 6) float64: x0, y0, x1, y1, z0, z1 in metres."""
         out = np.empty((len(self.items), 6))
         for k, item in enumerate(self.items):
             hx, hy = item.half
@@ -79,26 +79,26 @@ class Group:
 
     @property
     def left(self) -> float:
-        """Least x."""
+        """Smallest x, metres."""
         return float(self.boxes[:, 0].min())
 
     @property
     def right(self) -> float:
-        """Largest x."""
+        """Largest x, metres."""
         return float(self.boxes[:, 2].max())
 
     @property
     def depth(self) -> float:
-        """Extent along y."""
+        """Extent along y, metres."""
         return float(self.boxes[:, 3].max() - self.boxes[:, 1].min())
 
     def with_items(self, *items: PlacedAsset) -> Group:
         """Return the group with further items."""
-        return Group((*self.items, *items), self.clear, self.related)
+        return Group((*self.items, *items), self.clear)
 
     def with_clearance(self, *clear: tuple[float, float, float, float]) -> Group:
         """Return the group with further boxes (x0, y0, x1, y1) to keep clear."""
-        return Group(self.items, (*self.clear, *clear), self.related)
+        return Group(self.items, (*self.clear, *clear))
 
 
 def against(asset: Asset, x: float = 0.0, z: float = 0.0) -> PlacedAsset:
@@ -109,20 +109,23 @@ def against(asset: Asset, x: float = 0.0, z: float = 0.0) -> PlacedAsset:
 def in_front(
     item: PlacedAsset, depth: float, share: float = 1.0
 ) -> tuple[float, float, float, float]:
-    """Box of some depth before an item that faces the room."""
+    """Return the rectangle of a depth (m) before an item that faces the room.
+
+    `share` is the rectangle's share of the item's width.
+    """
     hx, hy = item.half
     return (item.x - hx * share, item.y + hy, item.x + hx * share, item.y + hy + depth)
 
 
 @dataclass(frozen=True, slots=True)
 class Picker:
-    """Chooses assets by type and size."""
+    """Random choice of assets by type and size."""
 
     catalogue: Catalogue
     rng: Generator
 
     def chance(self, share: float) -> bool:
-        """Toss a coin that shows heads with a share."""
+        """Return True in that share of draws."""
         return float(self.rng.random()) < share
 
     def one(
@@ -142,7 +145,7 @@ class Picker:
         return min(found, key=lambda a: (a.size[0] * a.size[1], a.asset_id), default=None)
 
     def parts(self, item: PlacedAsset) -> Floats:
-        """Boxes around the parts of an item, (n, 6), in the group's frame."""
+        """Return boxes around an item's parts, (n, 6) float64, in the group's frame, metres."""
         key = (self.catalogue.digest, item.asset.asset_id)
         if key not in _BOXES:
             corners, starts = asset_corners(item.asset)
@@ -169,6 +172,8 @@ class Picker:
         item = PlacedAsset(asset, below.x + dx, below.y + dy, turn, support=index)
         hx, hy = item.half
         parts = self.parts(below)
+        # The small asset rests on the highest part below it, and that part must carry its whole
+        # rectangle, up to `slack`: nothing stands on a chair's back or over a table's edge.
         over = (
             (parts[:, 0] < item.x + hx)
             & (parts[:, 2] > item.x - hx)
@@ -214,12 +219,12 @@ class Picker:
 
 
 def overlap(first: Floats, second: Floats, gap: float = 0.005) -> bool:
-    """Whether boxes (n, 6) of one thing come nearer than a gap to those of another."""
+    """Return whether boxes (n, 6) of one item come nearer than a gap (m) to those of another."""
     return bool(any_overlap(first, second, gap))
 
 
 def consistent(picker: Picker, group: Group) -> bool:
-    """Whether no two things of a group share volume: a chair may stand under a table."""
+    """Return whether no two items of a group share volume: a chair may stand under a table."""
     boxes = group.boxes
     count = len(boxes)
     for a in range(count):

@@ -42,7 +42,7 @@ class WallSegment:
 
     @property
     def length(self) -> int:
-        """Centimetres."""
+        """Length, centimetres."""
         return self.high - self.low
 
 
@@ -52,6 +52,7 @@ class Opening:
 
     along_x: bool
     at: int
+    """y of an opening in a wall along x, x of one in a wall along y."""
     low: int
     high: int
     rooms: tuple[int, int]
@@ -63,7 +64,7 @@ class Opening:
 
     @property
     def open(self) -> bool:
-        """Whether people can walk through it."""
+        """Return whether people can walk through it: not through windows and the entrance."""
         return self.kind is not None and self.kind != "entrance"
 
 
@@ -92,7 +93,7 @@ class FloorGrid:
         return FloorGrid(tuple(xs), tuple(ys), tuple(tuple(cells) for cells in owner))
 
     def at(self, i: int, j: int) -> int:
-        """Owner of a cell; OUTSIDE beyond the grid."""
+        """Return the room of a cell; OUTSIDE beyond the grid."""
         inside = 0 <= i < len(self.xs) - 1 and 0 <= j < len(self.ys) - 1
         return self.owner[i][j] if inside else OUTSIDE
 
@@ -107,7 +108,7 @@ class FloorGrid:
         return out
 
     def area_cm2(self, room: int) -> int:
-        """Area of a room, centre line to centre line."""
+        """Area of a room, centre line to centre line, cm²."""
         return sum(
             (self.xs[i + 1] - self.xs[i]) * (self.ys[j + 1] - self.ys[j])
             for i, j in self.cells[room]
@@ -119,6 +120,7 @@ class FloorGrid:
         return tuple(self._walls(along_x=False) + self._walls(along_x=True))
 
     def _walls(self, *, along_x: bool) -> list[WallSegment]:
+        # Along each grid line: a wall goes on while the rooms on both sides stay the same.
         lines, stops = (self.ys, self.xs) if along_x else (self.xs, self.ys)
         out: list[WallSegment] = []
         for k, at in enumerate(lines):
@@ -139,6 +141,8 @@ class FloorGrid:
 
     def polygon(self, inside: frozenset[int]) -> tuple[Corner, ...]:
         """Corners of the union of some rooms, counter-clockwise; () where it is in pieces."""
+        # Every border edge of a cell, directed so that the inside lies on its left; a corner from
+        # which two edges leave is one where cells touch only diagonally.
         step: dict[Corner, list[Corner]] = {}
         for i in range(len(self.xs) - 1):
             for j in range(len(self.ys) - 1):
@@ -164,11 +168,13 @@ class FloorGrid:
         return _without_straight(path)
 
     def main_rectangle(self, room: int) -> Rect:
-        """Return the largest rectangle of whole cells inside a room."""
+        """Return the largest rectangle of cells inside a room."""
         cells = set(self.cells[room])
         best, best_area = (0, 0, 0, 0), 0
         for i0, j0 in cells:
-            top = min(self.ys.__len__(), 1000)
+            # From its lower left cell a rectangle grows column by column; each column can only
+            # lower the top.
+            top = len(self.ys)
             i1 = i0
             while (i1, j0) in cells:
                 j1 = j0
@@ -223,13 +229,16 @@ class FloorPlan:
 
 
 def clear_size_m(rect: Rect) -> tuple[float, float]:
-    """Shorter and longer side between the wall faces of a rectangle of centre lines, metres."""
+    """Return the shorter and the longer side between wall faces of a rectangle, metres.
+
+    The rectangle's sides are centre lines of walls.
+    """
     sides = sorted((rect[2] - rect[0] - WALL_CM, rect[3] - rect[1] - WALL_CM))
     return sides[0] / 100.0, sides[1] / 100.0
 
 
 def clear_area_m2(grid: FloorGrid, room: int) -> float:
-    """Area of a room between its wall faces, m²."""
+    """Return the area of a room between its wall faces, m²."""
     # Half a wall off all around, but a rectilinear polygon has four more outer corners than inner
     # ones, at which the strips overlap.
     around = sum(s.length for s in grid.segments if room in {s.before, s.after})

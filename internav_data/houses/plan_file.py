@@ -56,9 +56,9 @@ _DOOR_KINDS: Mapping[str, int] = {
     "wide": 150,
     "double": 200,
 }
-"""Usual widths, centimetres."""
+"""Default widths by kind, centimetres."""
 MIN_USER_DOOR_CM = 70
-"""Narrower than this the agent's disc finds no column of the lattice."""
+"""Smallest width: the agent's disc finds no column of the lattice in a narrower door."""
 _KEYS = {
     "": {"ceiling_m", "rooms", "doors", "windows"},
     "rooms": {"name", "type", "polygon"},

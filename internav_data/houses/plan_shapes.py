@@ -1,4 +1,4 @@
-"""Polygons of a user's floor plan: read, checked and laid on the grid of a Plan."""
+"""Polygons of a user's floor plan: read, checked and laid on a `FloorGrid`."""
 
 from __future__ import annotations
 
@@ -16,16 +16,24 @@ if TYPE_CHECKING:
     from internav_data.houses.plan import Corner, Rect
 
 MIN_SIDE_CM = 100
-"""Narrower rooms leave the agent no place to turn beside furniture."""
+"""Smallest side of a room: narrower ones leave the agent no place to turn beside furniture."""
 MAX_EXTENT_CM = 10_000
+"""Largest coordinate."""
 
 
 class FloorPlanError(ValueError):
-    """What is wrong with a floor plan, before the file's name is known."""
+    """Error in a floor plan, raised before the file's name is known."""
 
 
 def read_polygon(value: object, name: str) -> list[Corner]:
-    """Return a room's corners in centimetres, straight ones dropped."""
+    """Read a room's corners: centimetres, without those in the middle of a straight side.
+
+    Raises
+    ------
+    FloorPlanError
+        When the value is no list of four or more corners, or its polygon is not rectilinear or
+        touches itself.
+    """
     if not isinstance(value, list) or len(value) < 4:  # noqa: PLR2004 - a rectangle has four
         raise FloorPlanError(
             f"room '{name}': 'polygon' needs four or more corners [x, y] in metres"
@@ -69,13 +77,13 @@ def read_polygon(value: object, name: str) -> list[Corner]:
 
 
 def _straight(a: Corner, b: Corner, c: Corner) -> bool:
-    """Whether a way goes straight on at b (and not back)."""
+    """Return whether the outline goes straight on at b, and not back."""
     (ux, uy), (vx, vy) = (b[0] - a[0], b[1] - a[1]), (c[0] - b[0], c[1] - b[1])
     return ux * vy == uy * vx and ux * vx + uy * vy > 0
 
 
 def _check_simple(corners: Sequence[Corner], name: str) -> None:
-    """Complain about sides that touch or cross others than their neighbours."""
+    """Raise FloorPlanError where a side touches or crosses one that is not its neighbour."""
     count = len(corners)
     sides = [(corners[k], corners[(k + 1) % count]) for k in range(count)]
     for a, b in itertools.combinations(range(count), 2):
@@ -90,7 +98,7 @@ def _check_simple(corners: Sequence[Corner], name: str) -> None:
 
 
 def _covers(corners: Sequence[Corner], x: float, y: float) -> bool:
-    """Whether a point (never on a side) lies inside: count the sides to its right."""
+    """Return whether a point (never on a side) lies inside: count the sides to its right."""
     inside = False
     for (ax, ay), (bx, by) in itertools.pairwise([*corners, corners[0]]):
         if ax == bx and ax > x and min(ay, by) < y < max(ay, by):
@@ -101,7 +109,13 @@ def _covers(corners: Sequence[Corner], x: float, y: float) -> bool:
 def lay_out(
     polygons: Sequence[Sequence[Corner]], names: Sequence[str]
 ) -> tuple[FloorGrid, tuple[int, int]]:
-    """Lay rooms on a grid; return the plan and how far it was moved (centimetres)."""
+    """Lay rooms on a grid; return it and the shift of the origin (x, y), centimetres.
+
+    Raises
+    ------
+    FloorPlanError
+        When rooms overlap, are apart, enclose a gap or are too narrow.
+    """
     left = min(x for corners in polygons for x, _ in corners) + HALF_WALL_CM
     low = min(y for corners in polygons for _, y in corners) + HALF_WALL_CM
     moved = [[(x - left, y - low) for x, y in corners] for corners in polygons]
@@ -128,7 +142,7 @@ def lay_out(
 
 
 def _check_tiling(grid: FloorGrid, names: Sequence[str]) -> None:
-    """Complain about gaps between rooms and about rooms too narrow to furnish."""
+    """Raise FloorPlanError for gaps between rooms and for rooms too narrow to furnish."""
     for room, name in enumerate(names):
         x0, y0, x1, y1 = grid.main_rectangle(room)
         if min(x1 - x0, y1 - y0) < MIN_SIDE_CM:

@@ -1,4 +1,4 @@
-"""Which rooms a house has and how large each wants to be."""
+"""Programme of a house: its rooms, with the area that each wants."""
 
 from __future__ import annotations
 
@@ -19,16 +19,18 @@ if TYPE_CHECKING:
     from internav_data.records import SceneKey
 
 PAPER_AREA_M2 = 25.0
-"""Area a room in the paper preset, measured on ProcTHOR's houses: 26, 47, 67, 103 … m²."""
+"""Mean area of a room in the preset `paper`: ProcTHOR's houses have 26, 47, 67, 103 … m²."""
 
 
 @dataclass(frozen=True, slots=True)
 class RoomSpec:
-    """One room of the programme: its type, the area it wants and the standard it must keep."""
+    """One room of the programme."""
 
     type: str
     area_m2: float
+    """Wanted area, between the centre lines of the walls."""
     standard: RoomStandard
+    """Sizes that the room must keep."""
 
 
 _HOMES: Mapping[int, tuple[tuple[float, str], ...]] = {
@@ -108,7 +110,7 @@ def _standards(types: list[str], config: HouseConfig, rng: Generator) -> list[Ro
 
 
 def _areas(standards: list[RoomStandard], config: HouseConfig, rng: Generator) -> list[float]:
-    """Areas wanted, centre line to centre line, m²."""
+    """Draw the wanted areas, centre line to centre line, m²."""
     spread = 0.14 if config.preset == "paper" else 0.10
     areas = [s.area_m2 * math.exp(spread * float(rng.standard_normal())) for s in standards]
     areas = [min(s.high_m2, max(s.low_m2, a)) for s, a in zip(standards, areas, strict=True)]
@@ -122,7 +124,7 @@ def _areas(standards: list[RoomStandard], config: HouseConfig, rng: Generator) -
 
 
 def programme(key: SceneKey, config: HouseConfig) -> tuple[RoomSpec, ...]:
-    """Return the rooms of one house.
+    """Draw the rooms of one house.
 
     The number of rooms is the same in every attempt: the quota must not depend on what failed.
     """

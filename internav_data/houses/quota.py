@@ -1,4 +1,4 @@
-"""How many rooms a scene has: a low-discrepancy sequence, so that any prefix has the shares right.
+"""Number of rooms of each scene: a low-discrepancy sequence, so that any prefix keeps the shares.
 
 Source of the shares: Table 2 of the paper (1-2, 3-5 and 6-10 rooms); inside 1-2 rooms 56 % to 44 %.
 """
@@ -23,7 +23,8 @@ SHARES: Mapping[int, float] = {
 """Share of scenes by room count; sums to 1."""
 
 GOLDEN = 0.6180339887498949
-"""Fractional parts of its multiples are the most even sequence there is for intervals."""
+"""The golden ratio's fractional part: its multiples modulo 1 are a Kronecker sequence of lowest
+discrepancy (additive recurrence; Niederreiter 1992)."""
 
 
 def room_count(seed: int, scene: int, shares: Mapping[int, float] = SHARES) -> int:
@@ -37,8 +38,9 @@ def room_count(seed: int, scene: int, shares: Mapping[int, float] = SHARES) -> i
         Index of the scene, 0 and up.
     shares
         Share by room count; they need not sum to one.
-
     """
+    # The golden-ratio sequence, shifted by a random offset and mapped through the inverse
+    # cumulative distribution of the shares.
     turn = float(generator(seed, Purpose.PROGRAMME, episode=ProgrammeStream.COUNTS).random())
     position = (turn + scene * GOLDEN) % 1.0 * sum(shares.values())
     for count in sorted(shares):

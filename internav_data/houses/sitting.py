@@ -1,4 +1,4 @@
-"""Groups to sit in: sofas before televisions, tables with chairs."""
+"""Makers of seating groups: sofas before televisions, tables with chairs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def seating(p: Picker, room: RoomContext) -> list[Group]:
-    """Make sofa facing a television, coffee table between, an armchair beside."""
+    """Make a sofa facing a television, a coffee table between, an armchair beside."""
     stand = p.one("TVStand")
     screen = p.one("Television", lambda a: stand is not None and a.size[0] <= stand.size[0] + 0.05)
     sofa = p.one("Sofa", narrow(max(1.6, 0.6 * room.long_m)), any_size=True)
@@ -42,7 +42,7 @@ def seating(p: Picker, room: RoomContext) -> list[Group]:
 
 
 def _viewing_distances(room: RoomContext, stand: Asset, sofa: Asset) -> list[float]:
-    """Gaps between television stand and sofa: to the opposite wall if that is near, else nearer."""
+    """Return gaps (m) between stand and sofa: to the opposite wall if that is near, else less."""
     gaps = []
     for span in (room.short_m, room.long_m):
         gap = span - stand.size[1] - sofa.size[1] - 2 * BACK_GAP_M - 0.02
@@ -52,7 +52,7 @@ def _viewing_distances(room: RoomContext, stand: Asset, sofa: Asset) -> list[flo
 
 
 def _around(p: Picker, screens: tuple[PlacedAsset, ...], sofa: Asset, gap: float) -> list[Group]:
-    """Make sofa across from a screen, with and without what stands between and beside."""
+    """Make a sofa across from a screen, with and without coffee table, rug and armchair."""
     base = screens[0]
     front = base.y + base.half[1]
     seat = PlacedAsset(sofa, base.x, front + gap + sofa.size[1] / 2.0, FACING_WALL)
@@ -110,7 +110,7 @@ def television(p: Picker, room: RoomContext) -> list[Group]:
 
 
 def dining(p: Picker, room: RoomContext) -> list[Group]:
-    """Make a table with chairs pushed in, for as many as the room can take."""
+    """Make a table with chairs pushed in, as large as the room allows."""
     largest = 1.1 if room.area_m2 < 12 else 1.6 if room.area_m2 < 18 else 2.9  # noqa: PLR2004
     chair = p.one("Chair")
     out: list[list[Group]] = []
@@ -124,7 +124,7 @@ def dining(p: Picker, room: RoomContext) -> list[Group]:
 
 
 def _seated(p: Picker, table: PlacedAsset, chair: Asset | None) -> list[Group]:
-    """Seat people around a table, many first."""
+    """Make a table with six, four, two chairs and one."""
     plain = Group((table,))
     if chair is None:
         return [plain]
@@ -134,7 +134,7 @@ def _seated(p: Picker, table: PlacedAsset, chair: Asset | None) -> list[Group]:
     along = [(k - (seats - 1) / 2.0) * pitch for k in range(seats)]
     long_sides = [p.tucked(table, chair, side, a) for side in (0, 2) for a in along]
     ends = [p.tucked(table, chair, side, 0.0) for side in (1, 3)]
-    # Corners have room for one pair of knees.
+    # A corner has room for one chair: those at the ends give way.
     near = [p.parts(item) for item in long_sides]
     ends = [e for e in ends if not any(overlap(p.parts(e), other, 0.04) for other in near)]
     kind = ("Apple", "Bread", "Laptop")[int(float(p.rng.random()) * 3)]

@@ -1,4 +1,4 @@
-"""Slicing trees: rectangles cut in two again and again until every room has its own."""
+"""Slicing trees (Otten 1982): rectangles cut in two until every room has its own."""
 
 from __future__ import annotations
 
@@ -26,13 +26,17 @@ def snapped(value: float) -> int:
 
 
 def min_width_cm(spec: RoomSpec) -> int:
-    """Least distance of centre lines, on the grid, so that the clear width is kept."""
+    """Smallest distance of centre lines, on the grid, that keeps the clear width; centimetres."""
     clear = round(spec.standard.width_m * 100) + WALL_CM
     return -(-clear // GRID_CM) * GRID_CM
 
 
 def _best_cut(specs: Sequence[RoomSpec], order: Sequence[int], rng: Generator) -> tuple[int, float]:
-    """Where to part the order of rooms, and the share of area before it."""
+    """Draw the place at which to part the order of rooms; return it and the area before it.
+
+    Even cuts are likelier: the weight of a cut is the square of both shares' product. The area is
+    a share of the total.
+    """
     areas = [specs[k].area_m2 for k in order]
     total = sum(areas)
     weights: list[float] = []
@@ -77,7 +81,7 @@ def slice_rooms(
 
 
 def carve(rects: Sequence[Rect], chunk: Rect) -> list[Rect]:
-    """Take a rectangle out of some rectangles, as the rectangles that remain."""
+    """Return some rectangles without another one, cut into rectangles."""
     out: list[Rect] = []
     cx0, cy0, cx1, cy1 = chunk
     for x0, y0, x1, y1 in rects:
@@ -91,7 +95,7 @@ def carve(rects: Sequence[Rect], chunk: Rect) -> list[Rect]:
 
 
 def mirrored(layout: Layout, rng: Generator) -> Layout:
-    """Turn and mirror a layout by three coins and move its corner to the outer wall's place."""
+    """Turn and mirror a layout at random, then move it to the origin."""
     swap, flip_x, flip_y = (float(rng.random()) < 0.5 for _ in range(3))  # noqa: PLR2004 - coins
     out: Layout = {}
     for room, rects in layout.items():

@@ -1,4 +1,4 @@
-"""Walls as solid boxes that share no volume: pieces, lintels, breasts and the closed entrance."""
+"""Walls as solid boxes that share no volume: pieces, lintels, window breasts, closed entrances."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _Run = tuple[int, int, int]
 
 
 def _runs(grid: FloorGrid, *, along_x: bool) -> list[_Run]:
-    """Longest straight walls, whatever rooms lie beside them."""
+    """Return the longest straight walls, whatever rooms lie beside them."""
     out: list[_Run] = []
     for segment in grid.segments:
         if segment.along_x != along_x:
@@ -31,7 +31,7 @@ def _runs(grid: FloorGrid, *, along_x: bool) -> list[_Run]:
 
 
 def _cut(run: _Run, across: Sequence[_Run]) -> list[_Run]:
-    """Take the thickness of crossing walls out of a run."""
+    """Return a run without the thickness of the walls that cross it."""
     line, low, high = run
     stops = sorted(at for at, a, b in across if a <= line <= b and low <= at <= high)
     out: list[_Run] = []
@@ -68,7 +68,7 @@ def _pieces(
         if opening.low > start:
             out.append(_box((line, start, opening.low), 0, ceiling_cm, along_x=along_x))
         gap = (line, opening.low, opening.high)
-        # A closed entrance is a wall of its own up to the door's height.
+        # A closed entrance is solid up to the door's height.
         solid = opening.top if opening.kind == "entrance" else opening.bottom
         if solid > 0:
             out.append(_box(gap, 0, solid, along_x=along_x))

@@ -1,7 +1,7 @@
-"""Designs: how each type of thing looks. One function a type draws on a sketch pad.
+"""Designs of asset types: one function a type draws an asset on a sketch pad.
 
-A design gets the sketch, width, depth and height in metres and dice for its choices; `fitted`
-stretches the drawing to the asked size, so that a design may be a little off.
+A design gets the sketch, the width, depth and height in metres and a sampler for its choices.
+`Sketch.fitted` stretches the drawing to exactly that size, so that a design may be a little off.
 """
 
 from __future__ import annotations

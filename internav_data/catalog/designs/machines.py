@@ -1,4 +1,4 @@
-"""What needs a plug: televisions, microwaves, fridges, stoves, washing machines, lamps."""
+"""Electric appliances: televisions, microwaves, fridges, stoves, washing machines, lamps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Kitchen and bathroom fixtures, plants, and what lies on floors or hangs on walls."""
+"""Kitchen and bathroom fixtures, plants, rugs, pictures and mirrors."""
 
 from __future__ import annotations
 

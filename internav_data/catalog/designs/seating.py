@@ -1,4 +1,4 @@
-"""What people sit on: chairs, armchairs, sofas, stools, benches, ottomans, office chairs."""
+"""Seats: chairs, armchairs, sofas, stools, benches, ottomans, office chairs."""
 
 from __future__ import annotations
 

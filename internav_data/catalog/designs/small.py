@@ -1,4 +1,4 @@
-"""Small household things: boxes, clocks, laptops, pots, bins."""
+"""Small household objects: boxes, clocks, laptops, pots, bins."""
 
 from __future__ import annotations
 
@@ -223,7 +223,7 @@ def pot(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> Non
 
 
 def _open_wall(s: Sketch, size: tuple[float, float, float], cy: float, paint: Paint) -> None:
-    """Draw the wall of a vessel as eight flat staves around nothing."""
+    """Draw the wall of a vessel as a ring of eight flat staves."""
     rx, ry, h = size
     outer, inner = ring(0, cy, 0, rx, ry, 16), ring(0, cy, 0, 0.92 * rx, 0.92 * ry, 16)
     for k in range(0, 16, 2):

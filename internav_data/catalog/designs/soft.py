@@ -1,4 +1,4 @@
-"""Soft things: beds, pillows, dog beds."""
+"""Soft furniture: beds, pillows, dog beds."""
 
 from __future__ import annotations
 

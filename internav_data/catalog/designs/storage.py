@@ -118,7 +118,7 @@ def _books(s: Sketch, x: Span, y: Span, z: Span, sampler: UniformSampler) -> Non
 
 
 def shelving_unit(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> None:
-    """Draw open shelves with a few things on them."""
+    """Draw open shelves with a few objects on them."""
     wood, x, y = sampler.wood(), w / 2, d / 2
     boards = 4 if h < 1.5 else 5
     tops = _shelves(s, (w, d, h), boards, wood, back=sampler.chance(0.5))
