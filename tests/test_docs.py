@@ -1,4 +1,4 @@
-"""What README and docs say is so."""
+"""README and docs agree with the code: commands, snippets, names, links."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def table_rows(page):
 
 
 def defines(path, name):
-    """Whether a module, or one in a folder, defines a name or a column or option of this name."""
+    """Return whether a module, or one in a folder, defines a name, a column or an option."""
     modules = sorted(path.rglob("*.py")) if path.is_dir() else [path]
     pattern = rf"^ *(def|class) {name}\b|^ *(self\.)?{name}\b *[:=]|[\"']{name}[\"']"
     return any(re.search(pattern, module.read_text(), re.MULTILINE) for module in modules)

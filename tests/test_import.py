@@ -1,4 +1,4 @@
-"""What an import costs: the package nothing, the loader numpy and pyarrow."""
+"""Cost of imports: the package needs nothing, the loader numpy and pyarrow."""
 
 from __future__ import annotations
 

@@ -100,7 +100,7 @@ def killed(out, signum, scenes=60):
 
 
 def runs(pid):
-    """Whether a process is there and no zombie, which nobody may collect in a container."""
+    """Return whether a process exists and is no zombie, which nobody may collect in a container."""
     try:
         return psutil.Process(int(pid)).status() != psutil.STATUS_ZOMBIE
     except psutil.NoSuchProcess:

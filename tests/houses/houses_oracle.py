@@ -1,4 +1,4 @@
-"""What a house must be, checked with shapely and networkx: slow, plain, independent."""
+"""Rules of a house, checked with shapely and networkx: slow, plain, independent."""
 
 from __future__ import annotations
 

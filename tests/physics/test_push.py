@@ -24,7 +24,7 @@ def low_box(mass_kg, friction, size=(0.6, 0.5, 0.1)):
 
 
 CHAIR = chair(seat_m=0.22, mass_kg=6.0, friction=0.5)
-"""So low that a push at its middle does not topple it."""
+"""Low enough that a push at its middle does not topple it."""
 
 
 def alone(box):

@@ -39,7 +39,7 @@ FORBIDDEN = (
     "navigation", "physics", "planner", "records.agent", "render", "views", "world",
 )  # fmt: skip
 SHARED = ("physics", "world")
-"""What `replay` alone may import: physics is a pure function, and the world asks it."""
+"""Rooms that `replay` alone may import: physics is a pure function, and the world asks it."""
 
 
 def imported(path):

@@ -75,7 +75,7 @@ def changed(scenes, scene, index, /, **changes):
 
 
 def found_in(scenes, scene, index, assets=None):
-    """What is found in one episode, as read back: schema's interactions, geometry, physics."""
+    """Predicates found in one episode, as read back: schema's interactions, geometry, physics."""
     house, episodes = scenes[scene]
     report = check_scene(house, episodes[index : index + 1], Shapes(assets or ASSETS), "", FORCE)
     check_interactions(episodes[index], report, solvable=True)

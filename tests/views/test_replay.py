@@ -167,7 +167,7 @@ def test_the_map_shows_the_agent_where_it_stands(tried, frames):
 
 
 def share_of(picture, canvas, low, high, colour):
-    """How much of a rectangle of the map, metres, is about of a colour."""
+    """Return the share of a rectangle of the map, metres, that is about of a colour."""
     rows, columns = canvas.window(low, high)
     near = picture[rows.start // 2 : rows.stop // 2, columns.start // 2 : columns.stop // 2]
     return (np.abs(near.astype(int) - np.array(colour)).max(axis=-1) < 40).mean()

@@ -1,4 +1,4 @@
-"""What is kept on disk is what was solved; whatever happens to the file, answers stay right."""
+"""The cached engine returns solutions to the last bit, whatever happens to the cache's file."""
 
 import contextlib
 import functools

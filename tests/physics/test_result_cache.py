@@ -1,4 +1,4 @@
-"""What is kept on disk comes back whole or not at all, whoever else reads, writes or dies."""
+"""Entries of the result cache are complete or absent, whoever else reads, writes or dies."""
 
 import contextlib
 import functools
@@ -51,7 +51,7 @@ def opened(folder):
 
 
 def free_to_write(folder):
-    """Whether another process could write at once: nobody holds a transaction open."""
+    """Return whether another process could write at once: no transaction is open."""
     with contextlib.closing(opened(folder)) as other:
         try:
             other.execute("BEGIN IMMEDIATE")

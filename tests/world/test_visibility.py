@@ -1,4 +1,4 @@
-"""What the agent sees, against rays sampled point by point through scipy's hulls."""
+"""Visibility against rays sampled point by point through scipy's hulls."""
 
 import math
 
@@ -69,8 +69,8 @@ def test_points_are_few_and_belong_to_their_parts():
             assert (planes[:, :3] @ point - planes[:, 3] <= 1e-6).all()
 
 
-def sees(things, place=0, *, heading=0, horizon=30, eye=(0.0, 0.0)):
-    occluders = Occluders([placed_occlusion_shape(thing, pose) for thing, pose in things])
+def sees(placed, place=0, *, heading=0, horizon=30, eye=(0.0, 0.0)):
+    occluders = Occluders([placed_occlusion_shape(thing, pose) for thing, pose in placed])
     return occluders.seen(camera_pose(*eye, HEADINGS[heading], horizon), place)
 
 

@@ -32,7 +32,7 @@ SHAPES = st.lists(st.tuples(SPOTS, SPOTS), min_size=1, max_size=6).map(
 
 
 def dop8_of(shape):
-    """By the kernel, from corners that lie at some height and are not turned."""
+    """Return the 8-DOP by the kernel, from corners at some height, not rotated."""
     xy = shapely.get_coordinates(shape)
     reach = np.full(8, -math.inf)
     widen(reach, np.column_stack([xy, np.full(len(xy), 0.7)]), 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
@@ -40,7 +40,7 @@ def dop8_of(shape):
 
 
 def polygon_of(dop8):
-    """What an octagon means: where eight half-planes meet."""
+    """Return the polygon of an 8-DOP: the intersection of its eight half-planes."""
     out = shapely.box(-50, -50, 50, 50)
     for (nx, ny), far in zip(NORMALS, dop8, strict=True):
         size = math.hypot(nx, ny)

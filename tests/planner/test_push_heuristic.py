@@ -24,7 +24,7 @@ def pushables(world):
 
 
 def test_free_slides_are_guessed(worlds):
-    """What it runs into and how it turns are left out: what stays upright never slides farther."""
+    """The heuristic ignores collisions and rotation: an upright object never slides farther."""
     checked = 0
     for world in worlds:
         for thing in pushables(world):

@@ -1,4 +1,4 @@
-"""What is touched on a path: against shapely, and what it spares a push."""
+"""The narrow phase against shapely, and the bodies that it keeps out of a push."""
 
 import itertools
 import math
