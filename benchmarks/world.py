@@ -115,7 +115,7 @@ def pushes_in_houses(worlds: list[World]) -> dict[str, float]:
             timed(lambda h=heading, k=index, w=world: w.simulate_push(k, h, agent=False))
             for world in worlds
             for index in world.obstacles
-            if world.items[index].asset.pushable
+            if world.items[index].dynamics.pushable
             for heading in range(4)
         ]
     )

@@ -191,9 +191,9 @@ def _near(draft: EpisodeDraft, here: Polygons) -> list[Body]:
     """Return the furniture, obstacles and walls near a footprint, as fixed bodies."""
     house = draft.site.house
     bodies = [
-        Body.of(house.assets[thing.asset_id], thing.pose, moves=False)
-        for thing in house.objects
-        if _is_near(here, footprint(house.assets[thing.asset_id], thing.pose))
+        Body.of(house.assets[placed.asset_id], placed.pose, moves=False)
+        for placed in house.objects
+        if _is_near(here, footprint(house.assets[placed.asset_id], placed.pose))
     ]
     bodies += [
         Body.of(other.asset, other.settled.pose, moves=False)

@@ -135,8 +135,8 @@ class Engine(Protocol):
     def rules(self) -> int:
         """Number of the rules by which scenes are built and solved; part of `build`.
 
-        Raised with every change of results, so that datasets made by other rules are told from
-        wrong ones and no cached result outlives its rules.
+        Raised with every change of results: a dataset of other rules is not taken for a wrong one,
+        and no cached result outlives its rules.
         """
 
     @property

@@ -245,7 +245,7 @@ class _BestFirstSearch:
         penalty: int = 0,
     ) -> None:
         """Add a world to the search, unless it was reached as cheaply before."""
-        # Poses differ in their last digits with every history: worlds are told apart coarsely.
+        # Poses differ in their last digits with every history: worlds are compared coarsely.
         poses = tuple(coarse_position(world.items[k].pose) for k in self.problem.objects)
         agent = (world.i, world.j, world.quarter, world.horizon_deg)
         key = (*agent, world.held, world.interaction, poses)
@@ -316,8 +316,8 @@ class _BestFirstSearch:
     def _propose(self, node: SearchNode, bit: int, reach: Costs, back: Costs, path: Ints) -> None:
         """Propose to push an object, or to pick it up, from the cheapest poses that see it."""
         state, problem = node.state, self.problem
-        thing = problem.objects[bit]
-        item = state.world.items[thing]
+        index = problem.objects[bit]
+        item = state.world.items[index]
         if item.pose is None:
             return
         # The cost beyond the interaction, as if it had moved the object out of every path.
@@ -335,21 +335,21 @@ class _BestFirstSearch:
         for place in zip(*(f[:MAX_VIEWPOINTS].tolist() for f in found), strict=True):
             if all(place[0] // 4 != known[0] // 4 for known in places):
                 self._place(probe, *place[:2])
-                if probe.target(pick=pick) == thing:
+                if probe.target(pick=pick) == index:
                     places.append(place)
                     if len(places) == (1 if pick else PUSH_NODES):
                         break
         if pick and places:
-            self._offer(state, thing, Action.PICKUP, places, back)
+            self._offer(state, index, Action.PICKUP, places, back)
         elif places:
-            clears = clearing_pushes(state.world, thing, path, problem.shape)
+            clears = clearing_pushes(state.world, index, path, problem.shape)
             for action in _PUSHES:
-                self._offer(state, thing, action, places, back, clears)
+                self._offer(state, index, action, places, back, clears)
 
     def _offer(
         self,
         state: SearchState,
-        thing: int,
+        index: int,
         action: Action,
         places: Sequence[tuple[int, int, int]],
         back: Costs,
@@ -361,8 +361,8 @@ class _BestFirstSearch:
         for pose, horizon, cost in reversed(places):
             penalty, last = state.penalty, (-1, -1)
             if action.kind == "push":
-                last = (thing, (pose + action.quarter_turns) % 4)
-                turn = (last[1] - state.last[1]) % 4 if state.last[0] == thing else 0
+                last = (index, (pose + action.quarter_turns) % 4)
+                turn = (last[1] - state.last[1]) % 4 if state.last[0] == index else 0
                 if turn == 2:  # noqa: PLR2004 - to and fro
                     continue
                 penalty += TURN_PENALTY if turn else 0
@@ -379,8 +379,8 @@ class _BestFirstSearch:
         """Propose to drop the held object on the path to the next object to pick up."""
         state, problem = node.state, self.problem
         prices = state.prices.copy()
-        for bit, thing in enumerate(problem.objects):
-            if state.world.items[thing].dynamics.pickable:
+        for bit, index in enumerate(problem.objects):
+            if state.world.items[index].dynamics.pickable:
                 prices[bit] = PICK_PRICE
         after = problem.costs(state.masks, node.banned, prices)
         horizon = HORIZONS_DEG.index(state.world.horizon_deg)

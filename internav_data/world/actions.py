@@ -23,7 +23,7 @@ OptionName = Literal["navigate", "push", "pick", "done"]
 
 
 class Action(IntEnum):
-    """Discrete actions, numbered as in the released code, with what must be known about each.
+    """Discrete actions, numbered as in the released code, with their kind, words and options.
 
     Stored experts and policies depend on the numbers: never renumber; a new action takes the next.
 

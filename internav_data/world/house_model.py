@@ -97,15 +97,15 @@ class HouseModel:
         plans, items, object_ids = [walls], [], []
         # Movable furniture counts as an item with a handle of its own in the lattice, all else as
         # fixed; rugs block nothing and are left out.
-        for thing in house.objects:
-            asset = house.assets[thing.asset_id]
+        for placed in house.objects:
+            asset = house.assets[placed.asset_id]
             if is_movable(asset):
-                items.append(MovableObject.of(Body.of(asset, thing.pose)))
-                object_ids.append(thing.object_id)
+                items.append(MovableObject.of(Body.of(asset, placed.pose)))
+                object_ids.append(placed.object_id)
             elif asset.blocks:
-                bodies.append(Body.of(asset, thing.pose, moves=False))
-                dop8s.append(extent_of(asset, thing.pose).dop8)
-                plans.append(footprint(asset, thing.pose))
+                bodies.append(Body.of(asset, placed.pose, moves=False))
+                dop8s.append(extent_of(asset, placed.pose).dop8)
+                plans.append(footprint(asset, placed.pose))
         footprints = Polygons.joined(plans)
         lattice = Lattice.of_polygons(footprints, house.outline)
         handles = tuple(lattice.add(item.footprint) for item in items)

@@ -109,20 +109,45 @@ def test_outcomes_of_an_episode_follow_its_stored_values():
     assert outcomes(pushable=False, pickable=True)[number][4].reason != "not pickable"
 
 
-ROOMS = ("physics", "world", "planner", "envs", "evaluation")
+ROOMS = (
+    *("physics", "world", "planner", "episodes", "envs", "views", "evaluation", "camp"),
+    "verification/replay",
+)
 """Rooms in which objects have dynamics of their own."""
 OWN = {"mass_kg", "friction", "pushable", "pickable"}
 
 
-@pytest.mark.parametrize("room", ROOMS)
-def test_nobody_reads_the_dynamics_of_an_asset_beside_an_object(room):
-    root = Path(internav_data.__file__).parent
-    found = [
-        f"{file.relative_to(root)}:{node.lineno} {ast.unparse(node)}"
-        for file in (root / room).rglob("*.py")
+def last_name(node):
+    """The `c` of a.b.c and of a.b.c[d]."""
+    if isinstance(node, ast.Subscript):
+        node = node.value
+    return getattr(node, "attr", getattr(node, "id", ""))
+
+
+def readers_of_assets(folder):
+    """Where files read mass, friction or abilities of an asset, as file:line and code."""
+    return [
+        f"{file.relative_to(folder)}:{node.lineno} {ast.unparse(node)}"
+        for file in folder.rglob("*.py")
         for node in ast.walk(ast.parse(file.read_text()))
         if isinstance(node, ast.Attribute)
-        and node.attr in OWN
-        and ast.unparse(node.value).split(".")[-1].split("[")[0] in {"asset", "assets"}
+        and (
+            (node.attr in OWN and last_name(node.value) in {"asset", "assets"})
+            or (node.attr == "dynamics" and ast.unparse(node.value).endswith(".asset"))
+        )
     ]
-    assert found == []
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_nobody_reads_the_dynamics_of_an_asset_beside_an_object(room):
+    folder = Path(internav_data.__file__).parent / room
+    assert list(folder.rglob("*.py"))
+    assert readers_of_assets(folder) == []
+
+
+@pytest.mark.parametrize(
+    "code", ["assets[o.asset_id].mass_kg", "self.items[k].asset.friction", "item.asset.dynamics"]
+)
+def test_a_reader_of_an_assets_dynamics_is_found(tmp_path, code):
+    (tmp_path / "room.py").write_text(f"print({code})\n")
+    assert readers_of_assets(tmp_path) == [f"room.py:1 {code}"]
