@@ -139,7 +139,7 @@ def evaluate_command(**given: Any) -> int:  # noqa: ANN401 - the options above
     ]
     found = []
     for each in candidates:
-        results = evaluate(each.policy, dataset, settings, _teller(each.about.name))
+        results = evaluate(each.policy, dataset, settings, _reporter(each.about.name))
         found.append(Evaluation(each.about, tuple(results)))
     forget_evaluations(out)
     for evaluation in found:
@@ -244,16 +244,16 @@ def _check_out(out: Path, *, force: bool) -> None:
         )
 
 
-def _teller(name: str) -> Callable[[int, int], None] | None:
-    """Tell on a terminal how far it is."""
+def _reporter(name: str) -> Callable[[int, int], None] | None:
+    """Return a function that writes the number of finished episodes on a terminal."""
     if not sys.stderr.isatty():
         return None
 
-    def tell(done: int, total: int) -> None:
+    def report(done: int, total: int) -> None:
         end = "\r\033[K" if done == total else ""
         click.echo(f"\r\033[K{name}: {done}/{total} episodes{end}", nl=False, err=True)
 
-    return tell
+    return report
 
 
 def _write(

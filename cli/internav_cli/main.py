@@ -90,12 +90,12 @@ def launch(command: click.Command, program: str, arguments: list[str] | None = N
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - every one becomes one line
         if debug:
             traceback.print_exc()
-        sys.exit(_told(error, program, given))
+        sys.exit(_report(error, program, given))
     sys.exit(result if isinstance(result, int) else 0)
 
 
-def _told(error: BaseException, program: str, given: list[str]) -> int:
-    """Say on stderr what went wrong and return the exit code."""
+def _report(error: BaseException, program: str, given: list[str]) -> int:
+    """Write an error on stderr and return the exit code."""
     from internav_data.records.errors import InternavError
 
     if isinstance(error, click.exceptions.NoArgsIsHelpError):

@@ -121,7 +121,7 @@ def name_dataset(given: Path | None) -> None:
 
 
 def progress() -> GenerationProgress:
-    """Return a progress that tells on stderr."""
+    """Return a progress line on stderr."""
     from internav_data.generation import GenerationProgress
 
     return GenerationProgress(sys.stderr)
@@ -143,7 +143,14 @@ def renamed_option(old: str, new: str, *, is_flag: bool = False) -> Callable[[F]
 
 
 def positive(_context: click.Context, parameter: click.Parameter, value: int | None) -> int | None:
-    """Refuse counts below one."""
+    """Check that a count is 1 or more.
+
+    Raises
+    ------
+    BadParameter
+        It is less.
+
+    """
     if value is not None and value < 1:
         raise click.BadParameter(f"{value}: ask for 1 or more", param=parameter)
     return value

@@ -61,14 +61,14 @@ def command(
     from internav_data.records.errors import ValidationError
     from internav_data.verification import validate
 
-    tell = _tell if sys.stderr.isatty() else None
+    progress = _show_progress if sys.stderr.isatty() else None
     folder = dataset_to_read(dataset)
-    findings = validate(folder, level, sample, workers or cores(), tell)
-    if tell is not None:
+    findings = validate(folder, level, sample, workers or cores(), progress)
+    if progress is not None:
         click.echo("\r\033[K", nl=False, err=True)
     click.echo(findings.to_json() if as_json else findings.summary())
     return 0 if findings.ok else ValidationError.exit_code
 
 
-def _tell(level: str, done: int, total: int) -> None:
+def _show_progress(level: str, done: int, total: int) -> None:
     click.echo(f"\r\033[K{level}: {done}/{total}", nl=False, err=True)

@@ -7,7 +7,7 @@ from collections import deque
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Final, Self
 
-from internav_data.core.progress import Ticker, clock
+from internav_data.core.progress import ProgressLine, clock
 from internav_data.envs.tasks import STEP, SUCCESS
 from internav_data.records.errors import CorruptDataError
 
@@ -152,7 +152,7 @@ def rates(steps: int, seconds: Sequence[float]) -> Row:
     }
 
 
-class ProgressReporter(Ticker):
+class ProgressReporter(ProgressLine):
     """Progress line of a run, from the rows of its log.
 
     Parameters
@@ -171,13 +171,13 @@ class ProgressReporter(Ticker):
         if "validation" in row:
             self._validation = row["validation"]
             words = _validation_words(self._validation)
-            self.say(f"{row['stage']}, {row['step']:,} steps: validation {words}")
+            self.log(f"{row['stage']}, {row['step']:,} steps: validation {words}")
             return
         if self._last and self._last.get("stage") != row.get("stage"):
-            self.say(self.line())
+            self.log(self.line())
         self._last = row
         if self.due():
-            self.tell(self.line())
+            self.update(self.line())
 
     def line(self) -> str:
         """Return the progress in one line."""

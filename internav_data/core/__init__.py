@@ -1,1 +1,1 @@
-"""Files, settings, progress, locks and interrupts: what every room uses and no house is in."""
+"""Settings, stores, caches, lazy imports, progress and interrupts: nothing here knows of houses."""

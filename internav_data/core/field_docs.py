@@ -1,4 +1,4 @@
-"""Documentation of the fields of dataclasses, read from their source."""
+"""Docstrings of the fields of dataclasses, read from their source."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 
 def descriptions(cls: type[Any]) -> dict[str, str]:
-    """Return the docstrings below a dataclass's fields; none where there is no source."""
+    """Return the docstrings below a dataclass's fields, by name; none where there is no source."""
     try:
         tree = ast.parse(inspect.cleandoc(inspect.getsource(cls)))
     except (OSError, TypeError):

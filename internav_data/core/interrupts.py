@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM end a run in order: what is under way is finished, what is done is kept."""
+"""Ctrl-C and SIGTERM end a run in order: tasks under way are finished, results are kept."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class InterruptedRunError(InternavError):
-    """A run was ended by a signal; the same command continues it."""
+    """A signal ended a run; the same command continues it."""
 
     def __init__(self, message: str, signum: int) -> None:
         super().__init__(message)
@@ -24,9 +24,10 @@ class InterruptedRunError(InternavError):
 
 
 class Interrupts:
-    """While it is entered, the first signal raises a flag and the second ends the process.
+    """Flag that the first signal raises; the second one ends the process.
 
-    Outside the main thread Python cannot catch signals; there the flag never rises.
+    Signals are caught inside a `with` block only. Outside the main thread Python cannot catch them;
+    there the flag never rises.
     """
 
     def __init__(self) -> None:
@@ -49,7 +50,7 @@ class Interrupts:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Give the signals back to whoever had them."""
+        """Restore the handlers from before."""
         for signum, handler in self._before.items():
             signal.signal(signum, handler)  # type: ignore[arg-type] # what signal() returned
         self._before.clear()

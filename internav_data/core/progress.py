@@ -1,4 +1,4 @@
-"""How far a run is: a line that renews itself on a terminal, a log line now and then elsewhere."""
+"""Progress of a run: one line that renews itself on a terminal, rare lines of a log elsewhere."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import time
 from typing import TextIO
 
 REDRAW_S = 0.2
-
+"""Shortest time between two updates on a terminal, seconds."""
 LOG_EVERY_S = 30.0
-
+"""The same in a log."""
 HOUR_S, MINUTE_S = 3600, 60
 
 
@@ -22,38 +22,38 @@ def clock(seconds: float) -> str:
     return f"{whole} s"
 
 
-class Ticker:
-    """Tells a state in one line: on a terminal it renews itself, elsewhere it comes now and then.
+class ProgressLine:
+    """A line about the state of a run.
 
     Parameters
     ----------
     stream
-        Where; None: nowhere.
+        Stream to write on; None: silent.
     """
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self._stream = stream
         self._terminal = stream is not None and stream.isatty()
-        self._told = time.monotonic()
+        self._updated = time.monotonic()
         self._width = 0
 
     def due(self) -> bool:
-        """Return whether it is time to tell again."""
+        """Return whether it is time for another update."""
         every = REDRAW_S if self._terminal else LOG_EVERY_S
-        return self._stream is not None and time.monotonic() - self._told >= every
+        return self._stream is not None and time.monotonic() - self._updated >= every
 
-    def tell(self, line: str) -> None:
-        """Tell the state."""
-        self._told = time.monotonic()
+    def update(self, line: str) -> None:
+        """Write the state: over the last one on a terminal, as a new line elsewhere."""
+        self._updated = time.monotonic()
         if not self._terminal:
-            self.say(line)
+            self.log(line)
         elif self._stream is not None:
             self._stream.write("\r" + line.ljust(self._width))
             self._stream.flush()
             self._width = len(line)
 
-    def say(self, text: str) -> None:
-        """Tell something that stays on the screen."""
+    def log(self, text: str) -> None:
+        """Write a line that stays on the screen."""
         if self._stream is None:
             return
         self.end()

@@ -1,4 +1,4 @@
-"""Stores: named blobs that are there whole or not at all, and the folder of files that is one.
+"""Stores: named blobs that are complete or absent, and the folder of files that is one.
 
 Linking, renaming, locking and waiting for the disk happen here and nowhere else, so that a bucket
 or a test's dictionary can stand in for a folder.
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _BLOCK = 1 << 20
 TEMPORARY = ".tmp"
-"""Suffix of files under way in a folder; a kill leaves one behind."""
+"""Suffix of unfinished files in a folder; a kill leaves one behind."""
 
 
 class LockedError(InternavError):
@@ -60,7 +60,7 @@ class Store(Protocol):
         ...
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> bytes:
-        """Return the bytes start … stop - 1 of a blob; less where it ends earlier."""
+        """Return the bytes start … stop - 1 of a blob; fewer where it ends earlier."""
         ...
 
     def source(self, name: str) -> Path | BinaryIO:
@@ -68,7 +68,7 @@ class Store(Protocol):
         ...
 
     def put(self, name: str, data: bytes) -> None:
-        """Store a blob whole and durably: readers see the old one or the new one."""
+        """Store a blob durably: readers see the old one or the new one, never a part."""
         ...
 
     def names(self, prefix: str = "") -> list[str]:
@@ -101,7 +101,7 @@ def store_of(root: StoreLike) -> Store:
 
 
 def is_temporary(name: str) -> bool:
-    """Return whether a name is that of a file that was under way."""
+    """Return whether a name is that of an unfinished file."""
     return name.endswith(TEMPORARY) and name.rsplit("/", 1)[-1].startswith(".")
 
 
@@ -143,7 +143,7 @@ class FolderStore:
         return size
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> bytes:
-        """Return the bytes start … stop - 1 of a file; less where it ends earlier."""
+        """Return the bytes start … stop - 1 of a file; fewer where it ends earlier."""
         with (self.root / name).open("rb") as stream:
             stream.seek(start)
             return stream.read(-1 if stop is None else stop - start)
@@ -153,7 +153,7 @@ class FolderStore:
         return self.root / name
 
     def put(self, name: str, data: bytes) -> None:
-        """Write a file whole and durably."""
+        """Write a file durably: readers see the old one or the new one, never a part."""
         write_atomically(self.root / name, data)
 
     def names(self, prefix: str = "") -> list[str]:
@@ -210,8 +210,8 @@ class FolderStore:
 def write_atomically(path: Path, data: bytes) -> None:
     """Write a file by way of a temporary one beside it: readers see the old or the new one.
 
-    Whatever goes wrong (a full disk, an interrupt), the temporary file is removed and `path` is
-    as it was.
+    After an error (a full disk, an interrupt) the temporary file is removed and `path` is as it
+    was before.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}{TEMPORARY}")
@@ -229,7 +229,7 @@ def write_atomically(path: Path, data: bytes) -> None:
 def write_folder_atomically(folder: Path, fill: Callable[[Path], object]) -> None:
     """Let `fill` write into a temporary folder beside `folder`, which must be new, then rename it.
 
-    Whatever goes wrong, nothing stays behind.
+    After an error nothing stays behind.
     """
     temporary = folder.with_name(f".{folder.name}.{os.getpid()}{TEMPORARY}")
     shutil.rmtree(temporary, ignore_errors=True)

@@ -1,13 +1,14 @@
 """From staged scenes to a finished dataset: readers see the old one, the new one, or none.
 
-The order of things, for whoever generates:
+The order of calls of a generator:
 
 1. `open_staging(out, identity)` before the first scene: refuses a folder that holds anything else
    or another configuration's dataset.
 2. `stage_scene` / `stage_quarantine` for every scene (any process, any order); on resume skip
    `done_scenes(out)`: scenes in the finished dataset that is being extended, or staged.
-3. `assemble(out, identity, assets, scenes)`: shards go into `data/`, the manifest last; then what
-   it does not name and `.work/` are removed. Interrupted anywhere, calling it again finishes.
+3. `assemble(out, identity, assets, scenes)`: shards go into `data/`, the manifest last; then
+   shards that it does not name and `.work/` are removed. After an interruption anywhere, a second
+   call finishes.
 
 When a dataset is extended, the manifest in place stays valid until the next one replaces it: a
 shard that differs has another name (see `shards`).

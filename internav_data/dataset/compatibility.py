@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def problems(got: pa.Schema, wanted: pa.Schema) -> list[str]:
-    """Return what keeps a file of columns `got` from being read as `wanted`; empty if nothing."""
+    """Return the reasons for which columns `got` cannot be read as `wanted`; empty if they can."""
     return list(_problems(pa.struct(list(got)), pa.struct(list(wanted)), ""))
 
 

@@ -93,7 +93,7 @@ def one_array(column: pa.ChunkedArray) -> pa.Array:
 
 
 def schema_difference(got: pa.Schema, expected: pa.Schema) -> str:
-    """Say in a few words how two schemas differ."""
+    """Return the difference of two schemas in a few words."""
     missing = [n for n in expected.names if n not in got.names]
     surplus = [n for n in got.names if n not in expected.names]
     if missing or surplus:
@@ -163,7 +163,21 @@ Cursor = _LeafCursor | _StructCursor | _ListCursor
 
 
 def cursor(node: Node, array: pa.Array) -> Cursor:
-    """Return a reader of an array that is not a slice of a struct array."""
+    """Return a reader of an array.
+
+    Parameters
+    ----------
+    node
+        Shape of a row of the array.
+    array
+        Array, no slice of a struct array: its children would begin elsewhere.
+
+    Raises
+    ------
+    TypeError
+        `node` is a mapping, which has no columns.
+
+    """
     if isinstance(node, Leaf):
         return _LeafCursor(array, is_text=node.kind == "string")
     if isinstance(node, Sequence):

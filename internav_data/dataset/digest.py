@@ -1,4 +1,4 @@
-"""The logical digest: what a table says, whatever its row groups, encodings and pyarrow version.
+"""The logical digest: of the values of a table, not of its row groups, encodings or pyarrow.
 
 Definition, since format version 1. sha256 over the leaf columns in schema order. A leaf column is
 

@@ -43,7 +43,7 @@ def schemas() -> dict[str, dict[str, Any]]:
 
 
 def schema_text(schema: dict[str, Any]) -> str:
-    """Return a schema as it stands in its file."""
+    """Return the text of a schema's file."""
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
 
@@ -55,7 +55,7 @@ def write_schemas(root: StoreLike, prefix: str = "") -> None:
 
 
 def schema_folder() -> Path:
-    """Return where the schemas lie: inside the installed package, else at the repository's root."""
+    """Return the folder of the schemas: in the installed package, else in the repository."""
     package = Path(__file__).resolve().parents[1]
     installed = package / "schemas"
     return installed if installed.is_dir() else package.parent / "schemas"

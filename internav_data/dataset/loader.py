@@ -173,11 +173,11 @@ class Dataset(Generic[E]):
         return number if self._index is None else int(self._index[number])
 
     def row_numbers(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return where selected episodes lie among all rows of the split's files."""
+        """Return the rows, among all of the split's files, of selected episodes: (n,) int64."""
         return numbers if self._index is None else self._index[numbers]
 
     def blocks(self) -> NDArray[np.int64]:
-        """Return the numbers of selected episodes at which row groups start, and their count."""
+        """Return the numbers of the episodes that begin row groups, and the count of all: int64."""
         bounds = self.row_group_cache.all_bounds()
         if self._index is not None:
             bounds = np.searchsorted(self._index, bounds)

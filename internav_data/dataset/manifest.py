@@ -1,8 +1,8 @@
-"""The manifest: what a dataset is and which files it is made of. It is written last.
+"""The manifest: identity, counts and files of a dataset. It is written last.
 
-A folder without `manifest.json` is no dataset; a reader opens exactly the files it names. It holds
-nothing of the machine, the clock or the number of workers, so the same configuration and seed
-give the same bytes.
+A folder without `manifest.json` is no dataset; a reader opens exactly the files that it names. It
+holds nothing of the machine, the clock or the number of workers, so the same configuration and
+seed give the same bytes.
 """
 
 from __future__ import annotations
@@ -50,12 +50,13 @@ class DataFile:
     """None for the assets, which all splits share."""
     rows: int
     bytes: int
+    """Size of the file."""
     sha256: str
-    """Of the file's bytes."""
+    """SHA-256 of the file's bytes, 64 hexadecimal digits."""
     footer_sha256: str
-    """Of the file's last bytes, the Parquet footer: checked whenever the file is opened."""
+    """SHA-256 of the Parquet footer, the file's last bytes: checked whenever the file is opened."""
     logical_digest: str
-    """Of what the file says, whatever library wrote it (see the format's documentation)."""
+    """Digest of the file's values, the same for every library that wrote it (docs/dataset.md)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +71,7 @@ class Quarantined:
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """How much one split holds."""
+    """Numbers of scenes and episodes of one split."""
 
     scenes: int
     episodes: int
@@ -78,7 +79,7 @@ class Counts:
 
 @dataclass(frozen=True, slots=True)
 class Manifest:
-    """Everything that says what a dataset is."""
+    """Description of a dataset: its identity, its counts and its files."""
 
     format_version: int
     generator: str
@@ -89,15 +90,15 @@ class Manifest:
     config: Mapping[str, Any]
     """The resolved configuration; the number of scenes and workers is no part of it."""
     counts: Mapping[str, Counts]
-    """By split."""
+    """Counts by split."""
     scenes: int
-    """Scene numbers 0 … scenes - 1 were asked for; those not quarantined are in the files."""
+    """Number of scenes, 0 … scenes - 1, quarantined ones included; the others are in the files."""
     redraws: Mapping[str, int]
-    """How often something was drawn again while generating, by reason."""
+    """Number of redraws while generating, by reason."""
     quarantined: tuple[Quarantined, ...]
     files: tuple[DataFile, ...]
     requires: tuple[str, ...] = ()
-    """Keys and columns that a reader must know; any other that it does not know, it ignores."""
+    """Keys and columns that a reader must know; it ignores any other that it does not know."""
 
     def of(self, table: str, split: str | None = None) -> tuple[DataFile, ...]:
         """Return the files of one table (of one split, if given) in order."""
@@ -106,12 +107,12 @@ class Manifest:
         )
 
     def to_json(self) -> str:
-        """Return the manifest as it stands in the file."""
+        """Return the text of the manifest's file."""
         return json.dumps(dataclasses.asdict(self), indent=1, ensure_ascii=False) + "\n"
 
 
 def write_manifest(root: StoreLike, manifest: Manifest) -> None:
-    """Put a manifest in place: from here on the folder is (another) dataset."""
+    """Put a manifest in place: from then on readers see its dataset."""
     store_of(root).put(MANIFEST, manifest.to_json().encode())
 
 

@@ -40,17 +40,18 @@ UNITS = {"m": "m", "m2": "m^2", "kg": "kg", "s": "s", "deg": "deg", "seconds": "
 """Unit by the last word of a field's name."""
 
 METRES = frozenset({"x", "y", "z", "centre", "size", "corners", "polygon", "outline", "points"})
-"""Fields in metres whose names don't say so."""
+"""Fields in metres whose names state no unit."""
 
 Kind = Literal["string", "bool", "float64", "int8", "uint8", "int16", "int32", "int64"]
 
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """One value: `choices` are the strings it may be, () for any."""
+    """One value."""
 
     kind: Kind
     choices: tuple[str, ...] = ()
+    """Strings that the value may be; () for any."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,9 +80,10 @@ class Record:
 
 @dataclass(frozen=True, slots=True)
 class Keyed:
-    """A mapping by name, of `item`s or (None) of anything: in JSON files, never in tables."""
+    """A mapping by name: in JSON files, never in tables."""
 
     item: Node | None
+    """Shape of its values; None: any."""
 
 
 Node: TypeAlias = Leaf | Coordinates | Sequence | Record | Keyed
@@ -101,7 +103,7 @@ _known: dict[type[Any], Record] = {}
 
 
 def record_node(cls: type[Any]) -> Record:
-    """Return the shape of a dataclass; fields left out of comparison are not stored.
+    """Return the shape of a dataclass; fields with `compare=False` are not stored.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""In which order an epoch visits episodes: a pure function of (seed, epoch)."""
+"""Order of the episodes of an epoch: a pure function of (seed, epoch)."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 WINDOW = 8
-"""Row groups that are shuffled into one another: so many are in memory at a time."""
+"""Number of row groups that are shuffled into one another and in memory at a time."""
 
 
 def epoch_order(
     blocks: NDArray[np.int64], *, seed: int, epoch: int, shuffle: bool
 ) -> NDArray[np.int64]:
-    """Return the positions 0 … n - 1 in the order of an epoch.
+    """Return the positions 0 … n - 1 in the order of an epoch, (n,) int64.
 
     Row groups are shuffled, then the rows of every `WINDOW` neighbouring groups: far apart in the
     data, yet read a few files at a time.
@@ -28,7 +28,7 @@ def epoch_order(
     blocks : (groups + 1,) int64
         Positions at which row groups start, and n.
     seed, epoch : int
-        What the order depends on.
+        Seed and number of the epoch, on which alone the order depends.
     shuffle : bool
         False for the order on disk.
 
@@ -43,7 +43,7 @@ def epoch_order(
 
 
 def share(count: int, member: int, members: int) -> tuple[int, int]:
-    """Return which of `count` positions [start, stop) belong to one of several members.
+    """Return the range [start, stop) of `count` positions that belongs to one of several members.
 
     Shares are disjoint, cover everything and differ in size by one at most.
     """

@@ -1,4 +1,4 @@
-"""What experts and outcomes of a dataset are like, from their columns alone."""
+"""Statistics of the experts and outcomes of a dataset, from their columns alone."""
 
 from __future__ import annotations
 
@@ -27,37 +27,39 @@ REFUSED: Redraw = "no expert"
 
 @dataclass(frozen=True, slots=True)
 class ExpertRow:
-    """How the experts do: no agent on the same lattice can be expected to do better."""
+    """Results of the experts: no agent on the same lattice can be expected to do better."""
 
     solved: int
     """Episodes with an expert."""
     solved_share: float
+    """Share of all episodes."""
     steps: Spread
-    """Done included."""
+    """Steps of the experts, Done included."""
     pushes: float
-    """Mean of those with an expert, as the next."""
+    """Mean number of pushes of an expert."""
     picks: float
+    """Mean number of pick-ups of an expert."""
     spl: float
     """Mean of shortest_path_m / max(path_m, shortest_path_m) over episodes; 0 without expert."""
     sts: float
     """Mean over all episodes of shortest_path_m / 0.25 m / steps, 0 without an expert."""
     refused: int
-    """Draws of the whole dataset, all splits, that were thrown away since no expert was found."""
+    """Draws of all splits that were thrown away since no expert was found."""
     refused_share: float
-    """Of those and the episodes together."""
+    """Share of these among these draws and the episodes together."""
 
 
 @dataclass(frozen=True, slots=True)
 class OutcomeRow:
-    """What one interaction does to the obstacles of all episodes."""
+    """Effects of one interaction on the obstacles of all episodes."""
 
     action: str
     possible: int
     """Obstacles that can be pushed, or picked up, at all."""
     success_share: float
-    """Of those."""
+    """Share of the possible ones that succeed."""
     opened: int
-    """How often it alone opens a blocked way."""
+    """Number of interactions that open a blocked path by themselves."""
 
 
 @dataclass(slots=True)
@@ -72,16 +74,16 @@ class OutcomeCounts:
 
     def add(self, obstacles: pa.ListArray) -> None:
         """Count the outcomes of a column of obstacles, one list for each episode."""
-        things = dict(
+        parts = dict(
             zip(_names(obstacles.type.value_type), obstacles.flatten().flatten(), strict=True)
         )
-        lists = things["outcomes"]
+        lists = parts["outcomes"]
         rows = dict(zip(_names(lists.type.value_type), lists.flatten().flatten(), strict=True))
-        thing = pc.list_parent_indices(lists)
+        obstacle = pc.list_parent_indices(lists)
         able = pc.if_else(
             pc.equal(rows["action"], "pick"),
-            things["pickable"].take(thing),
-            things["pushable"].take(thing),
+            parts["pickable"].take(obstacle),
+            parts["pushable"].take(obstacle),
         )
         table = pa.table({"action": rows["action"], "able": able} | rows)
         sums = table.group_by("action").aggregate(
@@ -91,11 +93,11 @@ class OutcomeCounts:
             self.possible[row["action"]] += row["able_sum"]
             self.succeeded[row["action"]] += row["success_sum"]
             self.opened[row["action"]] += row["opened_sum"]
-        episode = pc.list_parent_indices(obstacles).take(thing)
+        episode = pc.list_parent_indices(obstacles).take(obstacle)
         self.openable += len(pc.unique(episode.filter(rows["opened"])))
 
     def rows(self) -> tuple[OutcomeRow, ...]:
-        """Return a row for each interaction."""
+        """Return the statistics of each interaction."""
         return tuple(
             OutcomeRow(
                 action, count, share(self.succeeded[action], count), int(self.opened[action])
@@ -105,14 +107,14 @@ class OutcomeCounts:
 
 
 def expert_row(table: pa.Table, manifest: Manifest) -> ExpertRow:
-    """Return how the experts of some episodes do.
+    """Return the results of the experts of some episodes.
 
     Parameters
     ----------
     table
-        With `shortest_path_m` and, of `expert`, the `EXPERT_COLUMNS`.
+        Episodes: `shortest_path_m` and, of `expert`, the `EXPERT_COLUMNS`.
     manifest
-        Of the whole dataset.
+        Manifest of the dataset, which counts the redraws of all splits.
 
     """
     expert = table.column("expert")

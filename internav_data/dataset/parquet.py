@@ -27,9 +27,12 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 
 SCENES_PER_GROUP = 10
-"""At least so many scenes lie in a row group ..."""
+"""Minimum number of scenes in a row group."""
 ROWS_PER_GROUP = 400
-"""... and at least so many rows: a random record costs reading its group, a group its overhead."""
+"""Minimum number of rows in a row group of episodes.
+
+A random record costs reading its group; a group costs its overhead.
+"""
 _ZSTD_LEVEL = 3
 _TAIL = 8  # bytes: the footer's length and the letters PAR1
 
@@ -62,7 +65,7 @@ def write_parquet(path: Path, records: Sequence[R], spec: TableSpec[R]) -> FileI
 
 
 def write_table(path: Path, table: pa.Table, spec: TableSpec[Any]) -> FileInfo:
-    """Write a table of the spec's schema as a file, whole or not at all (see `parquet_bytes`)."""
+    """Write a table of the spec's schema as a file, complete or absent (see `parquet_bytes`)."""
     data = parquet_bytes(table, spec)
     write_atomically(path, data)
     return file_info(path.name, data, table)
@@ -103,7 +106,7 @@ def file_info(path: str, data: bytes, table: pa.Table) -> FileInfo:
 
 
 def group_bounds(table: pa.Table) -> list[tuple[int, int]]:
-    """Return the rows [start, stop) of each row group: whole scenes, at least the stated many."""
+    """Return the rows [start, stop) of each row group: full scenes, at least `SCENES_PER_GROUP`."""
     rows = table.num_rows
     if not rows:
         return []
@@ -113,9 +116,9 @@ def group_bounds(table: pa.Table) -> list[tuple[int, int]]:
     starts = [0, *(np.flatnonzero(np.diff(scenes)) + 1).tolist(), rows]
     bounds, first = [], 0
     per_row_scene = len(starts) - 1 == rows  # the table of scenes: a row each
-    least_rows = SCENES_PER_GROUP if per_row_scene else ROWS_PER_GROUP
+    min_rows = SCENES_PER_GROUP if per_row_scene else ROWS_PER_GROUP
     for k, stop in enumerate(starts[1:], start=1):
-        if k - first >= SCENES_PER_GROUP and stop - starts[first] >= least_rows:
+        if k - first >= SCENES_PER_GROUP and stop - starts[first] >= min_rows:
             bounds.append((starts[first], stop))
             first = k
     if starts[first] < rows:
@@ -124,7 +127,7 @@ def group_bounds(table: pa.Table) -> list[tuple[int, int]]:
 
 
 def footer_sha256(store: Store, name: str, size: int) -> str:
-    """Return the sha256 of a Parquet file's footer, which page checksums don't cover.
+    """Return the sha256 of a Parquet file's footer, which page checksums do not cover.
 
     Raises
     ------

@@ -27,6 +27,7 @@ Reader = RecordReader | ColumnReader
 
 MAX_OPEN_FILES = 64
 MAX_CACHED_BYTES = 96 << 20
+"""Bytes of decoded row groups in memory, a table."""
 
 
 class RowGroupCache:

@@ -29,7 +29,7 @@ _WORDS = {"true": True, "false": False}
 
 
 def condition(text: str) -> Condition:
-    """Return what a person means by `room_count<=3` or `mode=blocked`.
+    """Read a condition as people write it: `room_count<=3` or `mode=blocked`.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def read_columns(
 
 
 def matching_rows(store: Store, files: Sequence[DataFile], filters: Filters) -> NDArray[np.int64]:
-    """Return the numbers of the episodes for which the filters hold, (n,) int64, ascending.
+    """Return the numbers of the episodes for which the filters hold, ascending: (n,) int64.
 
     Only the filters' columns are read; pyarrow evaluates the conditions.
 

@@ -1,4 +1,4 @@
-"""Staging: one file a finished scene below `.work/scenes/`, each whole or not at all.
+"""Staging: one file a finished scene below `.work/scenes/`, each complete or absent.
 
 Workers call `stage_scene` or `stage_quarantine` for every scene they finish; after a kill,
 `staged_scenes` tells which need not be built again. A file is
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from internav_data.records import Episode, House, Split
 
 STAGING = ".work/"
-"""Prefix of all that is unfinished."""
+"""Prefix of the names of an unfinished dataset's files."""
 _SCENES = f"{STAGING}scenes/"
 _MAGIC = b"INWORK01"
 _HEAD = len(_MAGIC) + 32
@@ -66,7 +66,7 @@ def scene_name(scene: int) -> str:
 
 
 def any_staged(root: StoreLike) -> bool:
-    """Return whether a scene is staged, whole or not."""
+    """Return whether a scene is staged, even a damaged one."""
     return any(name.endswith(".work") for name in store_of(root).names(_SCENES))
 
 
@@ -102,14 +102,14 @@ def stage_quarantine(
     attempts: int,
     redraws: Mapping[str, int] | None = None,
 ) -> None:
-    """Store a scene that was given up; its reason must hold nothing of the machine."""
+    """Store a scene that was given up; its reason becomes data and must not name the machine."""
     counts = dict(sorted((redraws or {}).items()))
     state = SceneState(scene, f"scene-{scene:06d}", split, 0, counts, attempts, reason or "unknown")
     _write(store_of(root), StagedScene(state, to_table([], SCENES), to_table([], EPISODES)))
 
 
 def staged_scenes(root: StoreLike, scenes: Iterable[int] | None = None) -> dict[int, SceneState]:
-    """Return the scenes (all, or of those asked for) that are staged undamaged, by number."""
+    """Return the scenes that are staged undamaged, by number: all, or those of `scenes`."""
     store = store_of(root)
     if scenes is None:
         names = [name for name in store.names(_SCENES) if name.endswith(".work")]

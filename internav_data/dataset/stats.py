@@ -1,7 +1,4 @@
-"""What a dataset is like, from its columns alone: the paper's Table 2 and more.
-
-Figures about many values: means, spreads, counts.
-"""
+"""Statistics of a dataset, from its columns alone: the paper's Table 2 and more."""
 
 from __future__ import annotations
 
@@ -72,7 +69,7 @@ class RoomsRow:
     """Mean number of rooms on the shortest room path."""
     blocked: int
     sealed: int
-    """Blocked ones that let nothing through off the lattice either."""
+    """Blocked episodes that let nothing through off the lattice either."""
     paper: PaperRow
 
 
@@ -100,13 +97,13 @@ class Stats:
     shortest_path_m: Spread
     shortest_path_steps: Spread
     detour_steps: Spread
-    """Further steps of lengthened episodes: steps - shortest_path_steps."""
+    """Further steps of lengthened episodes: obstructed_path_steps - shortest_path_steps."""
     expert: ExpertRow
     outcomes: tuple[OutcomeRow, ...]
     openable_share_of_blocked: float
-    """Blocked episodes that a single interaction opens."""
+    """Share of blocked episodes that a single interaction opens."""
     redraws: Mapping[str, int]
-    """How often something was drawn again while generating, by reason; of all splits."""
+    """Number of redraws while generating, by reason; of all splits."""
     quarantined: int
 
 

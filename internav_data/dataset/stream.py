@@ -1,4 +1,4 @@
-"""Iterating over a dataset: shuffled, shared among ranks and workers, resumable in mid-epoch."""
+"""Iteration over a dataset: shuffled, shared among ranks and workers, resumable in mid-epoch."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class EpisodeStream:
     In a torch DataLoader every worker takes its share of the rank's share: import torch before
     making the stream. Call `set_epoch` before each epoch.
 
-    `state_dict` says where the latest iteration stands; after `load_state_dict` the next
+    `state_dict` holds the position of the latest iteration; after `load_state_dict` the next
     iteration goes on from there. Streams live in the DataLoader's workers, so with workers use a
     loader that collects their states (torchdata's StatefulDataLoader does).
     """
@@ -59,7 +59,7 @@ class EpisodeStream:
         self._epoch, self._position, self._resume = epoch, 0, False
 
     def state_dict(self) -> dict[str, Any]:
-        """Return where the latest iteration stands: plain numbers, fit for JSON."""
+        """Return the position of the latest iteration: plain values, fit for JSON."""
         worker, workers = self._workers()
         return {
             "seed": self._seed,
@@ -74,7 +74,7 @@ class EpisodeStream:
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Go on where another stream with the same arguments stood.
+        """Go on from the position of another stream with the same arguments.
 
         Raises
         ------
@@ -117,7 +117,7 @@ class EpisodeStream:
         return stop - start
 
     def rows(self) -> np.ndarray[Any, np.dtype[np.int64]]:
-        """Return the row numbers of this worker's share of the epoch, in order."""
+        """Return the row numbers of this worker's share of the epoch, in order: (n,) int64."""
         order = epoch_order(
             self.dataset.blocks(), seed=self._seed, epoch=self._epoch, shuffle=self._shuffle
         )
@@ -142,7 +142,7 @@ def _check_member(name: str, member: int, total: str, members: int) -> None:
 
 
 def _register_with_torch() -> None:
-    """Let a DataLoader know streams as iterable datasets, if torch is there at all."""
+    """Make torch's DataLoader take streams for iterable datasets, if torch is imported."""
     module = sys.modules.get("torch.utils.data")
     if module is not None:
         module.IterableDataset.register(EpisodeStream)

@@ -18,12 +18,12 @@ _DIGITS = 6
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """The spread of one figure over all episodes that have it; zeros without any."""
+    """Spread of one figure over all episodes that have it; zeros without any."""
 
-    least: float
+    min: float
     median: float
     mean: float
-    most: float
+    max: float
 
 
 def mean(values: NDArray[Any]) -> float:
@@ -45,6 +45,6 @@ def spread(values: NDArray[Any]) -> Spread:
 
 
 def counts(column: pa.ChunkedArray) -> dict[str, int]:
-    """Return how often each value occurs, by value as text."""
+    """Return the number of occurrences of each value, by value as text."""
     pairs = [(c["values"], c["counts"]) for c in pc.value_counts(column).to_pylist()]
     return {str(value): count for value, count in sorted(pairs)}

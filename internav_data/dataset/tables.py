@@ -28,7 +28,7 @@ _LEAVES: dict[str, pa.DataType] = {
 }
 
 FORMAT_VERSION = 2
-"""Raised whenever a reader of the version before would misunderstand what is written.
+"""Version of the format; raised whenever an older reader would misunderstand the files.
 
 From version 2 on columns and manifest keys are only added, nullable or with a default.
 """
@@ -70,7 +70,14 @@ def arrow_field(field: Field) -> pa.Field:
 
 
 def arrow_type(node: Node) -> pa.DataType:
-    """Return the Arrow type of a node."""
+    """Return the Arrow type of a node.
+
+    Raises
+    ------
+    TypeError
+        The node is, or holds, a mapping, which has no columns.
+
+    """
     if isinstance(node, Leaf):
         return _LEAVES[node.kind]
     if isinstance(node, Coordinates):

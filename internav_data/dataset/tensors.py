@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def tensors(table: pa.Table) -> dict[str, Any]:
-    """Return the columns of a table of scalar episode columns as tensors.
+    """Return scalar columns of episodes as tensors (n,) by name.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Many houses: seeds, plan of work, worker processes, resume and progress."""
+"""Generation of datasets: runs, executors, worker processes, resume and progress."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Everything that decides what a dataset holds, save how many scenes of it are made."""
+"""Configuration of a dataset: every setting that its scenes depend on."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _TEST_ADVICE = "ask for 1 or more episodes, or 0 for a tenth of episodes_per_sce
 
 @dataclass(frozen=True, slots=True)
 class GenerationConfig:
-    """The identity of a dataset: equal configs give equal episodes, scene by scene."""
+    """Configuration of a dataset: equal configs give equal episodes, scene by scene."""
 
     seed: Annotated[int, Bounds(0, MAX_SEED, "choose one from 0 to 2^63 - 1")] = 0
     """Every random number derives from this and the scene's index."""
@@ -46,11 +46,11 @@ class GenerationConfig:
     test_episodes_per_scene: Annotated[int, Bounds(0, advice=_TEST_ADVICE)] = 0
     """Episodes of each test scene; 0 for a tenth of episodes_per_scene, rounded up."""
     assets: tuple[str, ...] = ()
-    """Folders of your own meshes that join the catalogue. What counts is their content."""
+    """Folders of your own meshes that join the catalogue."""
     house: HouseConfig = field(default_factory=HouseConfig)
-    """How houses are built."""
+    """Settings of the houses."""
     episodes: EpisodeConfig = field(default_factory=EpisodeConfig)
-    """How episodes are made."""
+    """Settings of the episodes."""
 
     def check(self) -> None:
         """Check all values, and that the files they name are there.
@@ -71,22 +71,22 @@ class GenerationConfig:
             load_floor_plan(self.house.floor_plan)
 
     def episodes_of(self, split: Split) -> int:
-        """Return how many episodes a scene of a split has."""
+        """Return the number of episodes of a scene of a split."""
         if split != "test":
             return self.episodes_per_scene
         return self.test_episodes_per_scene or -(-self.episodes_per_scene // TEST_SHARE)
 
     def resolved(self) -> dict[str, Any]:
-        """Return all values as plain data, as they are saved in the dataset."""
+        """Return all values as plain data."""
         values: dict[str, Any] = plain(self)
         values["test_episodes_per_scene"] = self.episodes_of("test")
         return values
 
     def identity(self, catalogue_digest: str) -> dict[str, Any]:
-        """Return what must be equal for two runs to make the same scenes.
+        """Return the values that must be equal for two runs to make the same scenes.
 
-        Paths are replaced by what they hold: the catalogue's digest stands for the asset folders,
-        the SHA-256 of its bytes for a floor plan.
+        Digests of contents replace paths: the catalogue's digest the asset folders, the SHA-256
+        of its bytes a floor plan.
         """
         values = self.resolved()
         values["assets"] = catalogue_digest
@@ -108,9 +108,7 @@ def load_config(
 ) -> GenerationConfig:
     """Read a config: a TOML file, then options by dotted key, then `a.b=c` overrides.
 
-    What none of them names is the default.
-
-    Paths inside the file are relative to the file.
+    Other settings have their defaults. Paths inside the file are relative to the file.
 
     Raises
     ------

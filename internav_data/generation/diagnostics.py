@@ -1,4 +1,4 @@
-"""What this machine has for generating: for `doctor` and `warmup`."""
+"""Checks of a machine before generating, for `doctor`, and the warm-up of its kernels."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ PACKAGES = {
     "trimesh": "generate",
     "coacd": "meshes",
 }
-"""What is needed, and the extra that brings it; meshes only for assets of one's own."""
+"""Packages needed, and the extra that brings each; meshes only for assets of your own."""
 BYTES_AN_EPISODE = 1000
 PAPER_EPISODES = 595_500
 GIB = 1 << 30
@@ -39,17 +39,17 @@ GIB = 1 << 30
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One thing looked at."""
+    """Result of one check."""
 
     name: str
     state: State
     found: str
     remedy: str
-    """What to do about it; empty when it is good."""
+    """Advice for the user; empty when the check is good."""
 
 
 def examine(out: Path) -> list[Check]:
-    """Return everything looked at, in a fixed order."""
+    """Run all checks, for a dataset in the folder `out`, in a fixed order."""
     return [
         _python(),
         _platform(),
@@ -58,7 +58,7 @@ def examine(out: Path) -> list[Check]:
         _memory(),
         _disk(out),
         _numba_cache(),
-        *_solved_pushes(),
+        *_result_cache(),
     ]
 
 
@@ -97,7 +97,7 @@ def _package(name: str, extra: str) -> Check:
 
 
 def _wanted(name: str) -> str:
-    """Return the least version that our own metadata asks for, empty for any."""
+    """Return the oldest version that our own metadata asks for, empty for any."""
     try:
         requirements = metadata.requires("internav-data") or []
     except metadata.PackageNotFoundError:
@@ -161,8 +161,8 @@ def _numba_cache() -> Check:
     )
 
 
-def _solved_pushes() -> list[Check]:
-    """Look at the pushes kept on disk; nothing where a package is missing, which is told above."""
+def _result_cache() -> list[Check]:
+    """Check the result cache on disk; nothing where a package is missing, as another check says."""
     try:
         from internav_data.physics import result_cache  # noqa: PLC0415 - imported when used
     except ImportError:
@@ -180,7 +180,7 @@ def _solved_pushes() -> list[Check]:
 
 
 def warm_up() -> float:
-    """Make a small scene, so that every kernel it needs is compiled and cached; return seconds."""
+    """Build a small scene, so that every kernel is compiled and cached; return the seconds."""
     from internav_data.catalog import catalogue  # noqa: PLC0415
     from internav_data.generation.config import GenerationConfig  # noqa: PLC0415 - as above
     from internav_data.generation.scenes import build_scene  # noqa: PLC0415 - as above

@@ -1,4 +1,4 @@
-"""How long a dataset will take and how large it will be: measured on a few of its scenes."""
+"""Forecast of a dataset's duration and size, measured on a few of its scenes."""
 
 from __future__ import annotations
 
@@ -24,27 +24,29 @@ if TYPE_CHECKING:
     from internav_data.records import Episode, House
 
 SAMPLE_SCENES = 12
-"""Scenes made for a forecast. The quota gives them the room counts of the whole within 5 %."""
+"""Scenes made for a forecast. The quota gives them the dataset's room counts within 5 %."""
 SAMPLE_EPISODES = 10
 MEGABYTE = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class Forecast:
-    """What a run would take on this machine, by processor time: with nothing else running."""
+    """Expected duration and size of a run on this machine, with nothing else running."""
 
     scenes: int
     episodes: int
     workers: int
     seconds: float
+    """Wall time, from the processor time of the sample."""
     bytes: int
+    """Size of the data files."""
     episodes_per_second: float
     sampled_scenes: int
     sampled_episodes: int
     quarantined_share: float
 
     def summary(self) -> str:
-        """Return it as people read it."""
+        """Return the forecast as a sentence."""
         return (
             f"{self.scenes} scenes, {self.episodes} episodes: about {clock(self.seconds)} with "
             f"{self.workers} workers ({self.episodes_per_second:.1f} episodes/s), "
@@ -53,7 +55,7 @@ class Forecast:
         )
 
     def to_json(self) -> str:
-        """Return it for programs."""
+        """Return the forecast as JSON."""
         return json.dumps(dataclasses.asdict(self))
 
 
@@ -72,19 +74,19 @@ def forecast(
     workers: int = 0,
     progress: GenerationProgress | None = None,
 ) -> Forecast:
-    """Make some scenes in memory and tell what all would take; nothing is kept.
+    """Make some scenes in memory and forecast a run of all; nothing is written.
 
     Raises
     ------
     UsageError
-        Counts or a config that cannot be meant.
+        A count or setting out of its bounds.
     QuarantineError
         Not one scene of the sample could be made.
 
     """
     check_scenes(scenes)
     config.check()
-    (progress or GenerationProgress()).say(f"making up to {SAMPLE_SCENES} scenes to measure")
+    (progress or GenerationProgress()).log(f"making up to {SAMPLE_SCENES} scenes to measure")
     sample = _sample(config, range(min(scenes, SAMPLE_SCENES)))
     made, tried = len(sample.houses), len(sample.houses) + sample.failed
     share = made / tried
@@ -147,7 +149,7 @@ def _tried(scene: int, config: GenerationConfig, known: Catalogue, episodes: int
 
 
 def _bytes(sample: _Sample, scenes: int, episodes: int) -> float:
-    """Return how large the tables of a whole dataset would be."""
+    """Return the size of the tables of the complete dataset."""
     from internav_data.dataset import EPISODES, SCENES, write_parquet  # noqa: PLC0415 - as above
 
     with tempfile.TemporaryDirectory() as folder:

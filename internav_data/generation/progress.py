@@ -1,4 +1,4 @@
-"""How far a run is: a line that renews itself on a terminal, a log line now and then elsewhere."""
+"""Progress of a generation run, on stderr."""
 
 from __future__ import annotations
 
@@ -6,30 +6,30 @@ import sys
 import time
 from typing import TextIO
 
-from internav_data.core.progress import Ticker, clock
+from internav_data.core.progress import ProgressLine, clock
 
 COMPILING_AFTER_S = 8.0
-"""Workers start within two seconds; what takes longer is numba compiling."""
+"""Time without a scene after which numba must be compiling, seconds: workers start in two."""
 
 
-class GenerationProgress(Ticker):
-    """Counts what ends and tells it on a stream; silent without one."""
+class GenerationProgress(ProgressLine):
+    """Counts scenes and writes rate and remaining time on a stream; silent without one."""
 
     def __init__(self, stream: TextIO | None = None) -> None:
         super().__init__(stream)
-        self._began = self._told
+        self._began = self._updated
         self.scenes = self.scenes_before = self.scenes_total = 0
         self.episodes = self.episodes_left = 0
         self.quarantined = 0
 
     def begin(self, scenes: int, done: int, episodes_left: int) -> None:
-        """State how much there is to do, and how much was done before."""
-        self._began = self._told = time.monotonic()
+        """Begin a run of `scenes` scenes, of which `done` were made before."""
+        self._began = self._updated = time.monotonic()
         self.scenes_total, self.scenes_before = scenes, done
         self.episodes_left = episodes_left
 
     def scene(self, episodes: int, *, expected: int) -> None:
-        """Count a scene that ended with so many episodes of those expected."""
+        """Count a scene that ended with `episodes` of the `expected` episodes; 0: quarantined."""
         self.scenes += 1
         self.episodes += episodes
         self.episodes_left -= expected
@@ -37,7 +37,7 @@ class GenerationProgress(Ticker):
 
     @property
     def seconds(self) -> float:
-        """Wall time since the beginning."""
+        """Wall time since the beginning of the run, seconds."""
         return time.monotonic() - self._began
 
     def line(self) -> str:
@@ -55,11 +55,11 @@ class GenerationProgress(Ticker):
         return ", ".join(parts)
 
     def tick(self) -> None:
-        """Tell the state if it is time to."""
+        """Write the state if it is time for an update."""
         if self.due():
-            self.tell(self.line())
+            self.update(self.line())
 
 
 def to_stderr() -> GenerationProgress:
-    """Return a progress that tells on stderr."""
+    """Return a progress line on stderr."""
     return GenerationProgress(sys.stderr)

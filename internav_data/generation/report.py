@@ -1,4 +1,4 @@
-"""What a run did, for programs and for people."""
+"""Report of a run, for programs and for people."""
 
 from __future__ import annotations
 
@@ -19,36 +19,39 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What a run did."""
+    """Result of a run."""
 
     out: Path
+    """Folder of the dataset."""
     scenes: int
-    """In the dataset now, quarantined ones included."""
+    """Scenes of the dataset, quarantined ones included."""
     episodes: int
-    """In the dataset now."""
+    """Episodes of the dataset."""
     new_scenes: int
-    """Made by this run."""
+    """Scenes made by this run."""
     new_episodes: int
+    """Episodes made by this run."""
     seconds: float
+    """Wall time of the run."""
     quarantined: tuple[tuple[str, str], ...]
-    """Scene ids in the dataset's manifest that could not be made, and why."""
+    """Scenes of the dataset that could not be made: id and reason."""
     redraws: Mapping[str, int]
-    """How often something was drawn again for the whole dataset, by reason."""
+    """Number of redraws of the dataset, by reason."""
     refused_share: float
-    """Of all that was spawned for it: what the expert found no plan for."""
+    """Share of the spawned draws for which the expert found no plan."""
 
     @property
     def exit_code(self) -> int:
-        """0, or 4 when scenes are missing."""
+        """Exit code of the command: 0, or 4 when scenes are missing."""
         return QuarantineError.exit_code if self.quarantined else 0
 
     def plain(self) -> dict[str, object]:
-        """Return it for programs."""
+        """Return the report as plain values, for programs."""
         return asdict(self) | {"out": str(self.out)}
 
 
 def report_of(out: Path, manifest: Manifest, progress: GenerationProgress) -> Report:
-    """Gather what a run did: what the dataset holds now, and what was counted on the way."""
+    """Return the report of a run: the dataset's figures, and those counted on the way."""
     return Report(
         out=out,
         scenes=manifest.scenes,
@@ -63,7 +66,7 @@ def report_of(out: Path, manifest: Manifest, progress: GenerationProgress) -> Re
 
 
 def summary(report: Report) -> str:
-    """Return in one line what a run did."""
+    """Return a report in one line."""
     if not report.new_scenes:
         return (
             f"{report.out} holds {report.scenes} scenes and {report.episodes} episodes of this "

@@ -1,4 +1,4 @@
-"""One scene or episode made again: to look at it, or to see that a dataset holds just that."""
+"""One scene or episode made again, to be printed or compared with a dataset."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """A scene made again, and what its things and obstacles are made of."""
+    """A scene made again, and the assets of its objects and obstacles."""
 
     house: House
     episodes: tuple[Episode, ...]
@@ -54,14 +54,14 @@ def made_again(config: GenerationConfig, scene: int, episode: int | None = None)
 def scene_again(
     config: GenerationConfig, scene: int, episode: int | None = None, out: Path | None = None
 ) -> tuple[str, str]:
-    """Return a scene or one of its episodes as JSON, and how it compares with a dataset's.
+    """Return a scene or one of its episodes as JSON, and a sentence about the comparison.
 
     Parameters
     ----------
     config, scene, episode
-        What to make; all episodes of the scene's split where `episode` is None.
+        Config and numbers of the scene and episode; None: all episodes of the scene's split.
     out
-        A dataset of the same config to compare with, if it has a manifest.
+        Dataset of the same config to compare with; None: no comparison.
 
     Raises
     ------
@@ -82,8 +82,8 @@ def scene_again(
         verdict += f"; the same as in {out}"
     if episode is not None:
         return json.dumps(record_values(parts[0])), verdict
-    said = {"scene": record_values(house), "episodes": [record_values(e) for e in episodes]}
-    return json.dumps(said), verdict
+    values = {"scene": record_values(house), "episodes": [record_values(e) for e in episodes]}
+    return json.dumps(values), verdict
 
 
 def record_values(record: House | Episode) -> dict[str, Any]:

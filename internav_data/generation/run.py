@@ -255,7 +255,7 @@ def _make(
             scene = result.task
             episodes = result.value if isinstance(result, Done) else 0
             if isinstance(result, Failed):
-                progress.say(f"scene-{scene:06d} is quarantined: {result.reason}")
+                progress.log(f"scene-{scene:06d} is quarantined: {result.reason}")
                 split, attempts = split_of_scene(scene), result.attempts
                 stage_quarantine(store, scene, result.reason, split=split, attempts=attempts)
             progress.scene(episodes, expected=queue.expected(scene))
@@ -281,7 +281,7 @@ def _assembled(
         states = staged_scenes(store)
         if all(state.quarantined for state in states.values()):
             raise _hopeless(store, len(states), next(iter(states.values())).quarantined)
-    progress.say(f"writing {scenes} scenes into {store.at('')}")
+    progress.log(f"writing {scenes} scenes into {store.at('')}")
     return assemble(store, identity, tuple(assets.assets.values()), scenes)
 
 

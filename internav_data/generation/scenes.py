@@ -28,17 +28,18 @@ class Scene:
     house: House
     episodes: tuple[Episode, ...]
     attempts: int
+    """Number of sub-seeds tried, the successful one included."""
     redraws: Mapping[str, int]
-    """How often something was drawn again for its episodes, by reason."""
+    """Number of redraws of its episodes, by reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class ScenePayload:
-    """What a worker needs to make scenes and store them."""
+    """Inputs of a worker that makes scenes and stages them."""
 
     config: GenerationConfig
     assets: Catalogue
-    """Built once, by the parent: a user's own meshes take a while to cut into parts."""
+    """Catalogue, built once by the parent: a user's meshes take a while to cut into parts."""
     store: Store
     """Store of the dataset, in which scenes are staged."""
 
@@ -46,12 +47,12 @@ class ScenePayload:
 def build_scene(
     scene: int, config: GenerationConfig, catalogue: Catalogue, episodes: int | None = None
 ) -> Scene:
-    """Return a scene with its episodes (so many, or those of its split).
+    """Return a scene with its episodes: `episodes` of them, or as many as its split has.
 
     Raises
     ------
     QuarantineError
-        No attempt succeeded; it says why the last one failed.
+        No attempt succeeded; it gives the reason of the last failure.
 
     """
     from internav_data.episodes import build_batch  # noqa: PLC0415 - numba, pybullet when used
@@ -81,7 +82,7 @@ def obstacle_pool(catalogue: Catalogue, config: GenerationConfig, split: Split) 
 
 
 def scene_maker(payload: ScenePayload) -> Callable[[int], int]:
-    """Set a worker up: return what makes and stores a scene and says how many episodes it has."""
+    """Set a worker up; return a function that makes and stages a scene and counts its episodes."""
     from internav_data.dataset.staging import stage_scene  # noqa: PLC0415 - workers only
 
     config, assets, store = payload.config, payload.assets, payload.store

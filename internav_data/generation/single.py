@@ -18,7 +18,7 @@ def generate_house(seed: int = 0, scene: int = 0, config: GenerationConfig | Non
     Parameters
     ----------
     seed
-        Of the dataset; takes the place of `config.seed`.
+        Seed of the dataset; takes the place of `config.seed`.
     scene
         Index of the scene, 0 and up.
     config
@@ -66,9 +66,9 @@ def generate_episodes(
     Raises
     ------
     UsageError
-        Counts below one, or a config that cannot be meant.
+        A count or setting out of its bounds.
     QuarantineError
-        An episode cannot be made within the stated bounds; it says which and why.
+        An episode cannot be made within the stated bounds; it names the episode and the reason.
 
     Examples
     --------
