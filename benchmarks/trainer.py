@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 import torch
 
-from internav_data.camp.agents import make_agent
+from internav_data.camp.agents import LEARNERS, make_agent
 from internav_data.camp.agents.options import ACTIONS_OF, NAVIGATE, STOP
 from internav_data.camp.config import from_mapping, preset
 from internav_data.camp.ppo import update
@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from internav_data.camp.config import CampConfig, PPOConfig
     from internav_data.camp.rollout import Rollout
 
-METHODS = ("ppo", "ppo-intent", "nie", "hrl", "camp")
 TARGETS = {"update_ratio": 10.0, "simulator_share": 1 / 3, "overhead_us": 50.0}
 TOLERANCE = 1e-4
 MAX_STEPS = 200
@@ -71,7 +70,7 @@ class Clock:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("dataset", type=Path)
-    parser.add_argument("--methods", default=",".join(METHODS))
+    parser.add_argument("--methods", default=",".join(LEARNERS))
     parser.add_argument("--rollouts", type=int, default=3)
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()

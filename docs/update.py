@@ -91,6 +91,18 @@ def room_types() -> str:
     return f"- Types: {', '.join(sorted(ROOM_TYPES))}. Up to 40 rooms."
 
 
+def methods() -> str:
+    """Return the table of methods."""
+    from internav_data.camp.agents import AGENTS  # noqa: PLC0415 - torch
+
+    rows = [
+        f"| `{name}` | {method.description} | {method.privileged} |"
+        for name, method in AGENTS.items()
+    ]
+    own = "| NAME | [your own](#your-own-agent) | depends on its `sensors` |"
+    return "\n".join(["| `--method` | | privileged input |", "|---|---|---|", *rows, own])
+
+
 def sensors() -> str:
     """Return the table of sensors."""
     from gymnasium import spaces  # noqa: PLC0415 - seconds
@@ -149,7 +161,9 @@ def updated() -> dict[Path, str]:
             "sensors",
             sensors(),
         ),
-        training: replaced(written, "training settings", training_settings()),
+        training: replaced(
+            replaced(written, "training settings", training_settings()), "methods", methods()
+        ),
     }
 
 

@@ -51,7 +51,7 @@ interrupted.""",
 @DATASET
 @click.option(
     "--method",
-    help="camp, ppo, ppo-intent, hrl, nie, or one of your own.  [default: camp]",
+    help="Agent to train: camp, a baseline of it (docs/training.md), or your own.  [default: camp]",
 )
 @click.option(
     "--out", type=click.Path(path_type=Path), help="The run's folder.  [default: runs/METHOD-SEED]"

@@ -9,7 +9,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from internav_data.camp import checkpoint as checkpoints  # noqa: E402
-from internav_data.camp.agents import make_agent  # noqa: E402
+from internav_data.camp.agents import LEARNERS, make_agent  # noqa: E402
 from internav_data.camp.checkpoint import Checkpoint, find, load_agent, read, save  # noqa: E402
 from internav_data.records.errors import CorruptDataError, UsageError  # noqa: E402
 
@@ -63,7 +63,7 @@ def test_what_is_read_is_what_was_written(kept, made):
     assert not read(folder, training=False).training
 
 
-@pytest.mark.parametrize("method", ["ppo", "ppo-intent", "nie", "hrl", "camp"])
+@pytest.mark.parametrize("method", LEARNERS)
 def test_an_agent_comes_back_knowing_what_it_is(tmp_path, made, method):
     written = made(method)
     save(tmp_path, written)

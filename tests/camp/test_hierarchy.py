@@ -7,7 +7,12 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from internav_data.camp.agents import AuxiliaryAgent, make_agent  # noqa: E402
+from internav_data.camp.agents import (  # noqa: E402
+    AGENTS,
+    LEARNERS,
+    AuxiliaryAgent,
+    make_agent,
+)
 from internav_data.camp.agents.options import (  # noqa: E402
     ACTIONS_OF,
     DONE,
@@ -298,7 +303,7 @@ def test_hrl_decides_at_every_step_and_its_interactions_never_hand_back(collecte
         assert (record.choice[acting] != DONE).all()
 
 
-@pytest.mark.parametrize("method", ["ppo", "ppo-intent", "nie", "hrl", "camp"])
+@pytest.mark.parametrize("method", LEARNERS)
 @pytest.mark.parametrize("chance", [0.01, 0.05])
 def test_every_learner_ends_an_episode_with_the_same_chance(fake, config, method, chance):
     env = fake()
@@ -353,7 +358,7 @@ def test_recursive_intent_is_the_intent_policy_run_on_its_own_first_intent(colle
 
 
 def test_unknown_methods_and_unfit_variants_are_refused(config):
-    with pytest.raises(UsageError, match="random, ppo, ppo-intent, nie, hrl, camp"):
+    with pytest.raises(UsageError, match=", ".join(AGENTS)):
         make_agent("dqn", config())
     with pytest.raises(UsageError, match="'policy'"):
         make_agent("ppo-intent", config(agent={"intent": "policy"}))

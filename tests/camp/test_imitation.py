@@ -8,7 +8,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from internav_data.camp.agents import make_agent  # noqa: E402
+from internav_data.camp.agents import LEARNERS, make_agent  # noqa: E402
 from internav_data.camp.agents.options import (  # noqa: E402
     DONE,
     NAVIGATE,
@@ -152,7 +152,7 @@ def test_frames_begin_where_episodes_do(experts, config):
         assert batch.record.choice[:, k].tolist() == right
 
 
-@pytest.mark.parametrize("method", ["ppo", "ppo-intent", "nie", "hrl", "camp"])
+@pytest.mark.parametrize("method", LEARNERS)
 def test_experts_are_learnt_by_every_learner(experts, config, method):
     agent = make_agent(method, config(network={"hidden": 32}))
     optimiser = torch.optim.Adam(agent.optimised(), 1e-3)

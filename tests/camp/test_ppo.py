@@ -8,7 +8,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from internav_data.camp.agents import AuxiliaryAgent, make_agent  # noqa: E402
+from internav_data.camp.agents import LEARNERS, AuxiliaryAgent, make_agent  # noqa: E402
 from internav_data.camp.ppo import explained_variance, set_rate, update  # noqa: E402
 from internav_data.camp.rollout import (  # noqa: E402
     Collector,
@@ -19,7 +19,6 @@ from internav_data.camp.rollout import (  # noqa: E402
 from internav_data.records.errors import NotFiniteError  # noqa: E402
 
 MIDDLE = 3e-3
-LEARNERS = ["ppo", "ppo-intent", "nie", "hrl", "camp"]
 
 
 def adam(agent, rate=1e-3):

@@ -74,21 +74,18 @@ def test_defect_3_cut_off_from_the_goal_is_a_failure_that_counts(fake, config):
     assert all(f.metrics["distance_to_goal_m"] == np.inf for f in rollout.finished)
 
 
-def test_defect_4_a_move_counts_once():
-    """Pushes and looks after a move add nothing to the path."""
-    from types import SimpleNamespace
+def test_defect_4_a_move_counts_once(houses):
+    """Pushes, turns and looks after a move add nothing to the path."""
+    from internav_data.envs import InterNavEnv
 
-    from internav_data.envs.tasks import InteractiveNavigation, TaskConfig
-
-    world = SimpleNamespace(i=0, j=0, lattice=None)
-    distances = SimpleNamespace(at=lambda _i, _j: 0.0)
-    task = InteractiveNavigation(world, distances, TaskConfig(), shortest_path_m=1.0)
-    task.success, statistics = True, task.statistics
-    statistics.moves, statistics.steps = 4, 12
-    statistics.tried["push"] = statistics.done["push"] = 7
-    found = task.metrics()
-    assert found["path_m"] == 1.0
-    assert found["spl"] == 1.0
+    env, moves = InterNavEnv(houses, 16, sensors=()), 0
+    env.reset(seed=0)
+    for action in np.random.default_rng(0).choice([0, 0, 1, 2, 3, 4, 5, 9], 120).tolist():
+        *_, info = env.step(action)
+        moves += action == 0 and info["action_success"]
+    *_, info = env.step(11)
+    assert moves > 5
+    assert info["metrics"]["path_m"] == 0.25 * moves
 
 
 def test_defect_5_no_synchronisation_within_an_update(collected, config, monkeypatch):

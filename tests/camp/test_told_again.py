@@ -6,21 +6,16 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from internav_data.camp.agents import AuxiliaryAgent, make_agent  # noqa: E402
+from internav_data.camp.agents import AGENTS, AuxiliaryAgent, make_agent  # noqa: E402
 from internav_data.camp.networks import EpisodeSegments  # noqa: E402
 
-LEARNERS = [
-    ("ppo", {}),
-    ("nie", {}),
-    ("ppo-intent", {}),
+VARIANTS = [
+    *((method, {}) for method in AGENTS),
     ("ppo-intent", {"intent": "recursive"}),
     ("ppo-intent", {"intent": "none"}),
-    ("hrl", {}),
-    ("camp", {}),
     ("camp", {"intent": "policy"}),
     ("camp", {"intent": "recursive"}),
     ("camp", {"intent": "none"}),
-    ("random", {}),
 ]
 
 
@@ -30,7 +25,7 @@ def curious(config):
     return {"agent": {"initial_interaction_probability": 0.3}}
 
 
-@pytest.mark.parametrize(("method", "told"), LEARNERS)
+@pytest.mark.parametrize(("method", "told"), VARIANTS)
 @pytest.mark.parametrize("shared", [True, False])
 def test_log_probabilities_and_values_are_those_of_the_rollout(
     collected, curious, method, told, shared

@@ -44,7 +44,7 @@ def policy(agent, *, greedy=False):
     return AgentPolicy("someone", agent, 16, greedy=greedy)
 
 
-@pytest.mark.parametrize("method", ["ppo", "ppo-intent", "hrl", "camp"])
+@pytest.mark.parametrize("method", agents.AGENTS)
 def test_agents_play_the_same_in_any_batch(played_data, make, method):
     agent = make(method)
     results = {

@@ -1,4 +1,4 @@
-"""Agents by name: `random`, `ppo`, `ppo-intent`, `nie`, `hrl`, `camp`, and a user's own.
+"""Agents by name, a row of `AGENTS` each, and a user's own.
 
 An entry point of the group `internav.agents`, a function of a `CampConfig` that returns an `Agent`,
 adds another.
@@ -6,6 +6,7 @@ adds another.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any, Final
@@ -33,27 +34,58 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AGENTS",
+    "LEARNERS",
     "Agent",
     "AgentStep",
     "AuxiliaryAgent",
     "Batch",
     "Evaluated",
     "Hierarchy",
+    "Method",
     "State",
     "StepRecord",
     "agent_names",
     "make_agent",
 ]
 
-AGENTS: Final[dict[str, Callable[[CampConfig], Agent[Any]]]] = {
-    "random": RandomAgent,
-    "ppo": PPOAgent,
-    "ppo-intent": PPOIntentAgent,
-    "nie": NIEAgent,
-    "hrl": partial(Hierarchy, temporally_extended=False),
-    "camp": Hierarchy,
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """Row of the table of methods."""
+
+    make: Callable[[CampConfig], Agent[Any]]
+    description: str
+    """Text for `docs/training.md`."""
+    privileged: str = "none"
+    """Privileged input: observations that a robot would not have."""
+
+
+AGENTS: Final = {
+    "camp": Method(
+        Hierarchy,
+        "a global policy opens Navigate, Push or Pick, conditioned on what the whole model is "
+        "about to do (section 4)",
+    ),
+    "hrl": Method(
+        partial(Hierarchy, temporally_extended=False),
+        "the same policies and the same pretraining; global decides at every step, Push and Pick "
+        "have no Done, no intent",
+    ),
+    "ppo": Method(PPOAgent, "one policy over the twelve actions"),
+    "ppo-intent": Method(
+        PPOIntentAgent,
+        "`ppo`, conditioned on what its own copy of some rollouts ago is about to do (figure 2c)",
+    ),
+    "nie": Method(
+        NIEAgent,
+        "`ppo` that foresees what each action does to objects in sight (Zeng et al. 2021)",
+        "**instance ids**",
+    ),
+    "random": Method(RandomAgent, "each action with equal probability; nothing to learn"),
 }
-"""Makers of agents by method."""
+"""Methods by name; trainer, documentation and tests derive their lists from it."""
+LEARNERS: Final = tuple(name for name in AGENTS if name != "random")
+"""Methods that can be trained."""
 GROUP: Final = "internav.agents"
 """Entry points that add methods."""
 
@@ -71,8 +103,9 @@ def make_agent(name: str, config: CampConfig) -> Agent[Any]:
     UsageError
         There is no such method, or the config does not suit it.
     """
-    make = AGENTS.get(name)
-    if make is None:
+    if name in AGENTS:
+        make = AGENTS[name].make
+    else:
         own = {point.name: point for point in entry_points(group=GROUP)}
         if name not in own:
             raise UsageError(f"method {name!r}: expected one of {', '.join(agent_names())}")
