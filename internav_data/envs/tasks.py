@@ -9,17 +9,19 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final, NamedTuple
 
+from internav_data.core.config import Bounds, check_bounds
 from internav_data.envs.auxiliary import is_cleared
 from internav_data.navigation import SPACING_M
+from internav_data.records import PushModel  # noqa: TC001 - fields' types are read at run time
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import INTERACTION_KINDS, ActionKind
 
 if TYPE_CHECKING:
     from internav_data.envs.auxiliary import InteractionKind
     from internav_data.envs.source import ShortestPathField
-    from internav_data.records import Episode, PushModel
+    from internav_data.records import Episode
     from internav_data.world import StepResult, World
 
 STEP: Final = -0.01
@@ -36,11 +38,12 @@ CHOSEN_ACTION: Final = 0.1
 class TaskConfig:
     """Settings of a task."""
 
-    max_steps: int = 500
+    max_steps: Annotated[int, Bounds(1)] = 500
     """Number of steps after which an episode is truncated."""
-    failed_done_reward: float = 0.0
+    failed_done_reward: Annotated[float, Bounds(-1000.0, 1000.0)] = 0.0
     """Reward of Done away from the goal, besides the step's; -1 in the released configuration."""
     push_model: PushModel = "force"
+    """Model of pushes."""
 
     def check(self) -> None:
         """Refuse settings that are out of their bounds.
@@ -50,12 +53,7 @@ class TaskConfig:
         UsageError
             A setting is out of its bounds.
         """
-        if self.max_steps < 1:
-            raise UsageError(f"max_steps: expected at least 1, got {self.max_steps}")
-        if not math.isfinite(self.failed_done_reward):
-            raise UsageError(
-                f"failed_done_reward: expected a number, got {self.failed_done_reward}"
-            )
+        check_bounds(self, "{key}: expected {expected}, got {value}")
         if self.push_model not in {"force", "kick"}:
             raise UsageError(f"push_model: expected 'force' or 'kick', got {self.push_model!r}")
 

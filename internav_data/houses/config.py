@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from internav_data.core.config import Bounds, check_bounds
 from internav_data.houses.room_types import ROOM_TYPES
@@ -26,6 +26,12 @@ class RoomsRequest:
 @dataclass(frozen=True, slots=True)
 class HouseConfig:
     """Settings of house generation."""
+
+    RENAMED: ClassVar[dict[str, str]] = {
+        "rooms_on_way_large": "rooms_on_path_large",
+        "rooms_on_way_medium": "rooms_on_path_medium",
+    }
+    """Present names of keys of earlier versions, for the error that refuses these."""
 
     preset: HousePreset = "paper"
     """`paper`: generous rooms of about 24 m², calibrated to the paper's Table 2; `realistic`:
@@ -51,9 +57,9 @@ class HouseConfig:
     """Share of wide, double and open doorways where they make sense. `paper` only."""
     wings: Annotated[float, Bounds(0.0, 1.0)] = 1.0
     """Share of drawn plans whose living room leads to rooms of its own: longer room paths."""
-    rooms_on_way_medium: Annotated[float, Bounds(2.0, 5.0)] = 2.7
+    rooms_on_path_medium: Annotated[float, Bounds(2.0, 5.0)] = 2.7
     """Mean number of rooms on a path, at which plans of 3-5 rooms aim. `paper` only."""
-    rooms_on_way_large: Annotated[float, Bounds(2.0, 6.0)] = 4.2
+    rooms_on_path_large: Annotated[float, Bounds(2.0, 6.0)] = 4.2
     """The same for 6-10 rooms. Doors of loops shorten paths again."""
     hall_from: Annotated[int, Bounds(0, 11)] = 0
     """Houses of this many rooms and more have a hall; 0 for the preset's own: 7 in `paper`, as
@@ -102,7 +108,7 @@ class HouseConfig:
         medium, large = 3, 6
         if self.preset != "paper" or rooms < medium:
             return None
-        return self.rooms_on_way_large if rooms >= large else self.rooms_on_way_medium
+        return self.rooms_on_path_large if rooms >= large else self.rooms_on_path_medium
 
 
 def parse_rooms(text: str) -> RoomsRequest:

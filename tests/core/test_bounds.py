@@ -19,6 +19,7 @@ CONFIGS = {
     "houses.config": "HouseConfig",
     "episodes.config": "EpisodeConfig",
     "evaluation.evaluator": "EvaluationConfig",
+    "envs.tasks": "TaskConfig",
     "camp.config": "CampConfig",
 }
 
