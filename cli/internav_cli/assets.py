@@ -50,8 +50,8 @@ def command(
         _draw(sheet, known, kind)
     if as_json:
         rows = [_row(asset) for asset in chosen] if kind else _counts(chosen)
-        told = {"version": known.version, "digest": known.digest, "assets": rows}
-        click.echo(json.dumps(told, indent=2))
+        values = {"version": known.version, "digest": known.digest, "assets": rows}
+        click.echo(json.dumps(values, indent=2))
     elif kind is None:
         _print_counts(_counts(chosen), len(known.spawnable))
     else:

@@ -160,13 +160,13 @@ def _forecast(request: Request, *, as_json: bool) -> int:
     from internav_data.camp.run import forecast
     from internav_data.core.progress import clock
 
-    told = forecast(request)
+    stages = forecast(request)
     if as_json:
         names = ("stage", "steps", "seconds")
-        click.echo(json.dumps([dict(zip(names, row, strict=True)) for row in told]))
+        click.echo(json.dumps([dict(zip(names, row, strict=True)) for row in stages]))
         return 0
-    whole = ("in all", sum(steps for _, steps, _ in told), sum(seconds for *_, seconds in told))
-    for name, steps, seconds in (*told, whole):
+    total = ("in all", sum(s for _, s, _ in stages), sum(seconds for *_, seconds in stages))
+    for name, steps, seconds in (*stages, total):
         amount = f"{steps:,} steps" if steps else ""
         click.echo(f"{name:<20} {amount:>18} {clock(seconds):>14}")
     click.echo("measured over a few updates; validation is not in it", err=True)

@@ -110,8 +110,8 @@ def command(
         pixels, rate = size or DEFAULTS[kind][0], fps if fps is not None else DEFAULTS[kind][1]
         count = write_video(path, film.frames(size=pixels, fps=rate), rate)
         end = "reaches the goal" if film.success else "does not end at the goal"
-        told = f"{count / rate:.0f} s, {path.stat().st_size / 1e6:.1f} MB"
-        click.echo(f"wrote {path}: {film.steps} actions, {end}; {told}", err=True)
+        length = f"{count / rate:.0f} s, {path.stat().st_size / 1e6:.1f} MB"
+        click.echo(f"wrote {path}: {film.steps} actions, {end}; {length}", err=True)
     return 0
 
 

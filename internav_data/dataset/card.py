@@ -69,7 +69,7 @@ def _summary(manifest: Manifest, stats: Stats) -> str:
 # Interactive navigation episodes
 
 {stats.episodes:,} tasks in {stats.scenes:,} generated houses: {splits}. In each, an agent (a disc
-of 0.2 m radius) is to reach a goal while obstacles, settled by physics, block the way
+of 0.2 m radius) is to reach a goal while obstacles, settled by physics, block the path
 ({stats.modes["blocked"]:,} episodes) or lengthen it ({stats.modes["lengthened"]:,}). Of the
 blocked ones {share} let nothing through off the 0.25 m lattice either (`sealed`).
 
@@ -81,7 +81,7 @@ quaternions are (x, y, z, w). `schemas/` holds a JSON Schema of each row, `stats
 
 def _table2(stats: Stats) -> str:
     lines = [
-        "| rooms | share | obstacles | distance, m | rooms on the way |",
+        "| rooms | share | obstacles | distance, m | rooms on the path |",
         "|---|---|---|---|---|",
     ]
     lines += [
@@ -97,9 +97,9 @@ def _interactions(stats: Stats) -> str:
     lines = [
         "## Interactions",
         "",
-        "What pushing each obstacle along each axis or picking it up would do (`outcomes`):",
+        "Effects of pushing each obstacle along each axis or of picking it up (`outcomes`):",
         "",
-        "| | possible | succeeds | opens a blocked way by itself |",
+        "| | possible | succeeds | opens a blocked path by itself |",
         "|---|---|---|---|",
     ]
     lines += [
@@ -114,7 +114,7 @@ def _interactions(stats: Stats) -> str:
 expert, replayed before it was stored, solves {100 * expert.solved_share:.1f} % of the episodes in
 {expert.steps.mean:.1f} steps on average ({expert.pushes:.2f} pushes, {expert.picks:.2f} picks); its
 SPL of {expert.spl:.3f} and STS of {expert.sts:.3f} are the ceiling to compare agents with. It
-refused {100 * expert.refused_share:.1f} % of what was drawn.
+refused {100 * expert.refused_share:.1f} % of the draws.
 """
     )
 
@@ -147,7 +147,7 @@ episodes = polars.read_parquet([f["path"] for f in files if f["table"] == "episo
 
 def _columns(spec: TableSpec[Any]) -> str:
     notes = descriptions(spec.cls)
-    lines = ["| column | type | unit | what it is |", "|---|---|---|---|"]
+    lines = ["| column | type | unit | description |", "|---|---|---|---|"]
     for field in spec.node.fields:
         note = " ".join(notes.get(field.name, "").split()).replace("|", "\\|")
         lines.append(f"| `{field.name}` | {_type(field)} | {field.unit or ''} | {note} |")

@@ -85,14 +85,14 @@ def _conformed(array: pa.Array, wanted: pa.DataType) -> pa.Array:
 def _pruned(schema: pa.Schema, columns: Sequence[str]) -> list[pa.Field]:
     """Return the fields that are named; of a struct the parts that are."""
     wanted: dict[str, list[str]] = {}
-    whole = set()
+    complete = set()
     for name in columns:
         first, _, rest = name.partition(".")
         wanted.setdefault(first, []).append(rest)
         if not rest:
-            whole.add(first)
+            complete.add(first)
     return [
-        field if field.name in whole else _part(field, wanted[field.name])
+        field if field.name in complete else _part(field, wanted[field.name])
         for field in schema
         if field.name in wanted
     ]

@@ -61,7 +61,7 @@ def croissant(manifest: Manifest) -> dict[str, Any]:
         "@type": "sc:Dataset",
         "name": "interactive-navigation-episodes",
         "description": "Interactive-navigation episodes in generated houses: obstacles, settled "
-        "by physics, block or lengthen an agent's way to its goal.",
+        "by physics, block or lengthen an agent's path to its goal.",
         "conformsTo": "http://mlcommons.org/croissant/1.0",
         "version": f"{FORMAT_VERSION}.0.0",
         "distribution": [_file(f) for f in manifest.files]

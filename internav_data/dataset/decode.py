@@ -2,7 +2,7 @@
 
 A tree of cursors is built over one table: a fixed effort for each column, after which any run of
 rows becomes dataclasses by slicing numpy arrays. A single record of a cached row group takes tens
-of microseconds, and a whole table no more for each row.
+of microseconds, and each row of a table no more.
 """
 
 from __future__ import annotations

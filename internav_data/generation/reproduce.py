@@ -31,7 +31,7 @@ class Made:
 
 
 def made_again(config: GenerationConfig, scene: int, episode: int | None = None) -> Made:
-    """Make a scene with its episodes, or with those up to `episode`: all physics solved anew.
+    """Make a scene with its episodes, or with those up to `episode`: without the result cache.
 
     Raises
     ------

@@ -27,7 +27,7 @@ def generate_house(seed: int = 0, scene: int = 0, config: GenerationConfig | Non
     Raises
     ------
     UsageError
-        A config, seed or scene that cannot be meant.
+        A seed, scene or setting out of its bounds.
     QuarantineError
         No house could be built within the stated bounds.
 
@@ -60,8 +60,8 @@ def generate_episodes(
 ) -> tuple[Episode, ...]:
     """Return episodes first … first + count - 1 of a house, each settled and judged.
 
-    They are those of a dataset with the same config, unless the dataset had to make the whole
-    scene anew because another of its episodes could not be made.
+    They are those of a dataset with the same config, unless the dataset had to make the scene
+    again because another of its episodes could not be made.
 
     Raises
     ------
