@@ -34,7 +34,7 @@ Examples:
 def command(
     *, kind: str | None, folders: tuple[str, ...], sheet: Path | None, as_json: bool
 ) -> int:
-    """List what can stand in a house or on an agent's way."""
+    """List the assets: obstacles and furniture."""
     from internav_data.catalog import catalogue
     from internav_data.generation import load_config
     from internav_data.generation.scenes import asset_folders

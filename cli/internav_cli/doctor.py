@@ -24,7 +24,7 @@ Examples:
 )
 @JSON
 def command(*, out: Path, as_json: bool) -> int:
-    """Look for what keeps this machine from generating, and say what to do about it."""
+    """Check that this machine can generate datasets; name a remedy for each problem."""
     from internav_data.generation.diagnostics import examine
 
     checks = examine(out)

@@ -11,14 +11,14 @@ import click
 
 COMMANDS = {
     "generate": "Make a dataset from a seed; continue or extend one.",
-    "validate": "Prove a dataset right, or say what in it is wrong.",
-    "stats": "Tell what a dataset is like, beside the paper's Table 2.",
+    "validate": "Validate a dataset independently of its generator; list every error.",
+    "stats": "Print statistics of a dataset, beside the paper's Table 2.",
     "show": "Draw a house or an episode from above as a PNG.",
-    "replay": "Film an episode: the agent's camera beside the map.",
+    "replay": "Record a video of an episode: the agent's camera beside the map.",
     "schema": "Print the JSON Schemas of every row and file.",
-    "assets": "List what can stand in a house or on a way.",
-    "doctor": "Look for what keeps this machine from generating.",
-    "warmup": "Compile the numba kernels now rather than at first use.",
+    "assets": "List the assets: obstacles and furniture.",
+    "doctor": "Check that this machine can generate datasets.",
+    "warmup": "Compile the numba kernels before their first use.",
 }
 INTERRUPTED = 130
 

@@ -77,7 +77,7 @@ def command(
     fps: float | None,
     force: bool,
 ) -> int:
-    """Film an episode of DATASET: the agent's camera beside the map, every action in words."""
+    """Record a video of an episode of DATASET: camera, map, and every action in words."""
     if outs and formats:
         raise click.UsageError("--format is for files without --out: a name's suffix says it")
     from internav_data.records.errors import UsageError

@@ -12,7 +12,7 @@ Examples:
   internav-gen warmup          once after installing, or while building a container""",
 )
 def command() -> int:
-    """Compile the numba kernels now, rather than when they are first used."""
+    """Compile the numba kernels before their first use."""
     from internav_data.core.progress import clock
     from internav_data.generation.diagnostics import warm_up
 
