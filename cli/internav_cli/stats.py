@@ -93,4 +93,4 @@ def interaction_lines(stats: dict[str, Any]) -> list[str]:
 
 
 def _spread(figures: dict[str, float]) -> str:
-    return f"{figures['least']:g} - {figures['most']:g}, mean {figures['mean']:.2f}"
+    return f"{figures['min']:g} - {figures['max']:g}, mean {figures['mean']:.2f}"
