@@ -107,6 +107,13 @@ demo-train: $(STAMP) ## see CaMP learn on a small dataset: about five minutes
 test: $(STAMP) ## run the tests (but not the slow campaigns)
 	$(BIN)/python -m pytest -q -m 'not slow and not learning' -n 2 --dist loadfile $(ARGS)
 
+.PHONY: coverage
+coverage: $(STAMP) ## run the tests, print what they cover a room: 1.8 times as slow
+	rm -rf build/coverage && mkdir -p build/coverage
+	$(BIN)/coverage run -m pytest -q -m 'not slow and not learning' -n 2 --dist loadfile $(ARGS)
+	$(BIN)/coverage combine --quiet
+	$(BIN)/python docs/covered.py
+
 .PHONY: test-slow
 test-slow: $(STAMP) ## run the slow campaigns
 	$(BIN)/python -m pytest -q -m slow $(ARGS)

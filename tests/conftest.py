@@ -8,11 +8,18 @@ from typing import TYPE_CHECKING
 
 import builders
 import pytest
+from hypothesis import HealthCheck, settings
 
 from internav_data.records import OUTSIDE, Door, NodePath, Window
 
 if TYPE_CHECKING:
     from internav_data.records import Episode, House, Wall
+
+# How long an example takes says how busy the machine is, and whether numba is compiling.
+settings.register_profile(
+    "any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("any machine")
 
 # Tests ask the engine itself: an answer from disk would be right even if the engine no longer were.
 os.environ["INTERNAV_CACHE_DIR"] = ""

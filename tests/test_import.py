@@ -15,7 +15,7 @@ HEAVY |= {"pandas", "matplotlib", "click", "duckdb", "polars", "gymnasium"}
 def modules_after(code: str) -> set[str]:
     script = f"import sys\n{code}\nprint(*sys.modules)"
     done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=120
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=300
     )
     return {name.split(".")[0] for name in done.stdout.splitlines()[-1].split()}
 

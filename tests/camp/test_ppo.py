@@ -112,7 +112,8 @@ def _part(agent, optimiser, rollout, config, columns):
     optimiser.step()
 
 
-def test_a_step_is_that_of_the_textbook(collected, config):
+def test_a_step_is_that_of_the_textbook(monkeypatch, collected, config):
+    monkeypatch.setitem(globals(), "adam", _gradient_step)
     agent, _, (_, rollout) = collected("ppo")
     other = copy.deepcopy(agent)
     ppo = dataclasses.replace(config().ppo, update_epochs=1, num_minibatches=1, ent_coef=0.0)
@@ -180,9 +181,9 @@ def _in_step(ranks, halves, ppo):
 
     def reduced(rank, tensor):
         shares[rank] = tensor.detach().clone()
-        meet.wait(20)
+        meet.wait(120)
         whole = sum(shares[k] for k in range(len(ranks)))
-        meet.wait(20)
+        meet.wait(120)
         return whole
 
     def run(rank):
@@ -196,7 +197,7 @@ def _in_step(ranks, halves, ppo):
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(30)
+        thread.join(300)
     return [told[rank] for rank in range(len(ranks))]
 
 

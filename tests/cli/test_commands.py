@@ -1,5 +1,6 @@
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -54,13 +55,19 @@ SMALL = ("--scenes", 3, "--episodes-per-scene", 2, "--rooms", 1, "--workers", 1)
 def test_help_has_examples_and_is_fast(words):
     seconds = []
     for _ in range(3):
-        began = time.perf_counter()
+        began = cpu_seconds()
         told = run(*words)
-        seconds.append(time.perf_counter() - began)
+        seconds.append(cpu_seconds() - began)
     assert told.returncode == 0
     assert "Examples:" in told.stdout
-    # 200 ms are promised (0.13 s measured); a busy machine gets some more.
+    # 200 ms are promised (0.13 s measured); a slow machine gets some more.
     assert min(seconds) < 0.6
+
+
+def cpu_seconds():
+    """Time of the processors that children took: other work on the machine does not count."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def test_help_imports_nothing_heavy():
@@ -259,11 +266,11 @@ def test_a_signal_ends_in_order_and_keeps_what_is_done(tmp_path, signum, code):
     words = ("--scenes", 500, "--episodes-per-scene", 2, "--rooms", 1, "--workers", 1)
     command = [GEN, "generate", "--out", tmp_path / "d", *map(str, words)]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 120
+    deadline = time.monotonic() + 300
     while not list(tmp_path.rglob("scene-*.work")) and time.monotonic() < deadline:
         time.sleep(0.05)
     process.send_signal(signum)
-    _, told = process.communicate(timeout=60)
+    _, told = process.communicate(timeout=300)
     assert process.returncode == code
     assert len(beside_the_dataset(told)) == 1, told
     assert "run the same command again to continue" in told

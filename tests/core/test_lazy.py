@@ -39,7 +39,7 @@ except AttributeError as error:
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
+        timeout=300,
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout == "module 'shop' has no attribute 'plum'\n"

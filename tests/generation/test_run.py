@@ -89,11 +89,11 @@ def killed(out, signum, scenes=60):
     (out.parent / "stub.json").write_text(json.dumps({"seconds": 0.2}))
     script = Path(__file__).with_name("run_stub.py")
     process = subprocess.Popen([sys.executable, script, out, str(scenes), "2"])
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 300
     while len(list(out.rglob("scene-*.work"))) < 5 and time.monotonic() < deadline:
         time.sleep(0.02)
     process.send_signal(signum)
-    code = process.wait(timeout=60)
+    code = process.wait(timeout=300)
     while any(map(runs, (out.parent / "workers").read_text().split())):
         time.sleep(0.02)  # workers whose parent was killed end the scene they are at
     return code

@@ -65,12 +65,14 @@ def test_a_full_disk_ends_the_run():
     assert caught.value.exit_code == 1
 
 
-def test_once_stopped_only_tasks_under_way_end():
+def test_once_stopped_only_tasks_under_way_end(tmp_path):
     ended = []
-    with WorkerPool(2, Recipe(worker_stubs.slow, 0.2)) as pool:
+    with WorkerPool(2, Recipe(worker_stubs.noted, str(tmp_path))) as pool:
         for result in pool.run(range(1000), tick=lambda: not ended):
             ended.append(result.task)  # noqa: PERF401 - the flag reads it meanwhile
-    assert 2 <= len(ended) <= 4
+    # Two may have ended at once and two more have begun meanwhile; one worker may have slept.
+    assert 1 <= len(ended) <= 4
+    assert sorted(ended) == sorted(int(path.name) for path in tmp_path.iterdir())
 
 
 def test_workers_are_gone_afterwards():
@@ -88,4 +90,4 @@ def test_an_error_in_the_caller_ends_workers_at_once():
     with pytest.raises(RuntimeError), WorkerPool(1, Recipe(worker_stubs.slow, 60)) as pool:
         for _ in pool.run([1], tick=lambda: (_ for _ in ()).throw(RuntimeError)):
             pass
-    assert time.monotonic() - began < 10
+    assert time.monotonic() - began < 45, "it does not wait for the task"

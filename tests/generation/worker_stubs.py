@@ -49,6 +49,17 @@ def full_disk(_payload):
     return work
 
 
+def noted(folder):
+    """Tasks that leave a file each."""
+
+    def work(task):
+        (Path(folder) / str(task)).touch()
+        time.sleep(0.2)
+        return task
+
+    return work
+
+
 def slow(seconds):
     def work(task):
         time.sleep(seconds)
