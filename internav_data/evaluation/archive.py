@@ -1,4 +1,4 @@
-"""An evaluation on disk: a row a episode in Parquet, and beside it what was evaluated, and how."""
+"""Evaluations on disk: a row an episode in Parquet, and a JSON file about policy and settings."""
 
 from __future__ import annotations
 
@@ -19,64 +19,73 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 ABOUT: Final = "evaluation.json"
+"""Name of the JSON file."""
 EPISODES: Final = "episodes.parquet"
+"""Name of the table."""
 FORMAT: Final = 2
-_BYTES_AT_MOST: Final = 1_000_000
-_ROWS_AT_MOST: Final = 5_000_000
-_DEPTH: Final = 3
-"""How many folders deep evaluations are looked for."""
+"""Version of both files."""
+_MAX_BYTES: Final = 1_000_000
+_MAX_ROWS: Final = 5_000_000
+_MAX_DEPTH: Final = 3
+"""Depth of folders in which evaluations are searched."""
 
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """What was evaluated, and how."""
+    """Policy and settings of an evaluation."""
 
     name: str
-    """Of its row, as in `camp --intent none`."""
+    """Name of the row in tables, as `camp --intent none`."""
     method: str
-    """camp, ppo, ppo-intent, hrl, nie, a user's own; or a reference policy."""
+    """Method: camp, ppo, ppo-intent, hrl, nie, a user's own; or a reference policy."""
     dataset: str
     """Fingerprint of the selected episodes (`Dataset.fingerprint`)."""
     split: str
+    """Split of the episodes."""
     seed: int
-    """Of the evaluation."""
+    """Seed of the evaluation."""
     max_steps: int
+    """Number of steps after which episodes were truncated."""
     greedy: bool = False
+    """Whether the most probable actions were taken instead of sampled ones."""
     is_reference: bool = False
-    """A reference policy, not a trained agent."""
+    """Whether it is a reference policy, not a trained agent."""
     intent: str = ""
-    """How the intent was made: integrated, policy, recursive, none; empty without one."""
+    """Kind of intent: integrated, policy, recursive, none; empty for methods without one."""
     sync_every: int | None = None
-    """Rollouts between synchronisations of the intent policy."""
+    """Number of rollouts between synchronisations of the intent policy."""
     without_intent: bool = False
-    """Trained with the intent, evaluated without."""
+    """Whether an agent trained with the intent was evaluated without it."""
     training_seed: int | None = None
+    """Seed of the training run."""
     environment_steps: int | None = None
-    """Of training, auxiliary stages included."""
+    """Environment steps of training, auxiliary stages included."""
     cloned_frames: int | None = None
-    """Expert frames it was cloned from beforehand."""
+    """Expert frames that were cloned before."""
     parameters: int | None = None
+    """Number of trained parameters."""
     training_s: float | None = None
-    """Wall time of training."""
+    """Wall time of training, seconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """What somebody did in every episode."""
+    """Evaluation of one policy: a result for each episode."""
 
     about: About
+    """Policy and settings."""
     results: tuple[EpisodeResult, ...]
-    """In order of episode_id."""
+    """Results in order of episode_id."""
 
 
 def write_evaluation(folder: Path, about: About, results: Sequence[EpisodeResult]) -> None:
-    """Write an evaluation; `evaluation.json` comes last, so what has it is whole."""
+    """Write an evaluation; `evaluation.json` comes last, so a folder that has it is complete."""
     ordered = sorted(results, key=lambda result: result.episode_id)
     (folder / ABOUT).unlink(missing_ok=True)
     info = write_parquet(folder / EPISODES, ordered, RESULTS)
-    said = {"format": FORMAT, **asdict(about), "episodes": info.rows}
-    said["logical_digest"] = info.logical_digest
-    write_atomically(folder / ABOUT, (json.dumps(said, indent=2) + "\n").encode())
+    values = {"format": FORMAT, **asdict(about), "episodes": info.rows}
+    values["logical_digest"] = info.logical_digest
+    write_atomically(folder / ABOUT, (json.dumps(values, indent=2) + "\n").encode())
 
 
 def read_evaluation(folder: Path) -> Evaluation:
@@ -92,10 +101,10 @@ def read_evaluation(folder: Path) -> Evaluation:
     table_path = Path(folder) / EPISODES
     with open_parquet(table_path, RESULTS) as opened:
         rows = opened.metadata.num_rows
-        if rows != episodes or rows > _ROWS_AT_MOST:
+        if rows != episodes or rows > _MAX_ROWS:
             raise CorruptDataError(
                 f"{table_path}: expected {episodes} rows as {ABOUT} says (at most "
-                f"{_ROWS_AT_MOST}), got {rows}; evaluate again"
+                f"{_MAX_ROWS}), got {rows}; evaluate again"
             )
         results = tuple(from_table(read_all(table_path, opened, RESULTS), RESULTS))
     if len({result.episode_id for result in results}) != len(results):
@@ -104,12 +113,12 @@ def read_evaluation(folder: Path) -> Evaluation:
 
 
 def folder_name(name: str) -> str:
-    """Return a folder's name for a row."""
+    """Return the name of the folder for a row."""
     return re.sub(r"[^\w.]+", "-", name).strip("-.") or "agent"
 
 
 def forget_evaluations(folder: Path) -> None:
-    """Take away what makes evaluations of the folders in a folder; new ones replace them."""
+    """Remove the JSON files of the evaluations in a folder, so that new ones replace them."""
     for path in folder.glob(f"*/{ABOUT}"):
         path.unlink()
 
@@ -123,7 +132,7 @@ def find_evaluations(path: Path) -> list[Path]:
         There is none.
     """
     path = Path(path)
-    patterns = ["/".join(["*"] * depth + [ABOUT]) for depth in range(_DEPTH + 1)]
+    patterns = ["/".join(["*"] * depth + [ABOUT]) for depth in range(_MAX_DEPTH + 1)]
     found = sorted({file.parent for pattern in patterns for file in path.glob(pattern)})
     if not found:
         raise UsageError(
@@ -134,26 +143,26 @@ def find_evaluations(path: Path) -> list[Path]:
 
 
 def _about(path: Path) -> tuple[About, int]:
-    def wrong(what: str) -> CorruptDataError:
-        return CorruptDataError(f"{path}: {what}; evaluate again with `camp-eval RUN DATASET`")
+    def wrong(text: str) -> CorruptDataError:
+        return CorruptDataError(f"{path}: {text}; evaluate again with `camp-eval RUN DATASET`")
 
     try:
         with path.open("rb") as file:
-            raw = file.read(_BYTES_AT_MOST + 1)
-        said: Any = json.loads(raw.decode("utf-8")) if len(raw) <= _BYTES_AT_MOST else None
+            raw = file.read(_MAX_BYTES + 1)
+        values: Any = json.loads(raw.decode("utf-8")) if len(raw) <= _MAX_BYTES else None
     except OSError as error:
         raise wrong(f"cannot be read: {error.strerror}") from error
     except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
         raise wrong("not JSON") from error
-    if not isinstance(said, dict) or said.get("format") != FORMAT:
+    if not isinstance(values, dict) or values.get("format") != FORMAT:
         raise wrong(f"expected an evaluation of format {FORMAT}")
     hints = get_type_hints(About)
     for field in fields(About):
         kinds = get_args(hints[field.name]) or (hints[field.name],)
-        kind = type(said.get(field.name))
+        kind = type(values.get(field.name))
         if kind not in kinds and not (kind is int and float in kinds):
             names = " or ".join("null" if k is NoneType else k.__name__ for k in kinds)
             raise wrong(f"{field.name}: expected {names}, got {kind.__name__}")
-    if type(said.get("episodes")) is not int:
+    if type(values.get("episodes")) is not int:
         raise wrong("episodes: expected a count")
-    return About(**{field.name: said[field.name] for field in fields(About)}), said["episodes"]
+    return About(**{field.name: values[field.name] for field in fields(About)}), values["episodes"]

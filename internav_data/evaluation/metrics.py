@@ -1,7 +1,7 @@
-"""What is measured: one record an episode, and the paper's figures as ratios of sums over them.
+"""Metrics: one record an episode, and the paper's figures as ratios of sums over records.
 
 Section 5.1 of the paper defines SR, FDT, SPL and STS, section 5.4 IR, ISR, PuSR and PiSR.
-`docs/evaluation.md` has the formulas, and what was settled where the paper is silent.
+`docs/evaluation.md` has the formulas, and the decisions where the paper is silent.
 """
 
 from __future__ import annotations
@@ -19,59 +19,76 @@ if TYPE_CHECKING:
     from internav_data.records import Episode
 
 HARD_ROOMS: Final = 4
-"""The paper's N >= 4: hard scenes are those "with more rooms" (section 5.4)."""
+"""Number of rooms from which a scene is hard, "with more rooms" (section 5.4: N >= 4)."""
 
 
 @dataclass(frozen=True, slots=True)
 class EpisodeResult:
-    """How one episode went: a row of `episodes.parquet`."""
+    """Metrics and actions of one evaluated episode: a row of `episodes.parquet`."""
 
     episode_id: str
+    """Episode, as `scene-000017/0003`."""
     scene_id: str
+    """House of the episode, as `scene-000017`."""
     room_count: int
+    """Number of rooms of the house."""
     obstacle_count: int
+    """Number of spawned obstacles."""
     mode: Mode
+    """Mode of the episode, blocked or lengthened."""
     success: bool
-    """Done within 0.2 m of the goal."""
+    """Whether the episode ended with Done within 0.2 m of the goal."""
     steps: int
-    """Taken: Done, waits and failed actions included."""
+    """Number of actions: Done, waits and failed actions included."""
     distance_m: float
-    """From the end to the goal, any-angle, no obstacle about (FDT)."""
+    """FDT: Euclidean distance from the end to the goal, obstacles absent, metres."""
     shortest_path_m: float
-    """L: from the start to the goal, any-angle, no obstacle about."""
+    """L: Euclidean distance from the start to the goal, obstacles absent, metres."""
     path_m: float
-    """P: 0.25 m for each move that succeeded."""
+    """P: length walked, 0.25 m for each successful move."""
     spl: float
+    """Success weighted by path length."""
     sts: float
+    """Success weighted by time steps."""
     pushes_tried: int
+    """Number of pushes."""
     pushes_done: int
+    """Number of successful pushes."""
     picks_tried: int
+    """Number of pickups."""
     picks_done: int
+    """Number of successful pickups."""
     drops_tried: int
+    """Number of drops."""
     drops_done: int
+    """Number of successful drops."""
     interaction_m: float
-    """What interactions took off the lattice distance, while it was finite before and after."""
+    """Sum of the drops of the lattice distance by interactions, metres, where both are finite."""
     openings: int
-    """Interactions that made a way where there was none; not in `interaction_m`."""
+    """Number of interactions that open a path where there was none; not in `interaction_m`."""
     closings: int
+    """Number of interactions that close the last path."""
     reward_sum: float
+    """Sum of the rewards."""
     actions: tuple[int, ...]
-    """All that was done, -1 for a wait: with the episode, these play it again."""
+    """Actions in order, -1 for a wait; with the episode, they replay it."""
 
 
 RESULTS: Final[TableSpec[EpisodeResult]] = TableSpec(
     "results", EpisodeResult, ("episode_id", "scene_id", "room_count", "mode", "success")
 )
-"""The schema of `episodes.parquet`."""
+"""Schema of `episodes.parquet`."""
 
 
-def result_of(episode: Episode, said: Mapping[str, float], actions: Sequence[int]) -> EpisodeResult:
-    """Make the record of an episode from the environment's metrics at its end.
+def result_of(
+    episode: Episode, metrics: Mapping[str, float], actions: Sequence[int]
+) -> EpisodeResult:
+    """Return the result of an episode from the environment's metrics at its end.
 
-    An end from which the goal cannot be reached at all is a failure at the start's distance: it
+    An end from which the goal cannot be reached counts as a failure at the start's distance: it
     stays in every mean (the released code drops such episodes).
     """
-    distance, reached = float(said["distance_to_goal_m"]), bool(said["success"])
+    distance, reached = float(metrics["distance_to_goal_m"]), bool(metrics["success"])
     if not math.isfinite(distance):
         distance, reached = episode.shortest_path_m, False
     return EpisodeResult(
@@ -81,38 +98,41 @@ def result_of(episode: Episode, said: Mapping[str, float], actions: Sequence[int
         obstacle_count=episode.obstacle_count,
         mode=episode.mode,
         success=reached,
-        steps=int(said["steps"]),
+        steps=int(metrics["steps"]),
         distance_m=distance,
         shortest_path_m=episode.shortest_path_m,
-        path_m=float(said["path_m"]),
-        spl=float(said["spl"]) if reached else 0.0,
-        sts=float(said["sts"]) if reached else 0.0,
-        pushes_tried=int(said["pushes_tried"]),
-        pushes_done=int(said["pushes_done"]),
-        picks_tried=int(said["picks_tried"]),
-        picks_done=int(said["picks_done"]),
-        drops_tried=int(said["drops_tried"]),
-        drops_done=int(said["drops_done"]),
-        interaction_m=float(said["interaction_reward_m"]),
-        openings=int(said["openings"]),
-        closings=int(said["closings"]),
-        reward_sum=float(said["return"]),
+        path_m=float(metrics["path_m"]),
+        spl=float(metrics["spl"]) if reached else 0.0,
+        sts=float(metrics["sts"]) if reached else 0.0,
+        pushes_tried=int(metrics["pushes_tried"]),
+        pushes_done=int(metrics["pushes_done"]),
+        picks_tried=int(metrics["picks_tried"]),
+        picks_done=int(metrics["picks_done"]),
+        drops_tried=int(metrics["drops_tried"]),
+        drops_done=int(metrics["drops_done"]),
+        interaction_m=float(metrics["interaction_reward_m"]),
+        openings=int(metrics["openings"]),
+        closings=int(metrics["closings"]),
+        reward_sum=float(metrics["return"]),
         actions=tuple(int(action) for action in actions),
     )
 
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """A figure of the paper: the sum of one thing over the sum of another."""
+    """Figure of the paper: a ratio of two sums over episodes."""
 
     title: str
+    """Name in tables."""
     unit: Literal["%", "m", ""]
+    """Unit in tables: per cent of a share, metres, or none."""
     better: Literal["more", "less", ""]
+    """Direction of improvement; empty for figures without one."""
     part: Callable[[EpisodeResult], tuple[float, float]]
-    """An episode's share of the numerator and of the denominator."""
+    """Function that returns an episode's part of the numerator and of the denominator."""
 
     def of(self, results: Iterable[EpisodeResult]) -> float | None:
-        """Return the figure of some episodes; None where nothing is to be divided by."""
+        """Return the figure of some episodes; None where the denominator is 0."""
         parts = [self.part(result) for result in results]
         whole = math.fsum(below for _, below in parts)
         return math.fsum(above for above, _ in parts) / whole if whole else None
@@ -149,7 +169,7 @@ MEASURES: Final[Mapping[str, Measure]] = {
     "steps": Measure("steps", "", "", lambda r: (float(r.steps), 1.0)),
     "return": Measure("return", "", "more", lambda r: (r.reward_sum, 1.0)),
 }
-"""All figures by name. Those of single episodes are means; rates of interactions are pooled."""
+"""Figures by name. Those of single episodes are means; rates of interactions are pooled."""
 
 GROUPS: Final[Mapping[str, Callable[[EpisodeResult], bool]]] = {
     "all": lambda _: True,
@@ -157,21 +177,23 @@ GROUPS: Final[Mapping[str, Callable[[EpisodeResult], bool]]] = {
     "non-interactive": lambda r: r.mode != "blocked",
     "blocked": lambda r: r.mode == "blocked",
 }
-"""Which episodes: the paper's three, and those that an interaction must open."""
+"""Groups of episodes: the paper's three, and blocked ones, which need an interaction."""
 
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """The figures of one group of episodes."""
+    """Figures of one group of episodes."""
 
     episodes: int
+    """Number of episodes."""
     scenes: int
+    """Number of scenes."""
     values: Mapping[str, float | None]
-    """By the names of `MEASURES`; None where there is nothing to divide by."""
+    """Figures by their names in `MEASURES`; None where the denominator is 0."""
 
 
 def summary(results: Sequence[EpisodeResult], group: str = "all") -> Summary:
-    """Return all figures of one of the `GROUPS`; the order of the results does not matter."""
+    """Return the figures of one of the `GROUPS`; the order of the results does not matter."""
     chosen = [result for result in results if GROUPS[group](result)]
     values = {name: measure.of(chosen) for name, measure in MEASURES.items()}
     return Summary(len(chosen), len({result.scene_id for result in chosen}), values)

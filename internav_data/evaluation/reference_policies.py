@@ -1,4 +1,4 @@
-"""Reference policies: the dataset's expert, the shortest path without interaction, and chance."""
+"""Reference policies: the dataset's expert, the shortest path without interaction, chance."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     ActionPlanner = Callable[[Episode], Sequence[int]]
 
 REFERENCE_POLICIES: Final = ("expert", "shortest_path", "random")
+"""Names of the reference policies."""
 _DIRECTIONS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))
 _TURNS: Final[tuple[tuple[int, ...], ...]] = (
     (),
@@ -33,7 +34,7 @@ _TURNS: Final[tuple[tuple[int, ...], ...]] = (
     (Action.ROTATE_LEFT,) * 2,
     (Action.ROTATE_RIGHT,),
 )
-"""What turns the agent by so many quarters, counter-clockwise."""
+"""Rotations by the number of quarter turns, counter-clockwise."""
 
 
 def reference_policy(name: str, dataset: Dataset[Episode]) -> Policy:
@@ -62,14 +63,14 @@ def reference_policy(name: str, dataset: Dataset[Episode]) -> Policy:
 
 
 class ScriptedPolicy:
-    """Knows at an episode's start what it will do.
+    """Policy that decides on all actions at an episode's start.
 
     Parameters
     ----------
     name
-        Of its row.
+        Name of the row in tables.
     plan
-        The actions for an episode; Done follows where they end without it.
+        Function that returns the actions for an episode; Done follows where they end without it.
     """
 
     image_size = 1
@@ -89,12 +90,12 @@ class ScriptedPolicy:
         self._left[slot] = deque(self._plan(episode))
 
     def act(self, observations: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:  # noqa: ARG002
-        """See `Policy`."""
+        """Return the actions of all slots, (n,) int64; see `Policy`."""
         return np.array([left.popleft() if left else Action.DONE for left in self._left], np.int64)
 
 
 class RandomPolicy:
-    """Takes each of the twelve actions with the same chance, Done included."""
+    """Policy that takes each of the twelve actions with the same probability, Done included."""
 
     name = "random"
     image_size = 1
@@ -113,7 +114,7 @@ class RandomPolicy:
         self._draws[slot] = episode_generator(self._seed, episode)
 
     def act(self, observations: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:  # noqa: ARG002
-        """See `Policy`."""
+        """Return the actions of all slots, (n,) int64; see `Policy`."""
         drawn = [
             Action.DONE if draw is None else int(draw.integers(ACTION_COUNT))
             for draw in self._draws
@@ -122,32 +123,32 @@ class RandomPolicy:
 
 
 def expert_actions(episode: Episode) -> Sequence[int]:
-    """Return the stored expert's actions; of an episode without one, Done alone: a failure."""
+    """Return the stored expert's actions; without an expert Done alone, a failure."""
     return (int(Action.DONE),) if episode.expert is None else episode.expert.actions
 
 
 def shortest_path_planner(dataset: Dataset[Episode]) -> ActionPlanner:
-    """Return what plans the shortest way on the lattice, things as they lie, touching none."""
+    """Return a planner of shortest lattice paths among objects as they lie."""
     from internav_data.envs.source import open_source  # noqa: PLC0415 - the camera's kernels
     from internav_data.world import World  # noqa: PLC0415
 
     source = open_source(dataset)  # houses are those of environments in this process
 
     def plan(episode: Episode) -> Sequence[int]:
-        stage = source.loaded_house(episode).model
-        world = World.of_episode(stage, episode, dataset.assets)
+        model = source.loaded_house(episode).model
+        world = World.of_episode(model, episode, dataset.assets)
         start, goal = (world.i, world.j), world.goal
         if world.lattice.distance(start, goal) is None:
-            goal = nearest(world.lattice, stage.lattice, start, goal)
+            goal = nearest(world.lattice, model.lattice, start, goal)
         return [*shortest(world.lattice, (*start, world.quarter), goal), int(Action.DONE)]
 
     return plan
 
 
 def nearest(lattice: Lattice, clear: Lattice, start: Node, goal: Node) -> Node:
-    """Return the node within reach from which the goal would be fewest steps, were all clear.
+    """Return the node in reach that is nearest to the goal on a lattice without obstacles.
 
-    Ties: the fewest steps to walk there, then i, then j.
+    Ties: fewest steps to walk there, then i, then j.
     """
     walk, rest = lattice.distances(*start), clear.distances(*goal)
     nodes = np.argwhere((walk >= 0) & (rest >= 0))
@@ -159,16 +160,16 @@ def nearest(lattice: Lattice, clear: Lattice, start: Node, goal: Node) -> Node:
 
 
 def shortest(lattice: Lattice, start: tuple[int, int, int], goal: Node) -> list[int]:
-    """Return actions along a shortest way, and of all such with the fewest turns.
+    """Return the actions along a shortest path, of all such one with the fewest rotations.
 
     Parameters
     ----------
     lattice
-        Things as they lie.
+        Lattice among objects as they lie.
     start
-        Node i, j and quarter turn.
+        Node i, j and quarter turns.
     goal
-        A node that can be reached from there.
+        Node that can be reached from the start.
     """
     steps = lattice.distances(*goal)
     reached: dict[tuple[int, int, int], list[int]] = {start: []}
@@ -187,9 +188,9 @@ def shortest(lattice: Lattice, start: tuple[int, int, int], goal: Node) -> list[
 
 
 def _leads(
-    lattice: Lattice, steps: NDArray[np.int32], node: Node, way: tuple[int, int], left: int
+    lattice: Lattice, steps: NDArray[np.int32], node: Node, step: tuple[int, int], left: int
 ) -> bool:
-    """Whether a step can be taken, and leaves so many."""
-    i, j = node[0] + way[0], node[1] + way[1]
+    """Return whether a step can be taken and leaves `left` more to the goal."""
+    i, j = node[0] + step[0], node[1] + step[1]
     inside = 0 <= i < steps.shape[0] and 0 <= j < steps.shape[1]
-    return inside and int(steps[i, j]) == left and lattice.edge_free(*node, *way)
+    return inside and int(steps[i, j]) == left and lattice.edge_free(*node, *step)

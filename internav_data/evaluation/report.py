@@ -1,6 +1,6 @@
-"""What an evaluation leaves behind for people: Markdown, JSON and one HTML page.
+"""Reports of evaluations: Markdown, JSON and one HTML page with training curves.
 
-A run's log rows, read forgivingly: one JSON object a line, of numbers by name.
+Curves come from a run's log, one JSON object of numbers a line; other lines are ignored.
 """
 
 from __future__ import annotations
@@ -37,14 +37,17 @@ if TYPE_CHECKING:
     from internav_data.views.page import Page
 
 
-BYTES_AT_MOST: Final = 256_000_000
+MAX_BYTES: Final = 256_000_000
+"""Size of a log above which it is not read."""
 STEPS: Final = ("step", "steps", "environment_steps")
-"""Names of the horizontal axis, the first one that a row has."""
+"""Names of the horizontal axis; the first one that a row has is used."""
 FIRST: Final = ("success", "validation", "return", "reward", "spl", "sts")
-"""What is shown first: names that hold these words."""
-CURVES_AT_MOST: Final = 24
+"""Words in the names of the curves that are shown first."""
+MAX_CURVES: Final = 24
+"""Maximum number of curves."""
 
 Series = dict[str, list[tuple[float, float]]]
+"""Points (step, value) of each number of a log."""
 
 
 def find_log(run: Path) -> Path | None:
@@ -54,9 +57,9 @@ def find_log(run: Path) -> Path | None:
 
 
 def read_log(path: Path) -> Series:
-    """Return each number of a log against the steps; lines that are no rows are passed over."""
+    """Return the points of each number of a log; lines that are no rows are ignored."""
     series: Series = {}
-    if path.stat().st_size > BYTES_AT_MOST:
+    if path.stat().st_size > MAX_BYTES:
         return series
     with path.open(encoding="utf-8", errors="replace") as lines:
         for line in lines:
@@ -71,26 +74,26 @@ def read_log(path: Path) -> Series:
 
 
 def shown_first(names: Sequence[str]) -> list[str]:
-    """Return the names to show, the telling ones first."""
+    """Return the names of the curves to show, those with a word of `FIRST` at the front."""
 
     def rank(name: str) -> tuple[int, str]:
         places = [k for k, word in enumerate(FIRST) if word in name.lower()]
         return (places[0] if places else len(FIRST)), name
 
-    return sorted(names, key=rank)[:CURVES_AT_MOST]
+    return sorted(names, key=rank)[:MAX_CURVES]
 
 
 def _row(line: str) -> Mapping[str, float]:
     try:
-        said: Any = json.loads(line)
+        values: Any = json.loads(line)
     except (ValueError, RecursionError):
         return {}
-    return _numbers(said) if isinstance(said, dict) else {}
+    return _numbers(values) if isinstance(values, dict) else {}
 
 
-def _numbers(said: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
+def _numbers(values: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
     found: dict[str, float] = {}
-    for name, value in said.items():
+    for name, value in values.items():
         if isinstance(value, dict) and not prefix:
             found |= _numbers(value, f"{name}/")
         elif isinstance(value, int | float) and not isinstance(value, bool):
@@ -104,17 +107,17 @@ def _numbers(said: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
 
 
 PICTURES_EACH: Final = 2
-"""Of the best, the median and the worst episodes."""
+"""Number of pictures of the best, the median and the worst episodes each."""
 _PIXELS: Final = 560
 
 
 def methods_of(evaluations: Sequence[Evaluation]) -> Methods:
-    """Return evaluations by row, checked to be comparable; a reference policy counts once.
+    """Return comparable evaluations by row; a reference policy counts once.
 
     Raises
     ------
     UsageError
-        They are not of the same episodes, or one is there twice.
+        The evaluations are not of the same episodes, or one is there twice.
     """
     kept: list[Evaluation] = []
     references: set[str] = set()
@@ -129,13 +132,13 @@ def methods_of(evaluations: Sequence[Evaluation]) -> Methods:
 
 
 def tables_of(methods: Methods) -> list[Table]:
-    """Return the paper's tables that these methods have something to say in."""
+    """Return the paper's tables that have a row of these methods."""
     ablations = table_4(methods)
     return [table_3(methods), *([ablations] if ablations else []), table_5(methods)]
 
 
 def text_of(methods: Methods) -> str:
-    """Return tables and what is said beside them, as Markdown."""
+    """Return tables and statements as Markdown."""
     about = next(iter(methods.values()))[0].about
     sampled = "likeliest actions" if about.greedy else "sampled actions"
     head = (
@@ -148,12 +151,12 @@ def text_of(methods: Methods) -> str:
         lines = [headings, ["---"] * len(headings), *rows]
         parts += ["### What each was given\n"]
         parts += ["\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"]
-    said = "\n".join(f"- {line}" for line in sentences(methods))
-    return "\n".join([*parts, "### What this can tell\n", said, ""])
+    statements = "\n".join(f"- {line}" for line in sentences(methods))
+    return "\n".join([*parts, "### What this can tell\n", statements, ""])
 
 
 def data_of(methods: Methods) -> dict[str, Any]:
-    """Return the same as plain data."""
+    """Return tables, figures, differences and statements as plain data."""
     return {
         "format": 2,
         "tables": [as_json(table) for table in tables_of(methods)],
@@ -164,7 +167,7 @@ def data_of(methods: Methods) -> dict[str, Any]:
 
 
 def _all_figures(found: Sequence[Evaluation]) -> dict[str, Any]:
-    """Return every figure of every group, in no table or in one: value, half interval, seeds."""
+    """Return every figure of every group: value, half of its interval, number of seeds."""
     figures: dict[str, Any] = {}
     for group in GROUPS:
         cells = {name: cell(found, group, name) for name in MEASURES}
@@ -178,8 +181,8 @@ def _all_figures(found: Sequence[Evaluation]) -> dict[str, Any]:
 def write_texts(folder: Path, methods: Methods) -> None:
     """Write `tables.md` and `tables.json`."""
     write_atomically(folder / "tables.md", text_of(methods).encode())
-    said = json.dumps(data_of(methods), indent=2, ensure_ascii=False, allow_nan=False)
-    write_atomically(folder / "tables.json", (said + "\n").encode())
+    text = json.dumps(data_of(methods), indent=2, ensure_ascii=False, allow_nan=False)
+    write_atomically(folder / "tables.json", (text + "\n").encode())
 
 
 def write_page(
@@ -193,13 +196,13 @@ def write_page(
     Parameters
     ----------
     path
-        Where to.
+        File to write.
     methods
-        What to report on.
+        Evaluations by row.
     dataset
-        Whose episodes they are: best, median and worst ones are drawn; none without it.
+        Dataset of the episodes; the best, median and worst ones are drawn, none without it.
     logs
-        Training logs by name of a run, for curves.
+        Logs by name of a run, for training curves.
     """
     from internav_data.views.page import Page  # noqa: PLC0415 - OpenCV
 
@@ -245,14 +248,14 @@ def picked(
 
 
 def episodes_by_id(dataset: Dataset[Episode], wanted: Sequence[str]) -> dict[str, Episode]:
-    """Return some episodes of a dataset."""
+    """Return episodes of a dataset by id."""
     ids: list[str] = dataset.to_table(["episode_id"]).column("episode_id").to_pylist()
     numbers = [k for k, name in enumerate(ids) if name in set(wanted)]
     return {episode.episode_id: episode for episode in dataset.__getitems__(numbers)}
 
 
 def push_model_of(dataset: Dataset[Episode]) -> Any:  # noqa: ANN401 - PushModel, from JSON
-    """Return how the dataset's pushes are answered."""
+    """Return the push model of the dataset's config."""
     return dataset.manifest.config.get("episodes", {}).get("push_model", "force")
 
 

@@ -1,4 +1,4 @@
-"""What is said beside the tables: intervals, differences, and what could not have been seen."""
+"""Statements beside the tables: intervals, differences, and the resolution of the evaluation."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Methods = Mapping[str, Sequence[Evaluation]]
 
 PRIMARY: Final = ("blocked", "success")
-"""Fixed beforehand: success on blocked episodes."""
+"""Group and measure of the primary outcome, fixed beforehand."""
 SECONDARY: Final = (
     ("all", "success"),
     ("all", "spl"),
@@ -34,30 +34,36 @@ SECONDARY: Final = (
     ("all", "ir_m"),
     ("all", "isr"),
 )
+"""Groups and measures of the secondary outcomes."""
 _TWO: Final = 2
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A difference between two rows, and what its interval is taken over."""
+    """Difference between two rows of a table."""
 
     first: str
+    """Name of the first row."""
     second: str
+    """Name of the second row."""
     group: str
+    """One of `GROUPS`."""
     measure: str
+    """One of `MEASURES`."""
     unit: str
-    """seeds, or scenes (then of two checkpoints, not of methods)."""
+    """Unit of the interval: seeds, or scenes (then of two checkpoints, not of methods)."""
     interval: Interval
+    """Mean and bounds of first minus second."""
 
 
 def differences(methods: Methods, group: str, measure: str) -> list[Difference]:
-    """Return what can be said about each pair of trained methods.
+    """Return the difference of each pair of trained methods.
 
-    Over seeds where both have two at least; over scenes where there are just two runs, one
-    each, and the words say that it is about these checkpoints.
+    The interval is over seeds where both have at least two. It is over scenes where there are just
+    two runs, one each; then it concerns these checkpoints alone.
     """
     trained = {name: found for name, found in methods.items() if not found[0].about.is_reference}
-    said = []
+    found_differences = []
     for first, second in combinations(trained, 2):
         values = [figures(trained[name], group, measure) for name in (first, second)]
         if min(map(len, values)) >= _TWO:
@@ -71,12 +77,12 @@ def differences(methods: Methods, group: str, measure: str) -> list[Difference]:
             if found is None:
                 continue
             over, unit = found, "scenes"
-        said.append(Difference(first, second, group, measure, unit, over))
-    return said
+        found_differences.append(Difference(first, second, group, measure, unit, over))
+    return found_differences
 
 
 def sentences(methods: Methods) -> list[str]:
-    """Return all that is said about some methods' figures, primary outcome first."""
+    """Return the statements about the figures of methods, primary outcome first."""
     lines = [f"Primary outcome, fixed beforehand: {_name(*PRIMARY)}."]
     lines += _one_run(methods)
     pairs = differences(methods, *PRIMARY)
@@ -91,7 +97,7 @@ def sentences(methods: Methods) -> list[str]:
 
 
 def fairness(methods: Methods) -> tuple[list[str], list[list[str]]]:
-    """Return headings and rows of what each trained method was given, and cost."""
+    """Return headings and rows of the steps, frames and time that each trained method had."""
     headings = ["", "seeds", "environment steps", "expert frames", "parameters", "training"]
     rows = []
     for name, found in methods.items():
@@ -120,7 +126,7 @@ def as_json(methods: Methods) -> list[dict[str, Any]]:
 
 
 def _one_run(methods: Methods) -> list[str]:
-    """Say of rows with a single run how well their episodes pin them down."""
+    """Return statements on the uncertainty of rows with a single run."""
     trained = {name: found for name, found in methods.items() if not found[0].about.is_reference}
     lines = []
     for name, found in (trained or methods).items():
@@ -160,7 +166,7 @@ def _sentence(each: Difference) -> str:
 
 
 def _resolved(methods: Methods) -> list[str]:
-    """Say which differences so many seeds and episodes could have shown."""
+    """Return statements on the differences that the seeds and episodes could show."""
     group, measure = PRIMARY
     trained = [f for f in methods.values() if not f[0].about.is_reference]
     values = [figures(found, group, measure) for found in trained]
@@ -189,7 +195,7 @@ def _resolved(methods: Methods) -> list[str]:
 
 
 def evaluation_size(evaluation: Evaluation) -> str:
-    """Return how much an evaluation played, in words."""
+    """Return the numbers of scenes and episodes of an evaluation, in words."""
     scenes = len({result.scene_id for result in evaluation.results})
     return f"{scenes} scenes with {len(evaluation.results)} episodes"
 

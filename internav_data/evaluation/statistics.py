@@ -1,8 +1,8 @@
-"""What the figures of several runs can tell, and what they cannot.
+"""Intervals of figures over seeds and scenes, and the differences that they can resolve.
 
 Between methods, training seeds are the unit: intervals by Student's t on the seeds' means. A
-bootstrap over scenes alone knows nothing of how another seed would have come out, and finds
-false winners in a third to a half of null comparisons; here it only speaks of fixed checkpoints.
+bootstrap over scenes alone ignores the spread between seeds and finds false winners in a third to a
+half of null comparisons; it is used for fixed checkpoints only.
 """
 
 from __future__ import annotations
@@ -25,25 +25,30 @@ if TYPE_CHECKING:
     from internav_data.evaluation.metrics import EpisodeResult
 
 CONFIDENCE: Final = 0.95
+"""Coverage of intervals."""
 POWER: Final = 0.8
+"""Probability to find a true difference of the size `Resolution.found`."""
 DRAWS: Final = 4000
-"""Of the bootstrap."""
+"""Number of bootstrap resamples."""
 _TWO: Final = 2
 
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """A mean and where it may lie; without bounds where one value says nothing of the spread."""
+    """Mean with a confidence interval; bounds are None where a single value has no spread."""
 
     mean: float
+    """Mean."""
     low: float | None
+    """Lower bound."""
     high: float | None
+    """Upper bound."""
     count: int
-    """Of seeds, or of scenes."""
+    """Number of seeds, or of scenes."""
 
     @property
     def half(self) -> float | None:
-        """Half its width."""
+        """Half of the width; None without bounds."""
         return None if self.low is None or self.high is None else (self.high - self.low) / 2.0
 
     @property
@@ -53,7 +58,7 @@ class Interval:
 
 
 def t_quantile(share: float, freedom: float) -> float:
-    """Return the quantile of Student's t."""
+    """Return the quantile of Student's t for a share and degrees of freedom."""
     from scipy.special import stdtrit  # noqa: PLC0415 - tables without intervals need none
 
     return float(stdtrit(freedom, share))
@@ -93,19 +98,20 @@ def seed_difference(first: Sequence[float], second: Sequence[float]) -> Interval
 
 @dataclass(frozen=True, slots=True)
 class Resolution:
-    """What two methods of so many seeds each can be told apart by."""
+    """Smallest differences that two methods of equally many seeds can show."""
 
     seeds: int
+    """Number of seeds of each method."""
     deviation: float
-    """Between the seeds of a method."""
+    """Standard deviation between the seeds of a method."""
     half: float
-    """Half of the difference's 95 % interval: smaller differences look like none."""
+    """Half of the 95 % interval of a difference: smaller differences look like none."""
     found: float
-    """A true difference of this size is found four times in five."""
+    """Size of a true difference that is found four times in five."""
 
 
 def resolution(seeds: int, spread: float) -> Resolution | None:
-    """Return what can be told apart at a deviation between seeds; None with fewer than two."""
+    """Return the resolution at a deviation between seeds; None with fewer than two seeds."""
     if seeds < _TWO:
         return None
     freedom, error = 2 * (seeds - 1), spread * math.sqrt(2.0 / seeds)
@@ -114,7 +120,7 @@ def resolution(seeds: int, spread: float) -> Resolution | None:
 
 
 def pooled_deviation(groups: Sequence[Sequence[float]]) -> float | None:
-    """Return the deviation between seeds, pooled over methods; None where nobody has two."""
+    """Return the deviation between seeds, pooled over methods; None where no method has two."""
     freedom = sum(len(values) - 1 for values in groups)
     if freedom < 1:
         return None
@@ -130,11 +136,12 @@ def scene_interval(
     Parameters
     ----------
     results
-        Of one checkpoint.
+        Results of one checkpoint.
     measure
         One of `MEASURES`.
     other
-        Of a second one, on the same episodes: the interval is that of `results` minus `other`.
+        Results of a second checkpoint on the same episodes; the interval is then that of the
+        difference `results` minus `other`.
 
     Returns
     -------
@@ -158,7 +165,7 @@ def scene_interval(
 
 
 def _figure(weights: Floats, sums: Sequence[tuple[Floats, Floats]]) -> Floats:
-    """Return the figure (or difference of two) for each row of scenes' weights."""
+    """Return the figure, or difference of two, for rows of weights (draws, scenes): (draws,)."""
     with np.errstate(invalid="ignore", divide="ignore"):
         figures: list[Floats] = [(weights @ above) / (weights @ below) for above, below in sums]
     return figures[0] if len(figures) == 1 else figures[0] - figures[1]
@@ -167,7 +174,7 @@ def _figure(weights: Floats, sums: Sequence[tuple[Floats, Floats]]) -> Floats:
 def _scene_sums(
     results: Sequence[EpisodeResult], measure: str, names: Sequence[str]
 ) -> tuple[Floats, Floats]:
-    """Numerators and denominators by scene, (scenes,) each."""
+    """Return the numerators and denominators of a measure by scene, (scenes,) each."""
     row = {name: k for k, name in enumerate(names)}
     above, below = np.zeros(len(names)), np.zeros(len(names))
     for result in results:
@@ -183,7 +190,7 @@ def check_comparable(evaluations: Sequence[Evaluation]) -> None:
     Raises
     ------
     UsageError
-        Names the first that differs, and by what; or one that is there twice.
+        Evaluations differ in dataset, split, steps or sampling, or one is there twice.
     """
     first = evaluations[0]
     known = {name: getattr(first.about, name) for name in ("dataset", "split", "max_steps")}

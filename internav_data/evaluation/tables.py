@@ -1,4 +1,4 @@
-"""Our figures in the form of the paper's Tables 3, 4 and 5, the paper's own below them."""
+"""Tables in the form of the paper's Tables 3, 4 and 5, with the paper's rows below ours."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NOT_COMPARABLE: Final = (
 NOTHING: Final = "–"  # noqa: RUF001 - an en dash, as tables have it
 _WIDE: Final = ("success", "distance_m", "spl", "sts")
 _TABLE5: Final = ("ir_m", "isr", "pusr", "pisr", "openings", "interactions")
-"""The paper's four; and ours: an opening has no finite drop, so IR does not see it."""
+"""The paper's four measures and two of ours: an opening has no finite drop, so IR misses it."""
 _PAPER_GROUPS: Final = ("all", "hard", "non-interactive")
 _TITLES: Final = {
     "all": "all",
@@ -74,36 +74,44 @@ PAPER_5: Final[Mapping[str, Row3]] = {
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A figure: its value in the measure's own unit (shares, not hundredths), and its seeds."""
+    """Figure in a table."""
 
     text: str
+    """Figure as printed."""
     value: float | None
+    """Mean over seeds in the measure's own unit (shares, not hundredths); None without one."""
     half: float | None = None
-    """Half of its 95 % t interval over seeds."""
+    """Half of the 95 % t interval over seeds."""
     seeds: int = 1
+    """Number of seeds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A line of a table."""
+    """Row of a table."""
 
     name: str
+    """Name of a method, or of a row of the paper."""
     source: str
-    """ours, reference or paper."""
+    """Origin of the figures: ours, reference or paper."""
     cells: tuple[Cell, ...]
+    """Figures, group by group."""
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table of the paper's form."""
+    """Table in the paper's form."""
 
     title: str
+    """Title."""
     groups: tuple[tuple[str, int], ...]
-    """Heading of each group of columns, and how many episodes it is over."""
+    """Heading of each group of columns, and the number of its episodes."""
     columns: tuple[str, ...]
     """Measures within each group, by their names in `MEASURES`."""
     rows: tuple[Row, ...]
+    """Rows, the paper's last."""
     notes: tuple[str, ...]
+    """Notes below the table."""
 
     def headings(self) -> list[str]:
         """Return the heading of each column but the first."""
@@ -115,7 +123,7 @@ class Table:
 
 
 def heading(measure: str) -> str:
-    """Return a measure's name with its unit and which way is better, as SR(%) ↑."""
+    """Return a measure's name with its unit and the direction of improvement, as SR(%) ↑."""
     found = MEASURES[measure]
     unit = f"({found.unit})" if found.unit else ""
     arrow = {"more": " ↑", "less": " ↓", "": ""}[found.better]
@@ -148,7 +156,7 @@ def cell(evaluations: Sequence[Evaluation], group: str, measure: str) -> Cell:
 
 
 def table_3(methods: Mapping[str, Sequence[Evaluation]], *, blocked: bool = True) -> Table:
-    """SR, FDT, SPL and STS on all, hard and non-interactive episodes, and on blocked ones."""
+    """Return SR, FDT, SPL and STS on all, hard, non-interactive and, if asked, blocked episodes."""
     groups = (*_PAPER_GROUPS, "blocked") if blocked else _PAPER_GROUPS
     return _table("Table 3: quantitative results", groups, _WIDE, methods, PAPER_3)
 
@@ -167,12 +175,12 @@ def table_4(methods: Mapping[str, Sequence[Evaluation]]) -> Table | None:
 
 
 def table_5(methods: Mapping[str, Sequence[Evaluation]]) -> Table:
-    """IR, ISR, PuSR and PiSR on all episodes; openings and interactions an episode besides."""
+    """Return IR, ISR, PuSR, PiSR, and openings and interactions an episode, on all episodes."""
     return _table("Table 5: interactions", ("all",), _TABLE5, methods, PAPER_5)
 
 
 def variant_of(about: About) -> str:
-    """Return which row of the paper's Table 4 a run is; empty for none."""
+    """Return the row of the paper's Table 4 to which a run corresponds; empty for none."""
     if about.method == "ppo-intent":
         return {1: "sync. /rollout", 3: "sync. /3*rollout", 5: "sync. /5*rollout"}.get(
             about.sync_every or 0, ""

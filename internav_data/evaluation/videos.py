@@ -1,4 +1,4 @@
-"""Films of evaluated episodes: camera, map, and bars of what led to each action."""
+"""Videos of evaluated episodes: camera, map, and bars of the distributions behind each action."""
 
 from __future__ import annotations
 
@@ -21,27 +21,29 @@ if TYPE_CHECKING:
     from internav_data.records import Episode
 
 SIZE: Final = 320
+"""Pixels a side of the camera's picture."""
 FPS: Final = 6.0
+"""Frames a second."""
 
 
 class _Noting:
-    """Plays as another does, and keeps what led to each action."""
+    """Policy that acts as another one does, and keeps the notes of each action."""
 
     def __init__(self, policy: Policy) -> None:
         self.name, self.image_size = policy.name, policy.image_size
         self.sensors = policy.sensors
-        self._player = policy
+        self._policy = policy
         self.steps: list[list[Note]] = []
 
     def begin(self, count: int, seed: int) -> None:
-        self._player.begin(count, seed)
+        self._policy.begin(count, seed)
 
     def start(self, slot: int, episode: Episode) -> None:
-        self._player.start(slot, episode)
+        self._policy.start(slot, episode)
 
     def act(self, observations: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
-        actions = self._player.act(observations)
-        notes = getattr(self._player, "notes", None)
+        actions = self._policy.act(observations)
+        notes = getattr(self._policy, "notes", None)
         if notes is not None:
             self.steps.append(notes(0))
         return actions
@@ -55,13 +57,14 @@ def videos(
     settings: EvaluationConfig,
     kind: str = "gif",
 ) -> Iterator[Path]:
-    """Film the best, the median and the worst episode of an evaluation.
+    """Record videos of the best, the median and the worst episode of an evaluation.
 
-    Each is played once more, alone, with the same random numbers, to see what led to each action.
+    Each is played once more, alone, with the same random numbers, to get the notes of each action.
 
     Yields
     ------
-    The files, each once it is written.
+    Path
+        File of each video, once it is written.
     """
     from internav_data.views import Replay, write_video  # noqa: PLC0415 - OpenCV
     from internav_data.views.bars import Bars, bars_panel  # noqa: PLC0415
