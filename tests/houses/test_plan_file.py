@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 
 import pytest
@@ -194,19 +195,31 @@ def test_any_staircase_of_rectangles_is_laid_out_exactly(data):
     assert len(grid.polygon(frozenset({1}))) == 4
 
 
-@settings(max_examples=60, deadline=None)
-@given(
-    st.lists(
-        st.tuples(st.integers(-3, 3), st.integers(-3, 3)).map(lambda p: [float(p[0]), float(p[1])]),
-        max_size=9,
-    )
-)
-def test_any_corners_are_a_simple_polygon_or_a_complaint(corners):
+places = st.lists(st.tuples(st.integers(-3, 3), st.integers(-3, 3)), max_size=9)
+
+
+@given(places)
+def test_any_corners_are_a_polygon_or_a_complaint(corners):
+    with contextlib.suppress(FloorPlanError):
+        assert len(read_polygon([[float(x), float(y)] for x, y in corners], "room")) >= 4
+
+
+@given(places.filter(lambda turns: len(turns) > 1))
+def test_rectilinear_corners_are_read_where_shapely_finds_a_polygon(turns):
     from shapely.geometry import Polygon
 
-    try:
-        found = read_polygon(corners, "room")
-    except FloorPlanError:
-        return
-    assert Polygon(found).is_valid
-    assert Polygon(found).area > 0
+    # From each place along x below the next one, then along y to it.
+    nexts = [*turns[1:], turns[0]]
+    corners = [
+        [float(x), float(y)]
+        for (_, y0), (x, y1) in zip(turns, nexts, strict=True)
+        for y in (y0, y1)
+    ]
+    expected = Polygon(corners)
+    if expected.is_valid and expected.area:
+        found = Polygon(read_polygon(corners, "room"))
+        assert found.is_valid
+        assert found.area == 10_000 * expected.area
+    else:
+        with pytest.raises(FloorPlanError):
+            read_polygon(corners, "room")
