@@ -8,6 +8,7 @@ half of null comparisons; it is used for fixed checkpoints only.
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -57,13 +58,6 @@ class Interval:
         return self.low is not None and self.high is not None and self.low * self.high > 0.0
 
 
-def t_quantile(share: float, freedom: float) -> float:
-    """Return the quantile of Student's t for a share and degrees of freedom."""
-    from scipy.special import stdtrit  # noqa: PLC0415 - tables without intervals need none
-
-    return float(stdtrit(freedom, share))
-
-
 def deviation(values: Sequence[float]) -> float:
     """Return the standard deviation of a sample of two or more."""
     mean = math.fsum(values) / len(values)
@@ -75,8 +69,13 @@ def seed_interval(values: Sequence[float]) -> Interval:
     count, mean = len(values), math.fsum(values) / len(values)
     if count < _TWO:
         return Interval(mean, None, None, count)
-    half = t_quantile((1.0 + CONFIDENCE) / 2.0, count - 1) * deviation(values) / math.sqrt(count)
-    return Interval(mean, mean - half, mean + half, count)
+    error = deviation(values) / math.sqrt(count)
+    if error == 0.0:
+        return Interval(mean, mean, mean, count)
+    from scipy import stats  # noqa: PLC0415 - a second; figures without intervals need none
+
+    low, high = stats.t.interval(CONFIDENCE, count - 1, loc=mean, scale=error)
+    return Interval(mean, float(low), float(high), count)
 
 
 def seed_difference(first: Sequence[float], second: Sequence[float]) -> Interval:
@@ -88,12 +87,16 @@ def seed_difference(first: Sequence[float], second: Sequence[float]) -> Interval
     count = min(len(first), len(second))
     if count < _TWO:
         return Interval(mean, None, None, count)
-    a, b = (deviation(values) ** 2 / len(values) for values in (first, second))
-    if a + b == 0.0:
+    if deviation(first) == deviation(second) == 0.0:
         return Interval(mean, mean, mean, count)
-    freedom = (a + b) ** 2 / (a**2 / (len(first) - 1) + b**2 / (len(second) - 1))
-    half = t_quantile((1.0 + CONFIDENCE) / 2.0, freedom) * math.sqrt(a + b)
-    return Interval(mean, mean - half, mean + half, count)
+    from scipy import stats  # noqa: PLC0415 - as above
+
+    with warnings.catch_warnings():
+        # Seeds of equal figures, as 0 successes each, are no loss of precision.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        test = stats.ttest_ind(first, second, equal_var=False)
+    bounds = test.confidence_interval(CONFIDENCE)
+    return Interval(mean, float(bounds.low), float(bounds.high), count)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,9 +117,12 @@ def resolution(seeds: int, spread: float) -> Resolution | None:
     """Return the resolution at a deviation between seeds; None with fewer than two seeds."""
     if seeds < _TWO:
         return None
+    from scipy import stats  # noqa: PLC0415 - as above
+
     freedom, error = 2 * (seeds - 1), spread * math.sqrt(2.0 / seeds)
-    half = t_quantile((1.0 + CONFIDENCE) / 2.0, freedom) * error
-    return Resolution(seeds, spread, half, half + t_quantile(POWER, freedom) * error)
+    half = float(stats.t.ppf((1.0 + CONFIDENCE) / 2.0, freedom)) * error
+    more = float(stats.t.ppf(POWER, freedom)) * error
+    return Resolution(seeds, spread, half, half + more)
 
 
 def pooled_deviation(groups: Sequence[Sequence[float]]) -> float | None:
@@ -152,6 +158,8 @@ def scene_interval(
     sums = [_scene_sums(each, measure, names) for each in (results, other) if each is not None]
     if len(names) < _TWO or any(s[1].sum() == 0.0 for s in sums):
         return None
+    # Our own bootstrap: `scipy.stats.bootstrap` cannot leave out resamples in which a rate has no
+    # denominator (no interaction in any scene drawn), and answers nan.
     rng = generator(0, Purpose.EVALUATION, attempt=EvaluationStream.BOOTSTRAP)
     weights = rng.multinomial(len(names), np.full(len(names), 1.0 / len(names)), DRAWS)
     ones = np.ones((1, len(names)))
