@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from internav_data.navigation import Lattice
     from internav_data.records import Episode
 
-    Node = tuple[int, int]
+    LatticeNode = tuple[int, int]
     ActionPlanner = Callable[[Episode], Sequence[int]]
 
 REFERENCE_POLICIES: Final = ("expert", "shortest_path", "random")
@@ -145,7 +145,7 @@ def shortest_path_planner(dataset: Dataset[Episode]) -> ActionPlanner:
     return plan
 
 
-def nearest(lattice: Lattice, clear: Lattice, start: Node, goal: Node) -> Node:
+def nearest(lattice: Lattice, clear: Lattice, start: LatticeNode, goal: LatticeNode) -> LatticeNode:
     """Return the node in reach that is nearest to the goal on a lattice without obstacles.
 
     Ties: fewest steps to walk there, then i, then j.
@@ -159,7 +159,7 @@ def nearest(lattice: Lattice, clear: Lattice, start: Node, goal: Node) -> Node:
     return int(best[0]), int(best[1])
 
 
-def shortest(lattice: Lattice, start: tuple[int, int, int], goal: Node) -> list[int]:
+def shortest(lattice: Lattice, start: tuple[int, int, int], goal: LatticeNode) -> list[int]:
     """Return the actions along a shortest path, of all such one with the fewest rotations.
 
     Parameters
@@ -188,7 +188,7 @@ def shortest(lattice: Lattice, start: tuple[int, int, int], goal: Node) -> list[
 
 
 def _leads(
-    lattice: Lattice, steps: NDArray[np.int32], node: Node, step: tuple[int, int], left: int
+    lattice: Lattice, steps: NDArray[np.int32], node: LatticeNode, step: tuple[int, int], left: int
 ) -> bool:
     """Return whether a step can be taken and leaves `left` more to the goal."""
     i, j = node[0] + step[0], node[1] + step[1]

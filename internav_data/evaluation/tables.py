@@ -87,7 +87,7 @@ class Cell:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class TableRow:
     """Row of a table."""
 
     name: str
@@ -108,7 +108,7 @@ class Table:
     """Heading of each group of columns, and the number of its episodes."""
     columns: tuple[str, ...]
     """Measures within each group, by their names in `MEASURES`."""
-    rows: tuple[Row, ...]
+    rows: tuple[TableRow, ...]
     """Rows, the paper's last."""
     notes: tuple[str, ...]
     """Notes below the table."""
@@ -204,14 +204,14 @@ def _table(
     rows = []
     for name, found in methods.items():
         cells = tuple(cell(found, group, measure) for group in groups for measure in columns)
-        rows.append(Row(name, "reference" if found[0].about.is_reference else "ours", cells))
+        rows.append(TableRow(name, "reference" if found[0].about.is_reference else "ours", cells))
     for name, values in paper.items():
         cells = tuple(
             _paper_cell(columns[k % len(columns)], values[k]) if k < len(values) else
             Cell(NOTHING, None)
             for k in range(len(groups) * len(columns))
         )  # fmt: skip
-        rows.append(Row(f"{name}, the paper's", "paper", cells))
+        rows.append(TableRow(f"{name}, the paper's", "paper", cells))
     headed = tuple((_TITLES[group], count) for group, count in zip(groups, counts, strict=True))
     return Table(title, headed, columns, tuple(rows), _notes(headed, methods))
 

@@ -13,7 +13,8 @@ from importlib import metadata, util
 from pathlib import Path
 from typing import Literal
 
-State = Literal["good", "warning", "bad"]
+CheckState = Literal["good", "warning", "bad"]
+"""Result of a check."""
 
 WHEELS_UP_TO = (3, 11)
 """pybullet 3.2.7 has wheels up to CPython 3.11; elsewhere it compiles for 5-9 minutes."""
@@ -42,7 +43,7 @@ class Check:
     """Result of one check."""
 
     name: str
-    state: State
+    state: CheckState
     found: str
     remedy: str
     """Advice for the user; empty when the check is good."""
@@ -87,7 +88,7 @@ def _package(name: str, extra: str) -> Check:
     try:
         found = metadata.version(name)
     except metadata.PackageNotFoundError:
-        state: State = "warning" if extra == "meshes" else "bad"
+        state: CheckState = "warning" if extra == "meshes" else "bad"
         use = "needed only for meshes of your own: " if extra == "meshes" else ""
         return Check(name, state, "missing", use + install)
     wanted = _wanted(name)

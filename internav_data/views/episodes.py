@@ -20,12 +20,13 @@ if TYPE_CHECKING:
     from internav_data.records import RGB, Asset, Episode, House, Obstacle, Vec2
     from internav_data.views.canvas import Canvas
 
-Kind = Literal["push", "pick", "fixed"]
+ObstacleKind = Literal["push", "pick", "fixed"]
+"""Interactions that an obstacle allows; fixed allows none."""
 PUSHABLE: RGB = (255, 211, 38)
 PICKABLE: RGB = (255, 238, 130)
 FIXED: RGB = (228, 150, 20)
-COLOURS: dict[Kind, RGB] = {"push": PUSHABLE, "pick": PICKABLE, "fixed": FIXED}
-NAMES: dict[Kind, str] = {"push": "pushable", "pick": "pickable", "fixed": "fixed"}
+COLOURS: dict[ObstacleKind, RGB] = {"push": PUSHABLE, "pick": PICKABLE, "fixed": FIXED}
+NAMES: dict[ObstacleKind, str] = {"push": "pushable", "pick": "pickable", "fixed": "fixed"}
 _RIM: RGB = (48, 36, 8)
 START: RGB = (40, 148, 84)
 GOAL: RGB = (36, 104, 214)
@@ -127,7 +128,7 @@ def _ends(episode: Episode) -> tuple[Vec2, Vec2]:
     return (episode.start.x, episode.start.y), (episode.goal.x, episode.goal.y)
 
 
-def obstacle_kind(obstacle: Obstacle) -> Kind:
+def obstacle_kind(obstacle: Obstacle) -> ObstacleKind:
     """Return what can be done with an obstacle."""
     if obstacle.pickable:
         return "pick"
@@ -150,7 +151,7 @@ def _silhouettes(obstacle: Obstacle, assets: Mapping[str, Asset]) -> list[Silhou
     return silhouettes(asset, obstacle.pose)
 
 
-def paint_obstacle(canvas: Canvas, kind: Kind, parts: list[Silhouette]) -> None:
+def paint_obstacle(canvas: Canvas, kind: ObstacleKind, parts: list[Silhouette]) -> None:
     """Paint an obstacle in the colour of its kind, with a dark rim; a small one with a ring."""
     colour = COLOURS[kind]
     low, high = _extent(parts)
