@@ -260,8 +260,8 @@ DIALECT_OF_ROOM = {
 """Names that were replaced in one room only: the word is good elsewhere."""
 
 STRICT_SHAPES = frozenset(
-    {"envs", "geometry", "navigation", "physics", "planner", "render"}
-    | {"verification", "views", "world"}
+    {"benchmarks", "catalog", "dataset", "envs", "evaluation", "geometry", "houses"}
+    | {"navigation", "physics", "planner", "render", "verification", "views", "world"}
 )
 """Rooms where a public function of arrays without a shape in its docstring is a finding."""
 

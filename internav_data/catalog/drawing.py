@@ -37,7 +37,7 @@ _MASS_LIMITS = (0.5, 2.0)
 
 
 def shares(ranks: NDArray[np.int64]) -> list[float]:
-    """Turn ranks 0 to n - 1 into shares 0 to 1; a single asset is the median, 0.5."""
+    """Turn ranks (n,), 0 to n - 1, into shares 0 to 1; a single asset is the median, 0.5."""
     last = max(1, len(ranks) - 1)
     return [float(rank) / last if len(ranks) > 1 else 0.5 for rank in ranks]
 

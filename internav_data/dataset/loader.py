@@ -177,7 +177,7 @@ class Dataset(Generic[E]):
         return numbers if self._index is None else self._index[numbers]
 
     def blocks(self) -> NDArray[np.int64]:
-        """Return the numbers of the episodes that begin row groups, and the count of all: int64."""
+        """Return the numbers of episodes that begin row groups, and of all episodes: (n,) int64."""
         bounds = self.row_group_cache.all_bounds()
         if self._index is not None:
             bounds = np.searchsorted(self._index, bounds)

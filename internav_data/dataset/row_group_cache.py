@@ -112,7 +112,7 @@ class RowGroupCache:
         return self._bounds[number]
 
     def all_bounds(self) -> NDArray[np.int64]:
-        """Return the row numbers at which the row groups of all files start, and the end."""
+        """Return the rows at which the row groups of all files start, and the end: (n,) int64."""
         parts = [self.bounds(number)[:-1] for number in range(len(self._files))]
         return np.concatenate([*parts, self.starts[-1:]])
 

@@ -32,16 +32,19 @@ class Environments(Protocol):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, dict[str, Any]]:
-        """Begin an episode everywhere, or where `options["reset_mask"]` is true."""
+        """Begin an episode everywhere, or where `options["reset_mask"]` (n,) is true.
+
+        Returns observations (n, …) by sensor, and infos.
+        """
 
     def step(self, actions: Actions) -> Stepped:
-        """Act everywhere; -1 waits."""
+        """Take actions (n,), -1 to wait; return what `VectorEnv.step` returns, arrays (n, …)."""
 
     def state(self) -> Sequence[EpisodeSnapshot]:
         """Return a snapshot of each environment."""
 
     def restore(self, states: Sequence[EpisodeSnapshot]) -> tuple[Observations, dict[str, Any]]:
-        """Become the environments of snapshots."""
+        """Restore the environments of snapshots; return observations (n, …) by sensor, and infos."""
 
     def close(self) -> None:
         """End the environments' processes."""
@@ -96,7 +99,7 @@ class EnvironmentLoop:
         self.starts = np.ones(self.env.num_envs, np.bool_)
 
     def restore(self, states: Sequence[EpisodeSnapshot], starts: Bools) -> None:
-        """Go on from snapshots of the environments and the `starts` that belong to them."""
+        """Continue from snapshots of the environments, with their `starts` (n,) bool."""
         self.observations, self.infos = self.env.restore(states)
         self.starts = starts
 
