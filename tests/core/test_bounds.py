@@ -12,6 +12,7 @@ from typing import Annotated
 import pytest
 
 from internav_data.core.config import Bounds, bounds_of, check_bounds, config_toml, from_mapping
+from internav_data.core.field_docs import descriptions
 from internav_data.records.errors import UsageError
 
 CONFIGS = {
@@ -105,7 +106,7 @@ def parts(cls):
 
 
 @pytest.mark.parametrize("module", CONFIGS)
-def test_every_number_has_bounds_and_its_default_lies_within(module):
+def test_every_setting_is_documented_and_every_number_has_bounds(module):
     pytest.importorskip("numba", reason="the extra 'generate' is not installed")
     pytest.importorskip("gymnasium", reason="the extra 'train' is not installed")
     cls = getattr(import_module(f"internav_data.{module}"), CONFIGS[module])
@@ -113,4 +114,5 @@ def test_every_number_has_bounds_and_its_default_lies_within(module):
         hints = typing.get_type_hints(part, include_extras=True)
         wanted = {f.name for f in dataclasses.fields(part) if numbers(hints[f.name])}
         assert set(bounds_of(part)) == wanted, part.__name__
+        assert set(descriptions(part)) >= {f.name for f in dataclasses.fields(part)}, part.__name__
     check_bounds(cls())
