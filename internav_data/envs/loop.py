@@ -44,7 +44,7 @@ class Environments(Protocol):
         """Return a snapshot of each environment."""
 
     def restore(self, states: Sequence[EpisodeSnapshot]) -> tuple[Observations, dict[str, Any]]:
-        """Restore the environments of snapshots; return observations (n, …) by sensor, and infos."""
+        """Restore environments of snapshots; return observations (n, …) by sensor, and infos."""
 
     def close(self) -> None:
         """End the environments' processes."""
