@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 import torch
 
 from internav_data.camp.agents import LEARNERS, make_agent
-from internav_data.camp.agents.options import ACTIONS_OF, NAVIGATE, STOP
+from internav_data.camp.agents.hierarchy import ACTIONS_OF, NAVIGATE, STOP
 from internav_data.camp.config import from_mapping, preset
 from internav_data.camp.ppo import update
 from internav_data.camp.rollout import Collector, orders_of, uniforms_of
@@ -38,7 +38,8 @@ if TYPE_CHECKING:
     from torch import Tensor
     from torch.optim import Optimizer
 
-    from internav_data.camp.agents import Agent, Batch, Hierarchy
+    from internav_data.camp.agents.hierarchy import Hierarchy
+    from internav_data.camp.agents.protocol import Agent, Batch
     from internav_data.camp.config import CampConfig, PPOConfig
     from internav_data.camp.rollout import Rollout
 
@@ -239,7 +240,7 @@ def naive_step(
     agent: Hierarchy, batch: Batch, t: int, k: int, hidden: Tensor
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """Return log-probability, value, entropy and hidden states (5, hidden) of one sample."""
-    if batch.starts[t, k]:
+    if batch.episode_starts[t, k]:
         hidden = torch.zeros_like(hidden)
     now = batch.record.map(lambda values: values[t, k])
     seen = {name: what[t : t + 1, k : k + 1] for name, what in batch.observations.items()}

@@ -14,7 +14,7 @@ from internav_cli.options import DATASET, JSON, dataset_to_read, renamed_option
 
 if TYPE_CHECKING:
     from internav_data.camp.config import CampConfig
-    from internav_data.camp.run import Request
+    from internav_data.camp.train import Request
 
 _SETTINGS = {
     "seed": "seed",
@@ -139,8 +139,8 @@ def _config(given: dict[str, Any]) -> CampConfig:
 
 
 def _request(given: dict[str, Any]) -> Request:
-    from internav_data.camp.run import Request
     from internav_data.camp.stages import CLONING, PARTS
+    from internav_data.camp.train import Request
 
     config, method = _config(given), given["method"] or "camp"
     words = (given["stages"] or ",".join(PARTS)).replace(" ", "").split(",")

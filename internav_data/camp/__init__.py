@@ -10,16 +10,17 @@ from typing import TYPE_CHECKING
 from internav_data.core.lazy import lazy_imports
 
 if TYPE_CHECKING:
-    from internav_data.camp.agents import (
+    from internav_data.camp.agents import make_agent
+    from internav_data.camp.agents.protocol import (
         Agent,
         AgentStep,
         Batch,
         Evaluated,
         State,
         StepRecord,
-        make_agent,
+        one_step,
+        reset_where_done,
     )
-    from internav_data.camp.agents.protocol import one_step, reset_where_done
     from internav_data.camp.checkpoint import export_agent, load_agent
     from internav_data.camp.config import CampConfig, preset
     from internav_data.camp.networks import (
@@ -58,10 +59,11 @@ __all__ = [
 __getattr__, __dir__ = lazy_imports(
     __name__,
     {
-        "agents": [
-            "Agent", "AgentStep", "Batch", "Evaluated", "State", "StepRecord", "make_agent",
+        "agents": ["make_agent"],
+        "agents.protocol": [
+            "Agent", "AgentStep", "Batch", "Evaluated", "State", "StepRecord", "one_step",
+            "reset_where_done",
         ],
-        "agents.protocol": ["one_step", "reset_where_done"],
         "checkpoint": ["export_agent", "load_agent"],
         "config": ["CampConfig", "preset"],
         "networks": ["Encoder", "RecurrentActorCritic", "drawn", "entropy_of", "log_prob_of"],

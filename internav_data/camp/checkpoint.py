@@ -1,11 +1,12 @@
-"""Checkpoints: tensors in safetensors, all else in JSON, whole or not there at all.
+"""Checkpoints: tensors in safetensors, the rest in JSON, complete or absent.
 
-Nothing is unpickled. A checkpoint is a folder: `weights.safetensors` (of the agent, enough to
-play), `training.safetensors` (moments of the optimiser, hidden states, random numbers) and
-`checkpoint.json`, which knows the sizes and digests of both. A run keeps its last and its best;
-`checkpoints.json` says which these are, and is replaced only when a new one is on the disk.
+Nothing is unpickled. A checkpoint is a folder: `weights.safetensors` (the agent's, enough to
+act), `training.safetensors` (the optimiser's moments, hidden states, random numbers) and
+`checkpoint.json`, which has the sizes and digests of both. A run keeps its last checkpoint and its
+best; `checkpoints.json` names them, and is replaced only when a new one is on the disk.
 
-What training is between two updates, as counters and tensors by name; and back again.
+`TrainState`, `pack` and `unpack` turn training between two updates into counters and tensors by
+name, and back.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ import torch
 from safetensors.torch import load_file, save_file
 
 from internav_data.camp.agents import make_agent
-from internav_data.camp.config import from_mapping, plain, preset
+from internav_data.camp.config import from_mapping, preset
 from internav_data.camp.stages import check_parts
 from internav_data.core import config as values
 from internav_data.core.storage import (
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
     from torch import Tensor
     from torch.optim import Optimizer
 
-    from internav_data.camp.agents import Agent, State
+    from internav_data.camp.agents.protocol import Agent, State
     from internav_data.camp.config import CampConfig
     from internav_data.envs.slot import EpisodeSnapshot
 
@@ -48,25 +49,25 @@ FORMAT: Final = 2
 FOLDER: Final = "checkpoints"
 POINTER: Final = "checkpoints.json"
 ABOUT, WEIGHTS, TRAINING = "checkpoint.json", "weights.safetensors", "training.safetensors"
-_TOLD: Final = ("environment_steps", "cloned_frames", "training_s", "dataset")
-"""Progress that evaluations tell of."""
-_JSON_AT_MOST: Final = 256_000_000
-"""Bytes. The actions so far of 65,536 environments stay below."""
-_TENSORS_AT_MOST: Final = 16_000_000_000
+_EXPORTED: Final = ("environment_steps", "cloned_frames", "training_s", "dataset")
+"""Progress that goes with an agent alone: evaluations show it."""
+_MAX_JSON_BYTES: Final = 256_000_000
+"""Maximum size of a JSON file; the actions of 65,536 environments stay below."""
+_MAX_TENSOR_BYTES: Final = 16_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class Checkpoint:
-    """All that a run is between two updates."""
+    """State of a run between two updates."""
 
     method: str
     config: CampConfig
     weights: Mapping[str, Tensor]
-    """Of the agent, by name."""
+    """Parameters of the agent by name."""
     progress: Mapping[str, Any] = field(default_factory=dict)
-    """Plain JSON: counters, the stage, what each environment is, the log's length."""
+    """Plain JSON: counters, the stage, snapshots of the environments, the log's length."""
     training: Mapping[str, Tensor] = field(default_factory=dict)
-    """The rest; empty where only the agent was read or kept."""
+    """Tensors of `pack`; empty for an agent alone."""
 
 
 def save(run: Path, checkpoint: Checkpoint, *, best: float | None = None) -> Path:
@@ -77,33 +78,33 @@ def save(run: Path, checkpoint: Checkpoint, *, best: float | None = None) -> Pat
     run
         The run's folder.
     checkpoint
-        What to write.
+        Checkpoint to write.
     best
-        If given, it is the best one too, and this is how good: a number.
+        Validation score, if it becomes the best one too.
     """
     known = _pointer(run)
     serial = int(known.get("serial", 0)) + 1
     folder = run / FOLDER / f"{serial:06d}"
-    shutil.rmtree(folder, ignore_errors=True)  # put in place just before a run was killed
+    shutil.rmtree(folder, ignore_errors=True)  # left by a run that was killed
     _write_folder(folder, checkpoint)
-    said = {**known, "format": FORMAT, "serial": serial, "last": folder.name}
+    pointer = {**known, "format": FORMAT, "serial": serial, "last": folder.name}
     if best is not None:
-        said |= {"best": folder.name, "best_score": best}
-    write_atomically(run / POINTER, (json.dumps(said, indent=1) + "\n").encode())
+        pointer |= {"best": folder.name, "best_score": best}
+    write_atomically(run / POINTER, (json.dumps(pointer, indent=1) + "\n").encode())
     for other in (run / FOLDER).iterdir():
-        if other.name not in {said["last"], said.get("best")}:
+        if other.name not in {pointer["last"], pointer.get("best")}:
             shutil.rmtree(other, ignore_errors=True)
     return folder
 
 
 def best_score(run: Path) -> float | None:
-    """Return how good the best checkpoint of a run is."""
+    """Return the validation score of a run's best checkpoint."""
     score = _pointer(run).get("best_score")
     return float(score) if isinstance(score, int | float) else None
 
 
 def has_checkpoint(run: Path) -> bool:
-    """Whether a run, or this very folder, has one."""
+    """Return whether a folder is a checkpoint, or a run with one."""
     return (run / POINTER).is_file() or (run / ABOUT).is_file()
 
 
@@ -140,38 +141,41 @@ def read(path: Path, which: str = "last", *, training: bool = True) -> Checkpoin
     which
         `last` or `best`.
     training
-        Read what training needs, too.
+        Read the training tensors, too.
 
     Raises
     ------
     UsageError
         There is none.
     CorruptDataError
-        It is damaged, of another version, or its weights do not fit its config.
+        The checkpoint is damaged, of another version, or its weights do not fit its config.
     """
     folder = find(path, which)
-    said = _json(folder / ABOUT)
-    if said.get("format") != FORMAT:
+    about = _json(folder / ABOUT)
+    if about.get("format") != FORMAT:
         raise CorruptDataError(
-            f"{folder / ABOUT}: format {said.get('format')!r}: this release reads {FORMAT}; "
+            f"{folder / ABOUT}: format {about.get('format')!r}: this release reads {FORMAT}; "
             "read it with the release that wrote it"
         )
-    method, files, progress = said.get("method"), said.get("files"), said.get("progress")
+    method, files, progress = (about.get(name) for name in ("method", "files", "progress"))
     if not isinstance(method, str) or not isinstance(files, dict) or not isinstance(progress, dict):
         raise CorruptDataError(f"{folder / ABOUT}: expected a method, files and progress")
     try:
-        config = from_mapping(preset("small"), _table(said.get("config")), "config")
+        config = from_mapping(preset("small"), _object(about.get("config"), "config"), "config")
+        with torch.device("meta"):  # names and shapes, without their memory
+            wanted = make_agent(method, config).state_dict()
     except InternavError as error:
         raise CorruptDataError(f"{folder / ABOUT}: {error}") from error
-    weights = _tensors(folder / WEIGHTS, files, _shapes(method, config))
+    shapes = {name: tuple(value.shape) for name, value in wanted.items()}
+    weights = _tensors(folder / WEIGHTS, files, shapes)
     rest = _tensors(folder / TRAINING, files) if training else {}
     return Checkpoint(method, config, weights, progress, rest)
 
 
 def load_agent(path: str | Path, which: str = "last") -> Agent[Any]:
-    """Return the trained agent of a run or checkpoint, on the processor.
+    """Return the trained agent of a run or checkpoint, on the CPU.
 
-    It knows its `method`, `config` and `progress`.
+    It has the attributes `method`, `config` and `progress`.
 
     Raises
     ------
@@ -189,9 +193,9 @@ def load_agent(path: str | Path, which: str = "last") -> Agent[Any]:
 
 
 def export_agent(path: str | Path, folder: str | Path, which: str = "last") -> Path:
-    """Write an agent alone, to be handed on: `load_agent` and `camp-eval` take the folder.
+    """Write an agent alone, to be published: `load_agent` and `camp-eval` take the folder.
 
-    What only training needs is left out: no run can be resumed from it.
+    The training tensors are left out: no run can be resumed from it.
 
     Raises
     ------
@@ -202,7 +206,7 @@ def export_agent(path: str | Path, folder: str | Path, which: str = "last") -> P
     if folder.exists():
         raise UsageError(f"{folder}: is there already; choose another folder")
     found = read(Path(path), which, training=False)
-    known = {name: found.progress[name] for name in _TOLD if name in found.progress}
+    known = {name: found.progress[name] for name in _EXPORTED if name in found.progress}
     _write_folder(folder, Checkpoint(found.method, found.config, found.weights, known))
     return folder
 
@@ -211,17 +215,17 @@ def _write_folder(folder: Path, checkpoint: Checkpoint) -> None:
     def fill(temporary: Path) -> None:
         files = {}
         for name, tensors in ((WEIGHTS, checkpoint.weights), (TRAINING, checkpoint.training)):
-            kept = {key: value.detach().cpu().contiguous() for key, value in tensors.items()}
-            save_file(kept, temporary / name)
-            # safetensors lets nobody else read; who may read the folder may read what is in it.
+            copies = {key: value.detach().cpu().contiguous() for key, value in tensors.items()}
+            save_file(copies, temporary / name)
+            # safetensors makes files private: readers of the folder may read them too.
             (temporary / name).chmod(temporary.stat().st_mode & 0o666)
             size = (temporary / name).stat().st_size
             files[name] = {"bytes": size, "sha256": file_sha256(temporary / name)}
             sync(temporary / name)
-        said = {
+        about = {
             "format": FORMAT,
             "method": checkpoint.method,
-            "config": plain(checkpoint.config),
+            "config": values.plain(checkpoint.config),
             "progress": checkpoint.progress,
             "files": files,
             "versions": {
@@ -229,7 +233,7 @@ def _write_folder(folder: Path, checkpoint: Checkpoint) -> None:
                 **{name: version(name) for name in ("internav-data", "torch", "numpy")},
             },
         }
-        text = json.dumps(said, indent=1, allow_nan=False)
+        text = json.dumps(about, indent=1, allow_nan=False)
         write_atomically(temporary / ABOUT, (text + "\n").encode())
 
     write_folder_atomically(folder, fill)
@@ -242,28 +246,19 @@ def _pointer(run: Path) -> dict[str, Any]:
 
 def _json(path: Path) -> dict[str, Any]:
     try:
-        if path.stat().st_size > _JSON_AT_MOST:
-            raise CorruptDataError(
-                f"{path}: more than {_JSON_AT_MOST} bytes: this is no checkpoint"
-            )
-        return _table(json.loads(path.read_bytes()), path)
+        if path.stat().st_size > _MAX_JSON_BYTES:
+            raise CorruptDataError(f"{path}: more than {_MAX_JSON_BYTES} bytes: no checkpoint")
+        return _object(json.loads(path.read_bytes()), path)
     except OSError as error:
         raise CorruptDataError(f"{path}: {error.strerror or error}") from error
     except (ValueError, RecursionError) as error:
         raise CorruptDataError(f"{path}: this is not JSON: {error}") from error
 
 
-def _table(said: object, path: Path | str = "config") -> dict[str, Any]:
-    if not isinstance(said, dict):
-        raise CorruptDataError(f"{path}: expected a JSON object, got {type(said).__name__}")
-    return said
-
-
-def _shapes(method: str, config: CampConfig) -> dict[str, tuple[int, ...]]:
-    """Return the shapes that an agent's weights have, without taking their memory."""
-    with torch.device("meta"):
-        agent = make_agent(method, config)
-    return {name: tuple(value.shape) for name, value in agent.state_dict().items()}
+def _object(value: object, path: Path | str) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise CorruptDataError(f"{path}: expected a JSON object, got {type(value).__name__}")
+    return value
 
 
 def _tensors(
@@ -275,14 +270,19 @@ def _tensors(
         raise CorruptDataError(f"{path.parent / ABOUT}: files: {path.name} is missing")
     try:
         size = path.stat().st_size
-        if size != known.get("bytes") or size > _TENSORS_AT_MOST:
+        if size != known.get("bytes") or size > _MAX_TENSOR_BYTES:
             raise CorruptDataError(
                 f"{path}: {size} bytes, expected {known.get('bytes')}: copy the checkpoint again"
             )
         with safetensors.safe_open(path, "pt") as opened:
             found = {name: tuple(opened.get_slice(name).get_shape()) for name in opened.keys()}  # noqa: SIM118 - no mapping
-        if shapes is not None:
-            _compare(path, found, shapes)
+        shapes = found if shapes is None else shapes
+        for name in sorted({*found, *shapes}):
+            if found.get(name) != shapes.get(name):
+                raise CorruptDataError(
+                    f"{path}: {name} has shape {found.get(name)}, the method and sizes of {ABOUT} "
+                    f"want {shapes.get(name)}: these are another agent's weights"
+                )
         if file_sha256(path) != known.get("sha256"):
             raise CorruptDataError(f"{path}: its bytes have changed: copy the checkpoint again")
         return load_file(path)
@@ -290,17 +290,6 @@ def _tensors(
         raise CorruptDataError(f"{path}: {error.strerror or error}") from error
     except safetensors.SafetensorError as error:
         raise CorruptDataError(f"{path}: this is no safetensors file: {error}") from error
-
-
-def _compare(
-    path: Path, found: Mapping[str, tuple[int, ...]], wanted: Mapping[str, tuple[int, ...]]
-) -> None:
-    for name in sorted({*found, *wanted}):
-        if found.get(name) != wanted.get(name):
-            raise CorruptDataError(
-                f"{path}: {name} has shape {found.get(name)}, the method and sizes of {ABOUT} "
-                f"want {wanted.get(name)}: these are another agent's weights"
-            )
 
 
 _OPTIMISER, _STATE, _STARTS, _RANDOM = "optimiser", "state", "starts", "random"
@@ -355,12 +344,12 @@ class TrainState:
         return state
 
 
-def pack(optimiser: Optimizer, state: State, starts: Tensor) -> dict[str, Tensor]:
+def pack(optimiser: Optimizer, state: State, episode_starts: Tensor) -> dict[str, Tensor]:
     """Return an optimiser's moments, an agent's memory and torch's random numbers by name.
 
-    `state` (n, …) and `starts` (n,) bool are those of all environments.
+    `state` (n, …) and `episode_starts` (n,) bool are those of all environments.
     """
-    tensors = {f"{_RANDOM}/cpu": torch.get_rng_state(), _STARTS: starts}
+    tensors = {f"{_RANDOM}/cpu": torch.get_rng_state(), _STARTS: episode_starts}
     if torch.cuda.is_available():
         tensors[f"{_RANDOM}/cuda"] = torch.cuda.get_rng_state()
     for number, moments in optimiser.state_dict()["state"].items():
@@ -411,14 +400,14 @@ def unpack(
         return found[own.start : own.stop].to(like.device)
 
     state = {name: rows(f"{_STATE}/{name}", like) for name, like in blank.items()}
-    starts = rows(_STARTS, torch.zeros(1, dtype=torch.bool))
+    episode_starts = rows(_STARTS, torch.zeros(1, dtype=torch.bool))
     try:
         torch.set_rng_state(tensors[f"{_RANDOM}/cpu"])
         if f"{_RANDOM}/cuda" in tensors and torch.cuda.is_available():
             torch.cuda.set_rng_state(tensors[f"{_RANDOM}/cuda"])
     except (KeyError, RuntimeError, TypeError) as error:
         raise CorruptDataError(f"checkpoint: {_RANDOM}: {error}") from error
-    return state, starts
+    return state, episode_starts
 
 
 def snapshots_of(progress: Mapping[str, Any], own: range) -> list[EpisodeSnapshot]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import torch
 
-from internav_data.camp.agents import Batch
+from internav_data.camp.agents.protocol import Batch
 from internav_data.camp.ppo import alone, check_finite, step
 from internav_data.camp.rollout import ObservationRows
 from internav_data.envs.loop import EnvironmentLoop
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from torch import Tensor
     from torch.optim import Optimizer
 
-    from internav_data.camp.agents import Agent, StepRecord
+    from internav_data.camp.agents.protocol import Agent, StepRecord
     from internav_data.camp.ppo import Reduce
     from internav_data.core.typing import Bools
     from internav_data.dataset import Dataset
@@ -80,15 +80,15 @@ class Demonstrations:
         self._records: list[Any] = [None] * env.num_envs
         self._taken = [0] * env.num_envs
 
-    def restore(self, states: Sequence[EpisodeSnapshot], starts: Bools) -> None:
-        """Go on from snapshots of the environments and the `starts` that belong to them.
+    def restore(self, states: Sequence[EpisodeSnapshot], episode_starts: Bools) -> None:
+        """Go on from snapshots of the environments and their `episode_starts`, (n,) bool.
 
         Raises
         ------
         CorruptDataError
             A snapshot has more actions than its expert.
         """
-        self.loop.restore(states, starts)
+        self.loop.restore(states, episode_starts)
         for k, state in enumerate(states):
             self._begin(k, state.episode_id)
             self._taken[k] = len(state.actions)
@@ -101,13 +101,13 @@ class Demonstrations:
     def collect(self, steps: int) -> Batch[Any]:
         """Take T steps everywhere; the batch begins with the memory in `state`."""
         seen = ObservationRows(steps, self.agent.device)
-        starts: list[Tensor] = []
+        start_rows: list[Tensor] = []
         records: list[StepRecord] = []
 
-        def act(observations: Observations, begun: Bools) -> Actions:
+        def act(observations: Observations, episode_starts: Bools) -> Actions:
             seen.append(observations)
-            starts.append(torch.from_numpy(begun))
-            for k in np.flatnonzero(begun).tolist():
+            start_rows.append(torch.from_numpy(episode_starts))
+            for k in np.flatnonzero(episode_starts).tolist():
                 self._begin(k, str(self.loop.infos["episode_id"][k]))
             rows = [_row(own, t) for own, t in zip(self._records, self._taken, strict=True)]
             records.append(type(rows[0]).stack(rows))
@@ -118,7 +118,7 @@ class Demonstrations:
             for k, taken in enumerate(self._taken):
                 taken_step.over[k] |= taken == len(self._actions[k])
         record = type(records[0]).stack(records).map(lambda values: values.to(self.agent.device))
-        return Batch(seen.rows, torch.stack(starts).to(self.agent.device), self.state, record)
+        return Batch(seen.rows, torch.stack(start_rows).to(self.agent.device), self.state, record)
 
     def _begin(self, k: int, episode_id: str) -> None:
         self._actions[k], self._records[k] = self.agent.labels(self._experts(episode_id))

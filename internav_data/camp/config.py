@@ -1,4 +1,4 @@
-"""Every hyperparameter of training, with what it means; the presets `paper` and `small`."""
+"""Hyperparameters of training with their meanings and bounds; the presets `paper` and `small`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 Intent = Literal["integrated", "policy", "recursive", "none"]
 TrainPreset = Literal["paper", "small"]
 INTERACTION_ACTIONS: Final = 11
-"""After so many actions an interaction closes (the released code cuts after more than 10)."""
+"""Maximum number of actions of an interaction (the released code cuts after more than 10)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,47 +24,47 @@ class NetworkConfig:
     """Sizes of the networks."""
 
     image_size: Annotated[int, Bounds(16, 1024)] = 64
-    """Pixels a side of what the agent sees."""
+    """Size of the camera's pictures, pixels a side."""
     encoder: TrainPreset = "small"
     """"paper": one network for colour and one for depth, fused; "small": one network
     over all four channels."""
     hidden: Annotated[int, Bounds(1, 8192)] = 128
-    """Features of an encoder and units of each GRU."""
+    """Number of features of an encoder, and of units of each GRU."""
     goal_embedding: Annotated[int, Bounds(1, 8192)] = 32
-    """Into which (distance, cos bearing, sin bearing) is embedded."""
+    """Length of the embedded point goal (distance, cos bearing, sin bearing)."""
     shared_encoder: bool = True
     """One encoder for all policies; False: one for Navigate, intent and global, one for Push, one
     for Pick."""
     bf16: bool = True
-    """On a GPU encoders work in bfloat16; GRUs, heads and losses always in float32."""
+    """Run encoders in bfloat16 on a GPU; GRUs, heads and losses always use float32."""
     depth_limit_m: Annotated[float, Bounds(0.1, 1000.0)] = 10.0
-    """Depth is cut here and divided by it."""
+    """Depth beyond which distances are cut, and by which they are divided."""
     goal_scale_m: Annotated[float, Bounds(0.1, 1000.0)] = 1.0
-    """The goal's distance is divided by this. At 10 the last 0.25 m before the goal hardly show,
-    and clones say Done at a certain time rather than at the goal."""
+    """Divisor of the goal's distance. At 10 the last 0.25 m before the goal hardly show, and clones
+    end their episodes at a certain time rather than at the goal."""
 
 
 @dataclass(frozen=True, slots=True)
 class AgentConfig:
-    """What the learners are told to be, besides their method."""
+    """Agent hyperparameters common to all methods."""
 
     intent: Intent = "integrated"
-    """What global is fed (Table 4): the integrated intent of equation (7); the intent policy's
-    choice of option; equation (7) run twice; or nothing but the plane vector."""
+    """Intent input of the global policy (Table 4): the integrated intent of equation (7); the
+    intent policy's option probabilities; equation (7) run twice; or the uniform intent."""
     sync_every: Annotated[int, Bounds(1)] = 3
-    """Rollouts between copies of global into the intent policy (K)."""
+    """Rollouts between copies of the global policy into the intent policy (K)."""
     forbidden: tuple[Literal["push", "pick"], ...] = ()
     """Options that are never opened."""
     initial_done_probability: Annotated[float, Bounds(1e-6, 0.5)] = 0.01
-    """Chance at the start that a decision ends the episode, the same for every learner. Uniform
-    heads would end episodes after about ten steps."""
+    """Initial probability that a decision ends the episode, the same for every agent. Uniform heads
+    would end episodes after about ten steps."""
     initial_interaction_probability: Annotated[float, Bounds(1e-6, 0.49)] = 0.045
-    """Share at the start of Push, and of Pick, among what does not end the episode; Navigate has
-    the rest."""
+    """Initial probability of Push, and of Pick, among the options that do not end the episode;
+    Navigate has the rest."""
     nie_objects: Annotated[int, Bounds(1, 64)] = 6
-    """Objects that `nie` looks at: the nearest in sight."""
+    """Number of objects that `nie` takes: the nearest in sight."""
     nie_weight: Annotated[float, Bounds(0.0)] = 3.0
-    """Of the L1 loss on `nie`'s predicted keypoints (released code)."""
+    """Weight of the L1 loss on `nie`'s predicted keypoints (released code)."""
     RENAMED: ClassVar[dict[str, str]] = {
         "end_chance": "initial_done_probability",
         "interact_chance": "initial_interaction_probability",
@@ -74,37 +74,37 @@ class AgentConfig:
 
 @dataclass(frozen=True, slots=True)
 class PPOConfig:
-    """Rollouts and updates."""
+    """PPO hyperparameters."""
 
     num_envs: Annotated[int, Bounds(1, 65536)] = 16
-    """Stepped side by side."""
+    """Number of environments that are stepped side by side."""
     num_steps: Annotated[int, Bounds(1)] = 64
-    """Of each environment in a rollout."""
+    """Number of steps of each environment in a rollout."""
     update_epochs: Annotated[int, Bounds(1)] = 3
     """Passes over a rollout (the paper's k)."""
     num_minibatches: Annotated[int, Bounds(1)] = 4
-    """Of whole environments, a pass."""
+    """Number of minibatches a pass, each of whole environments."""
     clip_coef: Annotated[float, Bounds(0.0)] = 0.2
-    """How far the ratio of probabilities may leave 1 before it earns nothing."""
+    """Distance of the probability ratio from 1 beyond which it is clipped."""
     clip_vloss: bool = False
     """Clip values by `clip_coef` too. 0.1 against returns near 10 throttles the critic."""
     vf_coef: Annotated[float, Bounds(0.0)] = 0.5
-    """Of half the squared error of values."""
+    """Weight of the value loss, half the squared error of values."""
     ent_coef: Annotated[float, Bounds(0.0)] = 0.01
-    """Of the entropy that is rewarded."""
+    """Weight of the entropy bonus."""
     gamma: Annotated[float, Bounds(0.0, 1.0)] = 0.99
     """Discount a step."""
     gae_lambda: Annotated[float, Bounds(0.0, 1.0)] = 0.95
     """Decay of generalised advantages (lambda)."""
     max_grad_norm: Annotated[float, Bounds(0.0)] = 0.5
-    """Longer gradients are cut to this length."""
+    """Maximum norm of the gradient; longer ones are clipped."""
     target_kl: Annotated[float | None, Bounds(0.0)] = 0.03
-    """Updates on a rollout stop before the step whose minibatch is farther from the rollout's
-    policy than this; none: never."""
+    """KL divergence from the rollout's policy beyond which an update stops, before the step whose
+    minibatch exceeds it; none for no such limit."""
     normalise_advantages: bool = True
-    """To mean 0 and deviation 1, over a rollout."""
+    """Normalise advantages to mean 0 and deviation 1, over a rollout."""
     critic_warmup_rollouts: Annotated[int, Bounds(0)] = 10
-    """First rollouts after a start whose critic is new: they train the critic alone."""
+    """Critic warm-up: number of first rollouts of a new critic that train the critic alone."""
     RENAMED: ClassVar[dict[str, str]] = {
         "environments": "num_envs",
         "steps": "num_steps",
@@ -127,110 +127,104 @@ class CloningConfig:
     """Cloning the dataset's expert (`--pretrain bc`)."""
 
     frames: Annotated[int, Bounds(1)] = 150_000
-    """Of the expert, an epoch."""
+    """Number of expert frames in an epoch."""
     epochs: Annotated[int, Bounds(1)] = 4
     """Passes over them."""
     num_envs: Annotated[int, Bounds(1, 65536)] = 16
-    """Experts replayed side by side."""
+    """Number of experts that are replayed side by side."""
     num_steps: Annotated[int, Bounds(1)] = 16
-    """Frames of each in an update, its GRUs carried from one update to the next."""
+    """Number of frames of each in an update; hidden states go on from one update to the next."""
     learning_rate: Annotated[float, Bounds(0.0)] = 1e-3
-    """Of Adam; falls to 0 in a straight line."""
+    """Initial learning rate of Adam; decays linearly to 0."""
     sync_every: Annotated[int, Bounds(1)] = 100
-    """Updates between copies of global into the intent policy."""
-    RENAMED: ClassVar[dict[str, str]] = {
-        "environments": "num_envs",
-        "steps": "num_steps",
-    }
+    """Updates between copies of the global policy into the intent policy."""
+    RENAMED: ClassVar[dict[str, str]] = {"environments": "num_envs", "steps": "num_steps"}
     """Fields of earlier versions, and their names today."""
 
 
 @dataclass(frozen=True, slots=True)
 class StagesConfig:
-    """Environment steps, and how the stages share them; auxiliary ones count."""
+    """Environment steps, and the stages' shares of them; steps in auxiliary tasks count."""
 
     total_timesteps: Annotated[int, Bounds(1)] = 300_000
-    """In all stages together, the same for every method."""
+    """Number of environment steps of all stages together, the same for every method."""
     auxiliary_share: Annotated[float, Bounds(0.0, 1.0)] = 0.1
-    """On the three auxiliary tasks; flat methods: the main task in single rooms."""
+    """Share of the steps in the three auxiliary tasks; for flat methods, on the main task in
+    single rooms."""
     single_room_share: Annotated[float, Bounds(0.0, 1.0)] = 0.1
-    """Of joint training in scenes of a single room."""
+    """Share of the steps of joint training in scenes of a single room."""
     side_by_side: bool = True
-    """Auxiliary tasks at once, environments split in three; False: one after the other."""
+    """Train the auxiliary tasks at once, environments split in three; False: one by one."""
     learning_rate: Annotated[float, Bounds(0.0)] = 3e-4
-    """Of auxiliary stages and of flat methods."""
+    """Initial learning rate of auxiliary stages and of flat methods."""
     joint_learning_rate: Annotated[float, Bounds(0.0)] = 1e-4
-    """Of joint training of a hierarchy."""
+    """Initial learning rate of a hierarchy's joint training."""
     decay_over: Literal["stage", "all"] = "stage"
-    """What the learning rate falls to 0 over: each stage, with a fresh Adam, or all steps."""
-    RENAMED: ClassVar[dict[str, str]] = {
-        "steps": "total_timesteps",
-    }
+    """Span over which the learning rate decays to 0: each stage, or all steps. Each stage has a
+    fresh Adam."""
+    RENAMED: ClassVar[dict[str, str]] = {"steps": "total_timesteps"}
     """Fields of earlier versions, and their names today."""
 
 
 @dataclass(frozen=True, slots=True)
 class DataConfig:
-    """Which episodes of the dataset, and what they pay."""
+    """Selection of episodes, and their rewards."""
 
     filter: tuple[str, ...] = ()
     """Conditions on columns that all must hold, as "shortest_path_m<=6": training, validation."""
     failed_done_reward: Annotated[float, Bounds(-1000.0, 1000.0)] = 0.0
-    """Of Done away from the goal (-1 in the released configuration)."""
+    """Reward of Done away from the goal (-1 in the released configuration)."""
     house_cache_size: Annotated[int, Bounds(1)] = 512
-    """Houses that a process keeps ready; those of 1 to 3 rooms take 10 ms and 0.1 MB each, and the
-    distances to each of their goals besides."""
-    RENAMED: ClassVar[dict[str, str]] = {
-        "where": "filter",
-        "houses_kept": "house_cache_size",
-    }
+    """Number of loaded houses that a process caches; those of 1 to 3 rooms take 10 ms and 0.1 MB
+    each, and the distances to each of their goals besides."""
+    RENAMED: ClassVar[dict[str, str]] = {"where": "filter", "houses_kept": "house_cache_size"}
     """Fields of earlier versions, and their names today."""
 
 
 @dataclass(frozen=True, slots=True)
 class RunConfig:
-    """How a run goes about it."""
+    """Settings of a run that are no hyperparameters."""
 
     max_steps: Annotated[int, Bounds(1, 10_000)] = 500
-    """Of an episode; then it is cut off. In validation too."""
+    """Number of steps after which an episode is cut off, in validation too."""
     threads: Annotated[int, Bounds(1, 1024)] = 1
-    """Of torch on a processor; with one, equal runs are equal to the last bit."""
+    """Number of torch's threads on a CPU; with one, equal runs are equal to the last bit."""
     workers: Annotated[int, Bounds(0, 1024)] = 0
-    """Processes that step the main task's environments; 0: none but this one, which is nearly as
-    fast on two cores (106 s against 98 s with two, 48,000 steps of CaMP) and leaves one for another
-    run."""
+    """Number of processes that step environments; 0 for this one alone, which is nearly as fast on
+    two cores (106 s against 98 s with two, 48,000 steps of CaMP) and leaves one for another run."""
     checkpoint_every: Annotated[int, Bounds(1)] = 10
-    """Updates between checkpoints."""
+    """Number of updates between checkpoints."""
     validate_every: Annotated[int, Bounds(1)] = 50
-    """Updates of a stage between validations; each stage of the main task ends with one."""
+    """Number of updates of a stage between validations; stages of the main task end with one."""
     validation_episodes: Annotated[int, Bounds(0)] = 64
-    """Of the dataset's validation split, the same ones every time; 0: no validation."""
+    """Number of episodes of the validation split that are played, always the same; 0 for no
+    validation."""
     window: Annotated[int, Bounds(1, 10_000)] = 100
-    """Episodes that a logged mean is over: the last ones that ended."""
+    """Number of episodes of a logged mean: the last ones that ended."""
     tensorboard: bool = True
     """Write TensorBoard's files too, where `tensorboard` is installed."""
 
 
 @dataclass(frozen=True, slots=True)
 class CampConfig:
-    """All of it: equal configs, seeds and datasets give equal runs on one thread."""
+    """Training config: equal configs, seeds and datasets give equal runs on one thread."""
 
     seed: Annotated[int, Bounds(0, MAX_SEED)] = 0
-    """Every random number derives from it."""
+    """Seed that every random number derives from."""
     network: NetworkConfig = field(default_factory=NetworkConfig)
     """Sizes of the networks."""
     agent: AgentConfig = field(default_factory=AgentConfig)
-    """What the learner is told to be."""
+    """Agent hyperparameters common to all methods."""
     ppo: PPOConfig = field(default_factory=PPOConfig)
-    """Rollouts and updates."""
+    """PPO hyperparameters."""
     cloning: CloningConfig = field(default_factory=CloningConfig)
     """Cloning the expert."""
     stages: StagesConfig = field(default_factory=StagesConfig)
-    """How many steps, where."""
+    """Environment steps, and the stages' shares of them."""
     data: DataConfig = field(default_factory=DataConfig)
-    """Which episodes."""
+    """Selection of episodes, and their rewards."""
     run: RunConfig = field(default_factory=RunConfig)
-    """How a run goes about it."""
+    """Settings of a run that are no hyperparameters."""
 
     def check(self) -> None:
         """Check all values.
@@ -277,11 +271,11 @@ def from_mapping(config: CampConfig, changes: Mapping[str, Any], where: str) -> 
     Parameters
     ----------
     config
-        A preset.
+        Config to start from.
     changes
-        Nested by field name, as JSON or TOML give them.
+        Values, nested by field name, as JSON or TOML give them.
     where
-        They come from, for errors.
+        Origin of the values, for error messages.
 
     Raises
     ------
@@ -293,25 +287,15 @@ def from_mapping(config: CampConfig, changes: Mapping[str, Any], where: str) -> 
     return changed
 
 
-def plain(config: CampConfig) -> dict[str, Any]:
-    """Return all values as plain data, which `from_mapping` reads back."""
-    said: dict[str, Any] = values.plain(config)
-    return said
-
-
 def _paper() -> CampConfig:
     return CampConfig(
         network=NetworkConfig(300, "paper", hidden=512, shared_encoder=False),
         ppo=PPOConfig(
-            num_envs=12,
-            num_steps=30,
-            update_epochs=1,
-            num_minibatches=1,
-            clip_coef=0.1,
+            num_envs=12, num_steps=30, update_epochs=1, num_minibatches=1, clip_coef=0.1,
             clip_vloss=True,
         ),
         stages=StagesConfig(total_timesteps=10_000_000, side_by_side=False, decay_over="all"),
-    )
+    )  # fmt: skip
 
 
 _PRESETS: Final[dict[str, Callable[[], CampConfig]]] = {"paper": _paper, "small": CampConfig}

@@ -1,4 +1,4 @@
-"""The episodes that a run is trained and validated on."""
+"""Training and validation episodes of a run, and environments over them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from internav_data.camp.agents import Agent
+    from internav_data.camp.agents.protocol import Agent
     from internav_data.camp.config import CampConfig
     from internav_data.camp.stages import TrainingStage
     from internav_data.dataset import Dataset
@@ -38,9 +38,9 @@ class TrainingData:
     Raises
     ------
     CorruptDataError
-        There is none, or it is damaged or of another version.
+        The dataset is damaged or of another version.
     UsageError
-        It has nothing to train on, or no outcomes.
+        The dataset has no training episodes, or no outcomes.
     """
 
     def __init__(self, path: Path, where: Sequence[str] = ()) -> None:
@@ -53,7 +53,13 @@ class TrainingData:
         self.fingerprint = episodes.fingerprint
 
     def episodes(self, *, single_room: bool = False) -> Dataset[Episode]:
-        """Return the training split, or its scenes of a single room."""
+        """Return the training split, or its scenes of a single room.
+
+        Raises
+        ------
+        UsageError
+            There are no such episodes.
+        """
         conditions = [*self._where, *([_SINGLE] if single_room else [])]
         found = load_dataset(self.path, "train", conditions or None)
         if not len(found):
@@ -67,27 +73,16 @@ class TrainingData:
             raise UsageError(f"{self.path}: there are no {what}; {advice}")
         return found
 
-    def of_stage(
+    def environments(
         self, stage: TrainingStage, config: CampConfig, own: range, sensors: Sequence[str]
     ) -> Environments:
-        """Return those environments of a stage whose numbers are in `own`."""
-        tasks = stage.tasks[own.start : own.stop] or ("interactive",) * len(own)
-        return self.environments(config, tasks, sensors, single_room=stage.single_room)
-
-    def environments(
-        self,
-        config: CampConfig,
-        tasks: Sequence[str],
-        sensors: Sequence[str],
-        *,
-        single_room: bool = False,
-    ) -> Environments:
-        """Return environments of the training split, a task each."""
+        """Return a stage's environments with the numbers in `own`."""
         from internav_data.envs.make import make_vector  # noqa: PLC0415 - the camera's kernels
 
         env: Any = make_vector(
-            len(tasks), self.episodes(single_room=single_room), min(config.run.workers, len(tasks)),
-            autoreset=False, copy=False, sensors=sensors, task=tuple(tasks),
+            len(own), self.episodes(single_room=stage.single_room),
+            min(config.run.workers, len(own)), autoreset=False, copy=False, sensors=sensors,
+            task=stage.tasks[own.start : own.stop] or "interactive",
             image_size=config.network.image_size, max_steps=config.run.max_steps,
             failed_done_reward=config.data.failed_done_reward,
             house_cache_size=config.data.house_cache_size,
@@ -97,7 +92,7 @@ class TrainingData:
     def validate(
         self, agent: Agent[Any], method: str, config: CampConfig
     ) -> dict[str, float] | None:
-        """Let an agent play the validation split: means over its episodes, None without any."""
+        """Return an agent's mean metrics on the validation split, None without episodes."""
         limit = config.run.validation_episodes
         episodes = load_dataset(self.path, "val", self._where or None)
         if not limit or not len(episodes):

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from internav_data.camp.config import NetworkConfig
 
-    Observations = Mapping[str, Tensor]
-
 _LAYERS: Final = {
     "paper": ((32, 8, 4, 0), (64, 4, 2, 0), (32, 3, 1, 0)),
     "small": ((32, 4, 4, 0), (32, 3, 2, 1), (32, 3, 1, 1)),
@@ -35,6 +33,7 @@ _ACTOR_GAIN: Final = 0.01
 EMBEDDED: Final = 12
 """Length of an embedded intent (section 5.2)."""
 _RGB, _DEPTH = 3, 1
+_TINY: Final = 1e-12
 
 
 class Encoder(nn.Module):
@@ -62,7 +61,7 @@ class Encoder(nn.Module):
         """Return the number of features."""
         return config.hidden + config.goal_embedding + 1 + len(HORIZONS_DEG)
 
-    def forward(self, observations: Observations) -> Tensor:
+    def forward(self, observations: Mapping[str, Tensor]) -> Tensor:
         """Return features (T, n, size) float32.
 
         Observations are `rgb` (T, n, S, S, 3) uint8, `depth` (T, n, S, S, 1) metres, `goal`
@@ -224,18 +223,18 @@ def uniform_intent(features: Tensor, count: int) -> Tensor:
 class EpisodeSegments:
     """Episodes within T steps of n environments, and how GRUs run over them."""
 
-    starts: Tensor
+    episode_starts: Tensor
     """(T, n) bool: an episode begins at this step."""
 
     @cached_property
     def bounds(self) -> list[int]:
-        """First steps of the segments between starts, and T."""
-        begun: list[int] = self.starts.any(1).nonzero().flatten().tolist()
-        return sorted({0, *begun, len(self.starts)})
+        """First steps of the segments between episode starts, and T."""
+        begun: list[int] = self.episode_starts.any(1).nonzero().flatten().tolist()
+        return sorted({0, *begun, len(self.episode_starts)})
 
     def select(self, columns: Tensor) -> EpisodeSegments:
         """Return the segments of some environments, by number (m,)."""
-        return EpisodeSegments(self.starts[:, columns])
+        return EpisodeSegments(self.episode_starts[:, columns])
 
     def run(self, gru: nn.GRU, inputs: Tensor, hidden: Tensor) -> tuple[Tensor, Tensor]:
         """Run a GRU, one call a segment; zero its hidden state only where an episode begins.
@@ -258,7 +257,7 @@ class EpisodeSegments:
         """
         h, outs = hidden.unsqueeze(0), []
         for begin, end in itertools.pairwise(self.bounds):
-            h = h.masked_fill(self.starts[begin].unsqueeze(-1), 0.0)
+            h = h.masked_fill(self.episode_starts[begin].unsqueeze(-1), 0.0)
             out, h = gru(inputs[begin:end], h)
             outs.append(out)
         return (outs[0] if len(outs) == 1 else torch.cat(outs)), h.squeeze(0)
@@ -270,7 +269,7 @@ class EpisodeSegments:
         (T, n, hidden).
         """
         before = torch.cat([hidden.unsqueeze(0), out[:-1]])
-        before = before.masked_fill(self.starts.unsqueeze(-1), 0.0)
+        before = before.masked_fill(self.episode_starts.unsqueeze(-1), 0.0)
         # All T n steps at once, as a batch of sequences of length 1.
         once, _ = gru(inputs.flatten(0, 1).unsqueeze(0), before.flatten(0, 1).unsqueeze(0))
         again: Tensor = once.view_as(out)
@@ -306,6 +305,12 @@ def log_prob_of(log_probs: Tensor, choice: Tensor) -> Tensor:
 def entropy_of(log_probs: Tensor) -> Tensor:
     """Return the entropy of distributions (…, choices); impossible choices add nothing."""
     return -(log_probs.exp() * log_probs.clamp(min=-1e9)).sum(-1)
+
+
+def divergence(first: Tensor, second: Tensor) -> float:
+    """Return the mean KL divergence of distributions (…, k) from one another, in nats."""
+    ratio = first.clamp_min(_TINY).log() - second.clamp_min(_TINY).log()
+    return float((first * ratio).sum(-1).mean())
 
 
 def _convolutions(channels: int, config: NetworkConfig) -> nn.Sequential:

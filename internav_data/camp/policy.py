@@ -37,30 +37,30 @@ _NOTED: Final = {
     "intent": ("intent", ""),
     "action_probs": ("action", "choice"),
 }
-"""What agents record that can be shown: its title, and where they record what was taken."""
+"""Distributions that agents record: their title, and the field of the choice."""
 
 
 @dataclass(frozen=True, slots=True)
 class EvaluatedPolicy:
-    """Somebody to evaluate, and what is known of them."""
+    """Policy to evaluate, with the facts about it."""
 
     policy: Policy
     about: About
 
 
 class AgentPolicy:
-    """A trained agent as a `Policy`: torch is imported when it plays.
+    """Trained agent as a `Policy`; torch is imported when it acts.
 
     Parameters
     ----------
     name
-        Of its row.
+        Name of its row in tables.
     agent
-        `initial_state` and `act` of `internav_data.camp.agents`.
+        Agent with `initial_state` and `act`, as `internav_data.camp.agents` has them.
     image_size
-        That it was trained with.
+        Size of the pictures that it was trained with, pixels a side.
     greedy
-        The most probable option and action, rather than drawn ones.
+        Take the most probable option and action, rather than drawn ones.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class AgentPolicy:
         self._agent, self._greedy = agent, greedy
         self._seed = 0
         self._state: dict[str, Any] = {}
-        self._starts: NDArray[np.bool_] = np.zeros(0, np.bool_)
+        self._episode_starts: NDArray[np.bool_] = np.zeros(0, np.bool_)
         self._draws: list[Generator | None] = []
         self._record: Any = None
 
@@ -84,11 +84,11 @@ class AgentPolicy:
         """See `Policy`."""
         self._agent.eval()
         self._seed, self._state = seed, self._agent.initial_state(count)
-        self._starts, self._draws = np.ones(count, np.bool_), [None] * count
+        self._episode_starts, self._draws = np.ones(count, np.bool_), [None] * count
 
     def start(self, slot: int, episode: Episode) -> None:
         """See `Policy`."""
-        self._starts[slot] = True
+        self._episode_starts[slot] = True
         self._draws[slot] = episode_generator(self._seed, episode)
 
     def act(self, observations: Observations) -> NDArray[np.int64]:
@@ -104,17 +104,17 @@ class AgentPolicy:
                 if draw is not None:
                     row[:] = draw.random(2, np.float32)
             uniforms = torch.from_numpy(drawn).to(device)
-        starts = torch.from_numpy(self._starts).to(device)
+        episode_starts = torch.from_numpy(self._episode_starts).to(device)
         with torch.inference_mode():
-            step = self._agent.act(seen, self._state, starts, uniforms)
+            step = self._agent.act(seen, self._state, episode_starts, uniforms)
         self._state, self._record = step.state, step.record
-        self._starts = np.zeros(len(self._starts), np.bool_)
+        self._episode_starts = np.zeros(len(self._episode_starts), np.bool_)
         actions: NDArray[np.int64] = step.action.cpu().numpy()
         return actions
 
     def notes(self, slot: int) -> list[Note]:
-        """Return what led to a seat's last action: chances of options, intent, of actions."""
-        told: list[Note] = []
+        """Return the distributions behind a slot's last action: options, intent, actions."""
+        notes: list[Note] = []
         for name, (title, taken) in _NOTED.items():
             noted = getattr(self._record, name, None)
             if noted is None:
@@ -123,8 +123,8 @@ class AgentPolicy:
             names = _NAMES.get(len(shares))
             chosen = getattr(self._record, taken, None)
             if names is not None:
-                told.append((title, names, shares, -1 if chosen is None else int(chosen[slot])))
-        return told
+                notes.append((title, names, shares, -1 if chosen is None else int(chosen[slot])))
+        return notes
 
 
 def candidate(
@@ -202,7 +202,7 @@ def _loaded(run: Path) -> Any:  # noqa: ANN401 - an Agent, with what its checkpo
 
 
 def _facts(agent: object, about: About) -> About:
-    """Fill in what a loaded agent says of itself: `method`, `config` and `progress`."""
+    """Return `about` with the agent's `method`, `config` and `progress`."""
     progress = getattr(agent, "progress", None)
     known = progress if isinstance(progress, Mapping) else {}
     method = str(getattr(agent, "method", type(agent).__name__))

@@ -16,12 +16,12 @@ from torch import Tensor
 from internav_data.records.errors import NotFiniteError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
 
     from torch.nn import Parameter
     from torch.optim import Optimizer
 
-    from internav_data.camp.agents import Agent
+    from internav_data.camp.agents.protocol import Agent
     from internav_data.camp.config import PPOConfig
     from internav_data.camp.rollout import Rollout
 
@@ -91,36 +91,38 @@ def update(
         mean, variance = moments(advantages, reduce)
         advantages = (advantages - mean) / (variance.sqrt() + _EPSILON)
     parameters = agent.critics() if critic_only else agent.optimised()
-    minibatch_rows: list[dict[str, float]] = []
-    stopped = False
-    for columns in minibatches(orders, config.num_minibatches, rollout.rewards.device):
+    limit = math.inf if critic_only or config.target_kl is None else config.target_kl
+    rows: list[dict[str, float]] = []
+    stopped, device = False, rollout.rewards.device
+    minibatches = [
+        columns
+        for order in orders
+        for columns in torch.tensor(order, device=device).chunk(config.num_minibatches)
+    ]
+    for columns in minibatches:
         goals = advantages[:, columns], returns[:, columns]
         losses, row = _losses(agent, rollout, columns, goals, config, reduce)
-        minibatch_rows.append(row)
+        rows.append(row)
         # Stop before the step that would leave the rollout's policy too far behind.
-        limit = math.inf if critic_only or config.target_kl is None else config.target_kl
         stopped = row["kl"] > limit
         if stopped:
             break
-        loss = losses["value"] if critic_only else sum(losses.values(), losses["value"] * 0.0)
+        loss = config.vf_coef * losses["value_loss"]
+        if not critic_only:
+            loss = loss + losses["policy_loss"] - config.ent_coef * losses["entropy"]
+            loss = loss + losses["extra_loss"]
         row["grad_norm"] = step(optimiser, loss, parameters, config.max_grad_norm, reduce)
-    names = [*minibatch_rows[0], "grad_norm"]  # no gradient where not a single step was taken
-    means = {name: _mean([row[name] for row in minibatch_rows if name in row]) for name in names}
+    # Gradients: none where not a single step was taken.
+    norms = [row["grad_norm"] for row in rows if "grad_norm" in row]
+    means = {name: sum(row[name] for row in rows) / len(rows) for name in losses}
     return {
         **means,
-        "ratio_error": minibatch_rows[0]["ratio_error"],
+        "grad_norm": sum(norms) / max(len(norms), 1),
+        "ratio_error": rows[0]["ratio_error"],
         "explained_variance": explained,
-        "updates": float(len(minibatch_rows) - stopped),
+        "updates": float(len(norms)),
         "stopped": float(stopped),
     }
-
-
-def minibatches(
-    orders: Sequence[Sequence[int]], count: int, device: torch.device
-) -> Iterator[Tensor]:
-    """Yield the environments of each minibatch of each epoch, (m,) each."""
-    for order in orders:
-        yield from torch.tensor(order, device=device).chunk(count)
 
 
 def moments(values: Tensor, reduce: Reduce = alone) -> tuple[Tensor, Tensor]:
@@ -180,7 +182,7 @@ def _losses(
     config: PPOConfig,
     reduce: Reduce,
 ) -> tuple[dict[str, Tensor], dict[str, float]]:
-    """Return a minibatch's weighted losses, and the row of it that is logged.
+    """Return the means of a minibatch, with gradients, and as they are logged, across ranks.
 
     `columns` (m,) are its environments, `goals` their advantages and returns, (T, m) each.
     """
@@ -199,24 +201,17 @@ def _losses(
     extra = torch.zeros_like(gain) if now.loss is None else now.loss
     count = reduce(gain.new_tensor(float(gain.numel())))
     losses = {
-        "policy": -gain.sum() / count,
-        "value": config.vf_coef * 0.5 * errors.sum() / count,
-        "entropy": -config.ent_coef * now.entropy.sum() / count,
-        "extra": extra.sum() / count,
+        "policy_loss": -gain.sum() / count,
+        "value_loss": 0.5 * errors.sum() / count,
+        "entropy": now.entropy.sum() / count,
+        "extra_loss": extra.sum() / count,
+        # An estimate that is never negative: http://joschu.net/blog/kl-approx.html
+        "kl": (ratio - 1.0 - log_ratio).sum() / count,
+        "clip_fraction": (ratio != clipped).float().sum() / count,
     }
-    with torch.no_grad():
-        sums = {
-            "policy_loss": losses["policy"],
-            "value_loss": 0.5 * errors.sum() / count,
-            "entropy": now.entropy.sum() / count,
-            "extra_loss": losses["extra"],
-            # An estimate that is never negative: http://joschu.net/blog/kl-approx.html
-            "kl": (ratio - 1.0 - log_ratio).sum() / count,
-            "clip_fraction": (ratio != clipped).float().sum() / count,
-        }
-        row = reduce(torch.stack(list(sums.values()))).tolist()
+    means = reduce(torch.stack([loss.detach() for loss in losses.values()])).tolist()
     error = float((ratio.detach() - 1.0).abs().max())
-    return losses, {**dict(zip(sums, row, strict=True)), "ratio_error": error}
+    return losses, {**dict(zip(losses, means, strict=True)), "ratio_error": error}
 
 
 def check_finite(columns: Tensor, *outputs: Tensor) -> None:
@@ -235,7 +230,3 @@ def check_finite(columns: Tensor, *outputs: Tensor) -> None:
                 f"environment {k}: the networks' outputs are not finite; lower the learning rate, "
                 "or resume from the last checkpoint with another seed"
             )
-
-
-def _mean(numbers: Sequence[float]) -> float:
-    return sum(numbers) / len(numbers) if numbers else 0.0

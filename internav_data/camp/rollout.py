@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from internav_data.camp.agents import Batch
+from internav_data.camp.agents.protocol import Batch
 from internav_data.envs.loop import EnvironmentLoop
 from internav_data.records import Purpose, TrainingStream, generator
 from internav_data.records.errors import NotFiniteError
@@ -17,7 +17,7 @@ from internav_data.records.errors import NotFiniteError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from internav_data.camp.agents import Agent, AgentStep
+    from internav_data.camp.agents.protocol import Agent, AgentStep
     from internav_data.camp.config import PPOConfig
     from internav_data.core.typing import Bools
     from internav_data.envs.loop import Environments, LoopStep
@@ -34,7 +34,7 @@ def advantages_of(
     final_values: Tensor,
     *,
     gamma: float,
-    lam: float,
+    gae_lambda: float,
 ) -> Tensor:
     """Return generalised advantages (Schulman et al. 2016), (T, n) float32.
 
@@ -50,14 +50,14 @@ def advantages_of(
         The episode ended, or was cut off, by action t. Where both are true it ended.
     final_values : (T, n)
         Value of the observation after a cut, before the reset.
-    gamma, lam
-        Discount and decay.
+    gamma, gae_lambda
+        Discount, and decay of the advantages.
     """
     over = truncated | terminated
     following = torch.cat([values[1:], last_value.unsqueeze(0)])
     following = torch.where(truncated, final_values, following).masked_fill(terminated, 0.0)
     td_errors = rewards + gamma * following - values
-    carries = (gamma * lam) * (~over).to(values.dtype)
+    carries = (gamma * gae_lambda) * (~over).to(values.dtype)
     advantages, ahead = torch.empty_like(values), torch.zeros_like(last_value)
     for t in range(len(values) - 1, -1, -1):
         ahead = td_errors[t] + carries[t] * ahead
@@ -99,7 +99,7 @@ class Rollout:
         """Return the generalised advantages, (T, n)."""
         return advantages_of(
             self.rewards, self.values, self.last_value, self.terminated, self.truncated,
-            self.final_values, gamma=config.gamma, lam=config.gae_lambda,
+            self.final_values, gamma=config.gamma, gae_lambda=config.gae_lambda,
         )  # fmt: skip
 
 
@@ -147,9 +147,9 @@ class Collector:
         self.loop, self.agent, self._seed = EnvironmentLoop(env), agent, seed
         self.state = agent.initial_state(env.num_envs)
 
-    def restore(self, states: Sequence[EpisodeSnapshot], starts: Bools) -> None:
-        """Go on from snapshots of the environments and the `starts` that belong to them."""
-        self.loop.restore(states, starts)
+    def restore(self, states: Sequence[EpisodeSnapshot], episode_starts: Bools) -> None:
+        """Go on from snapshots of the environments and their `episode_starts`, (n,) bool."""
+        self.loop.restore(states, episode_starts)
 
     @torch.no_grad()
     def collect(self, uniforms: Tensor) -> Rollout:
@@ -168,16 +168,16 @@ class Collector:
         agent, device, before = self.agent, self.agent.device, self.state
         seen = ObservationRows(len(uniforms), device)
         taken: list[AgentStep[Any]] = []
-        starts: list[Tensor] = []
+        start_rows: list[Tensor] = []
         ends: list[tuple[Tensor, ...]] = []
         finished: list[Finished] = []
 
-        def act(observations: Observations, begun: Bools) -> Actions:
+        def act(observations: Observations, episode_starts: Bools) -> Actions:
             self._check(observations)
             row = seen.append(observations)
-            starts.append(torch.from_numpy(begun).to(device))
+            start_rows.append(torch.from_numpy(episode_starts).to(device))
             draws = uniforms[len(taken)].to(device)
-            taken.append(agent.act(row, self.state, starts[-1], draws))
+            taken.append(agent.act(row, self.state, start_rows[-1], draws))
             self.state = taken[-1].state
             actions: Actions = taken[-1].action.cpu().numpy()
             return actions
@@ -196,7 +196,7 @@ class Collector:
         )
         record = type(taken[0].record).stack([step.record for step in taken])
         return Rollout(
-            Batch(seen.rows, torch.stack(starts), before, record),
+            Batch(seen.rows, torch.stack(start_rows), before, record),
             rewards, terminated, truncated,
             values=torch.stack([step.value for step in taken]),
             log_probs=torch.stack([step.log_prob for step in taken]),

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 import torch
 
 from internav_data.camp import cloning, ppo
-from internav_data.camp.agents import AuxiliaryAgent, Hierarchy, make_agent
+from internav_data.camp.agents import agent_names, make_agent
+from internav_data.camp.agents.hierarchy import AuxiliaryAgent, Hierarchy
 from internav_data.camp.checkpoint import (
     Checkpoint,
     best_score,
@@ -20,23 +21,24 @@ from internav_data.camp.checkpoint import (
     unpack,
 )
 from internav_data.camp.cloning import Demonstrations, experts_of
+from internav_data.camp.config import CampConfig
+from internav_data.camp.data import TrainingData
+from internav_data.camp.distributed import device_of, distributed_context
 from internav_data.camp.logging import EpisodeWindow, MetricsLogger, rates
 from internav_data.camp.rollout import Collector, orders_of, uniforms_of
-from internav_data.camp.stages import order_seed
+from internav_data.camp.stages import PARTS, cloning_stage, order_seed, schedule
 from internav_data.core.interrupts import InterruptedRunError
+from internav_data.records import Purpose, TrainingStream, generator
 from internav_data.records.errors import NotFiniteError, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
     from pathlib import Path
 
     from torch.optim import Optimizer
 
-    from internav_data.camp.agents import Agent
+    from internav_data.camp.agents.protocol import Agent
     from internav_data.camp.checkpoint import TrainState
-    from internav_data.camp.config import CampConfig
-    from internav_data.camp.data import TrainingData
-    from internav_data.camp.distributed import DistributedContext
     from internav_data.camp.logging import Row
     from internav_data.camp.rollout import Rollout
     from internav_data.camp.stages import TrainingStage
@@ -47,6 +49,22 @@ if TYPE_CHECKING:
 INTERRUPTED: Final = "saved; go on with --resume"
 _CLONING_SAVES: Final = 4
 """Factor between checkpoints of cloning and of PPO, as its updates are smaller."""
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """Arguments of a run."""
+
+    dataset: Path
+    out: Path
+    """The run's folder."""
+    method: str = "camp"
+    config: CampConfig = field(default_factory=CampConfig)
+    parts: tuple[str, ...] = PARTS
+    """Stages after cloning; none for cloning alone."""
+    clones: bool = False
+    """Whether the dataset's experts are cloned first."""
+    device: str = "auto"
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,14 +88,8 @@ class Trainer:
 
     Parameters
     ----------
-    run
-        The run's folder.
-    data
-        Training and validation episodes.
-    method, config
-        Method name and training config.
-    ranks
-        Distributed context (rank, world size, device).
+    request
+        Arguments of the run.
     state
         Counters to resume from.
     checkpoint
@@ -86,42 +98,89 @@ class Trainer:
         Function that is called with every row of the log.
     interrupted
         Function that returns the signal that asked the run to stop; 0 for none.
+
+    Raises
+    ------
+    UsageError
+        A setting cannot be meant, or the dataset has no such episodes.
     """
 
     def __init__(
         self,
-        run: Path,
-        data: TrainingData,
-        method: str,
-        config: CampConfig,
-        ranks: DistributedContext,
+        request: Request,
         state: TrainState,
-        *,
         checkpoint: Checkpoint | None = None,
         callback: Callback | None = None,
         interrupted: Callable[[], int] = lambda: 0,
     ) -> None:
-        self.run, self.data, self.method, self.config = run, data, method, config
-        self.ranks, self.state, self._checkpoint = ranks, state, checkpoint
+        self.run, self.method, self.config = request.out, request.method, request.config
+        self.state, self._checkpoint = state, checkpoint
         self._callback, self._interrupted = callback, interrupted
-        own = ranks.share(config.ppo.num_envs, "ppo.num_envs")
+        config, seed = request.config, request.config.seed
+        torch.set_num_threads(config.run.threads)
+        # Nothing here draws from torch's own generator, but a user's agent may.
+        draws = generator(seed, Purpose.TRAINING, attempt=TrainingStream.TORCH)
+        torch.manual_seed(int(draws.integers(2**62)))
+        self.data = TrainingData(request.dataset, config.data.filter)
+        self.agent = make_agent(self.method, config)
+        self.stages = self._schedule()
+        for single in {stage.single_room for stage in self.stages}:
+            self.data.episodes(single_room=single)  # refuses a dataset without any
+        self.ranks = distributed_context(device_of(request.device))
+        own = self.ranks.share(config.ppo.num_envs, "ppo.num_envs")
         if len(own) % config.ppo.num_minibatches:
             raise UsageError(
                 f"ppo.num_minibatches is {config.ppo.num_minibatches}: it must divide the "
-                f"{len(own)} environments of each of {ranks.size} processes"
+                f"{len(own)} environments of each of {self.ranks.size} processes"
             )
-        self.agent = make_agent(method, config)
         progress = checkpoint.progress if checkpoint else {}
         if checkpoint:
             self.agent.load_state_dict(dict(checkpoint.weights))
-        self.agent.to(ranks.device)
+        self.agent.to(self.ranks.device)
         self._window = EpisodeWindow(config.run.window, progress.get("window", ()))
         self._log_position = int(progress.get("log", 0))
         self._log: MetricsLogger | None = None
         self._total_updates = 0
         self._lap = time.perf_counter()
 
-    def fit(self, stages: Sequence[TrainingStage]) -> None:
+    def _schedule(self) -> list[TrainingStage]:
+        """Return the stages that the run has before it, the present one first.
+
+        Raises
+        ------
+        UsageError
+            There is nothing to learn, or the stages cannot be meant.
+        """
+        state, config = self.state, self.config
+        if not self.agent.optimised():
+            others = ", ".join(name for name in agent_names() if name != self.method)
+            raise UsageError(
+                f"method {self.method!r} has nothing to learn; expected one of {others}"
+            )
+        if not state.parts and not state.clones:
+            raise UsageError("--stages cloning: there is nothing to clone without --pretrain bc")
+        if state.clones and config.agent.forbidden:
+            raise UsageError(
+                "agent.forbidden and --pretrain bc: the expert does what is forbidden; leave one "
+                "of them out"
+            )
+        hierarchical = isinstance(self.agent, Hierarchy)
+        stages = [cloning_stage(config)] if state.clones else []
+        if state.parts:
+            stages += schedule(config, state.parts, hierarchical=hierarchical)
+        names = [stage.name for stage in stages]
+        if state.stage in names:
+            return stages[names.index(state.stage) :]
+        known = schedule(config, PARTS, hierarchical=hierarchical)
+        if any(stage.name == state.stage and state.done < stage.updates for stage in known):
+            part = state.stage.split("-")[0]
+            raise UsageError(
+                f"{self.run}: stage {state.stage} is not finished: go on with it first "
+                f"(--stages {part},…)"
+            )
+        return [stage for stage in stages if not stage.clones or not state.stage]
+
+    def fit(self) -> None:
         """Train to the end of the last stage.
 
         Raises
@@ -131,21 +190,21 @@ class Trainer:
         NotFiniteError
             NaN or infinity turned up; the last checkpoint stands.
         """
-        state, board = self.state, self.config.run.tensorboard
-        names = [stage.name for stage in stages]
-        first = names.index(state.stage) if state.stage in names else 0
-        left = sum(stage.updates for stage in stages[first:] if not stage.clones)
-        done = state.done if state.stage in names and not stages[first].clones else 0
-        self._total_updates = state.updates + left - done
+        state, every = self.state, self.config.run
+        self._total_updates = state.updates + sum(
+            stage.updates - (state.done if stage.name == state.stage else 0)
+            for stage in self.stages
+            if not stage.clones
+        )
         with ExitStack() as stack:
             if self.ranks.first:
-                log = MetricsLogger(self.run, self._log_position, board=board)
+                log = MetricsLogger(self.run, self._log_position, board=every.tensorboard)
                 self._log = stack.enter_context(log)
             self._lap = time.perf_counter()
-            for stage in stages[first:]:
+            for stage in self.stages:
                 if stage.name != state.stage:
                     state.stage, state.done, self._checkpoint = stage.name, 0, None
-                    self._window = EpisodeWindow(self.config.run.window)
+                    self._window = EpisodeWindow(every.window)
                 if state.done < stage.updates:
                     self._train(stage)
 
@@ -176,7 +235,7 @@ class Trainer:
         own = self.ranks.share(
             sizes.num_envs, "cloning.num_envs" if stage.clones else "ppo.num_envs"
         )
-        env = self.data.of_stage(stage, self.config, own, self.agent.sensors)
+        env = self.data.environments(stage, self.config, own, self.agent.sensors)
         seed = order_seed(self.config.seed, stage.name) + own.start
         learner: Agent[Any] = self.agent
         if stage.tasks and isinstance(self.agent, Hierarchy):
@@ -188,8 +247,10 @@ class Trainer:
             source = Demonstrations(env, learner, experts_of(self.data.episodes()))
         if self._checkpoint is not None and self.state.done:
             tensors, progress = self._checkpoint.training, self._checkpoint.progress
-            source.state, starts = unpack(tensors, optimiser, source.state, own, sizes.num_envs)
-            source.restore(snapshots_of(progress, own), starts.numpy())
+            source.state, episode_starts = unpack(
+                tensors, optimiser, source.state, own, sizes.num_envs
+            )
+            source.restore(snapshots_of(progress, own), episode_starts.numpy())
         else:
             if not stage.tasks:
                 self.agent.synchronise()
@@ -291,7 +352,7 @@ class Trainer:
         """Write a checkpoint of a stage under way, with its validation score if it has one."""
         ranks, loop = self.ranks, now.source.loop
         memory = {name: ranks.all_gather(values) for name, values in now.source.state.items()}
-        starts = ranks.all_gather(torch.from_numpy(loop.starts))
+        episode_starts = ranks.all_gather(torch.from_numpy(loop.episode_starts))
         progress = {
             **asdict(self.state),
             "environments": ranks.all_gather_items([asdict(each) for each in loop.env.state()]),
@@ -303,7 +364,7 @@ class Trainer:
             return
         best = best_score(self.run)
         better = score if score is not None and (best is None or score >= best) else None
-        tensors, weights = pack(now.optimiser, memory, starts), self.agent.state_dict()
+        tensors, weights = pack(now.optimiser, memory, episode_starts), self.agent.state_dict()
         checkpoint = Checkpoint(self.method, self.config, weights, progress, tensors)
         save(self.run, checkpoint, best=better)
 

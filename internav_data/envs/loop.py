@@ -79,7 +79,7 @@ class EnvironmentLoop:
     ----------
     observations
         Observations that the next actions are chosen from.
-    starts : (n,) bool
+    episode_starts : (n,) bool
         Environments whose next step is the first of an episode.
     infos
         Infos of the last reset.
@@ -91,17 +91,17 @@ class EnvironmentLoop:
         self.env, self.env_s = env, 0.0
         self.observations: Observations = {}
         self.infos: dict[str, Any] = {}
-        self.starts = np.ones(env.num_envs, np.bool_)
+        self.episode_starts = np.ones(env.num_envs, np.bool_)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
         """Begin an episode everywhere."""
         self.observations, self.infos = self.env.reset(seed=seed, options=options)
-        self.starts = np.ones(self.env.num_envs, np.bool_)
+        self.episode_starts = np.ones(self.env.num_envs, np.bool_)
 
-    def restore(self, states: Sequence[EpisodeSnapshot], starts: Bools) -> None:
-        """Continue from snapshots of the environments, with their `starts` (n,) bool."""
+    def restore(self, states: Sequence[EpisodeSnapshot], episode_starts: Bools) -> None:
+        """Continue from snapshots of the environments, with their `episode_starts` (n,) bool."""
         self.observations, self.infos = self.env.restore(states)
-        self.starts = starts
+        self.episode_starts = episode_starts
 
     def run(self, act: Act, steps: int | None = None) -> Iterator[LoopStep]:
         """Yield one step after another; the next episode begins once the caller asks for more.
@@ -115,7 +115,7 @@ class EnvironmentLoop:
         """
         taken = 0
         while steps is None or taken < steps:
-            actions = act(self.observations, self.starts)
+            actions = act(self.observations, self.episode_starts)
             began = time.perf_counter()
             observations, rewards, terminated, truncated, infos = self.env.step(actions)
             self.env_s += time.perf_counter() - began
@@ -123,7 +123,7 @@ class EnvironmentLoop:
             self.observations = observations
             step = LoopStep(actions, observations, rewards, terminated, truncated, infos, over)
             yield step
-            self.starts = step.over
+            self.episode_starts = step.over
             if step.over.any():
                 began = time.perf_counter()
                 options = {"reset_mask": step.over, **step.reset_options}

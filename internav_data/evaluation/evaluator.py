@@ -1,7 +1,7 @@
-"""Let somebody play a split's episodes, many at a time, and note how each one went.
+"""Evaluation of a policy on a split's episodes, many at a time.
 
-What comes out depends on the player, the evaluation seed and the episode alone: not on how many
-are played side by side, nor in which order. (A network's arithmetic may differ in the last bit
+Results depend on the policy, the evaluation seed and the episode alone: not on the batch, nor on
+the order of episodes. (A network's arithmetic may differ in the last bit
 between batch sizes; at an even chance in a million a sampled action can then differ too.)
 """
 
@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from internav_data.envs.types import Actions, Observations
     from internav_data.records import Episode
 
-    Tell = Callable[[int, int], None]
+    Callback = Callable[[int, int], None]
+    """Function of the number of episodes that have ended, and of all."""
 
 Note = tuple[str, tuple[str, ...], tuple[float, ...], int]
 """Distribution that a policy drew from: a title, names, a probability for each, and the number of
@@ -50,16 +51,16 @@ class Policy(Protocol):
     """Names of the sensors that it takes; see `internav_data.envs.sensors`."""
 
     def begin(self, count: int, seed: int) -> None:
-        """Take `count` seats; all that is random derives from `seed` and the episode."""
+        """Begin with `count` slots; randomness derives from `seed` and the episode alone."""
 
     def start(self, slot: int, episode: Episode) -> None:
-        """Forget what happened in a seat: an episode begins there."""
+        """Clear the memory of a slot: an episode begins there."""
 
     def act(self, observations: Observations) -> NDArray[np.int64]:
-        """Return an action for every seat, (count,): 0 … 11, or -1 to wait.
+        """Return the actions (count,) of all slots: 0 … 11, or -1 to wait.
 
         Observations are those of the vector environment, (count, …) each; they are overwritten
-        by the next step. What is returned for an empty seat counts for nothing.
+        by the next step. Actions of empty slots are ignored.
         """
 
 
@@ -68,13 +69,13 @@ class EvaluationConfig:
     """Settings of an evaluation."""
 
     seed: Annotated[int, Bounds(0, MAX_SEED)] = 0
-    """Actions are drawn by a generator keyed by this and the episode."""
+    """Seed that, with the episode, keys the generator of its actions."""
     batch: Annotated[int, Bounds(1)] = 16
-    """Episodes side by side."""
+    """Number of episodes side by side."""
     workers: Annotated[int, Bounds(0)] = 0
-    """Processes that step the episodes; 0: this one."""
+    """Number of processes that step the episodes; 0 for this one."""
     max_steps: Annotated[int, Bounds(1, STEPS_AT_MOST)] = 500
-    """Steps after which an episode is cut off."""
+    """Number of steps after which an episode is cut off."""
     limit: Annotated[int | None, Bounds(1)] = None
     """Maximum number of episodes: a fixed random choice, of which a smaller limit's is a part."""
 
@@ -91,7 +92,7 @@ class EvaluationConfig:
 
 
 def episode_generator(seed: int, episode: Episode) -> Generator:
-    """Return the random numbers of one episode of an evaluation, whoever plays it and when."""
+    """Return the random generator of one episode of an evaluation."""
     scene = int(episode.scene_id.rpartition("-")[2])
     return generator(seed, Purpose.EVALUATION, scene, EvaluationStream.ACTIONS, episode.index)
 
@@ -108,20 +109,20 @@ def evaluate(
     policy: Policy,
     dataset: Dataset[Episode],
     settings: EvaluationConfig | None = None,
-    tell: Tell | None = None,
+    callback: Callback | None = None,
 ) -> list[EpisodeResult]:
-    """Play the episodes of a dataset; the results come in the dataset's order.
+    """Evaluate a policy on the episodes of a dataset; results come in the dataset's order.
 
     Parameters
     ----------
-    player
-        Who plays.
+    policy
+        Policy under evaluation.
     dataset
-        What `load_dataset` returned for a split, filters and all.
+        Split, with its filters, as `load_dataset` returns it.
     settings
-        How; the defaults if not given.
-    tell
-        Called with how many episodes have ended, and of how many.
+        Settings of the evaluation; the defaults if not given.
+    callback
+        Function that is called with the number of episodes that have ended, and of all.
 
     Raises
     ------
@@ -146,13 +147,13 @@ def evaluate(
     )  # fmt: skip
     try:
         policy.begin(count, settings.seed)
-        return _Round(env, policy, dataset, numbers, settings.seed).played(tell)
+        return _Round(env, policy, dataset, numbers, settings.seed).run(callback)
     finally:
         env.close()
 
 
 class _Round:
-    """One evaluation under way: who sits where, and what they did so far."""
+    """One evaluation under way: the episode of each slot, and its actions so far."""
 
     def __init__(
         self,
@@ -162,7 +163,7 @@ class _Round:
         numbers: Sequence[int],
         seed: int,
     ) -> None:
-        self._env, self._player, self._dataset, self._seed = env, policy, dataset, seed
+        self._env, self._policy, self._dataset, self._seed = env, policy, dataset, seed
         self._numbers, self._next = numbers, 0
         self._episodes: list[Episode | None] = [None] * env.num_envs
         self._ids: list[str] = [""] * env.num_envs
@@ -170,7 +171,7 @@ class _Round:
         self._playing = [0] * env.num_envs
         self._found: dict[int, EpisodeResult] = {}
 
-    def played(self, tell: Tell | None) -> list[EpisodeResult]:
+    def run(self, callback: Callback | None) -> list[EpisodeResult]:
         loop = EnvironmentLoop(self._env)
         for slot in range(self._env.num_envs):
             self._fill_slot(slot)
@@ -180,14 +181,14 @@ class _Round:
                 self._ended(slot, step.infos)
                 self._fill_slot(slot)
             step.reset_options["episode_id"] = self._ids
-            if tell is not None and step.over.any():
-                tell(len(self._found), len(self._numbers))
+            if callback is not None and step.over.any():
+                callback(len(self._found), len(self._numbers))
             if all(episode is None for episode in self._episodes):
                 break
         return [self._found[number] for number in self._numbers]
 
-    def _act(self, observations: Observations, starts: Bools) -> Actions:  # noqa: ARG002
-        actions = np.array(self._player.act(observations), dtype=np.int64)
+    def _act(self, observations: Observations, episode_starts: Bools) -> Actions:  # noqa: ARG002
+        actions = np.array(self._policy.act(observations), dtype=np.int64)
         idle = [episode is None for episode in self._episodes]
         actions[idle] = Action.WAIT
         for slot, action in enumerate(actions.tolist()):
@@ -195,7 +196,7 @@ class _Round:
         return actions
 
     def _fill_slot(self, slot: int) -> None:
-        """Give a seat the next episode; where there is none its last one stays, and is waited."""
+        """Give a slot the next episode; without one it keeps its last, and waits."""
         self._actions[slot] = []
         if self._next == len(self._numbers):
             self._episodes[slot] = None
@@ -204,11 +205,13 @@ class _Round:
         episode = self._dataset[number]
         self._next += 1
         self._episodes[slot], self._ids[slot] = episode, episode.episode_id
-        self._player.start(slot, episode)
+        self._policy.start(slot, episode)
 
     def _ended(self, slot: int, infos: Mapping[str, Any]) -> None:
         episode = self._episodes[slot]
         if episode is None:
             return
-        said = {name: column[slot] for name, column in infos["metrics"].items() if name[0] != "_"}
-        self._found[self._playing[slot]] = result_of(episode, said, self._actions[slot])
+        metrics = {
+            name: values[slot] for name, values in infos["metrics"].items() if name[0] != "_"
+        }
+        self._found[self._playing[slot]] = result_of(episode, metrics, self._actions[slot])

@@ -8,11 +8,13 @@ torch = pytest.importorskip("torch")
 from internav_data.camp.rollout import advantages_of  # noqa: E402
 
 
-def _one(rewards, values, last, terminated, truncated, final, gamma=0.99, lam=0.95):
+def _one(rewards, values, last, terminated, truncated, final, gamma=0.99, gae_lambda=0.95):
     column = [torch.tensor(x).unsqueeze(1) for x in (rewards, values)]
     flags = [torch.tensor(x).unsqueeze(1) for x in (terminated, truncated)]
     final = torch.tensor(final).unsqueeze(1)
-    found = advantages_of(*column, torch.tensor([last]), *flags, final, gamma=gamma, lam=lam)
+    found = advantages_of(
+        *column, torch.tensor([last]), *flags, final, gamma=gamma, gae_lambda=gae_lambda
+    )
     return found.squeeze(1)
 
 
@@ -76,7 +78,7 @@ def test_agrees_with_a_scalar_reference(seed):
     found = advantages_of(
         *(torch.tensor(x, dtype=torch.float32) for x in (floats[0], floats[1], last)),
         *(torch.tensor(x) for x in flags),
-        torch.tensor(floats[2], dtype=torch.float32), gamma=gamma, lam=lam,
+        torch.tensor(floats[2], dtype=torch.float32), gamma=gamma, gae_lambda=lam,
     )  # fmt: skip
     for k in range(count):
         right = _scalar(
@@ -97,16 +99,16 @@ def test_agrees_with_stable_baselines():
     rewards, values = rng.normal(size=(2, steps, count)).astype(np.float32)
     ended = rng.random((steps, count)) < 0.2
     last = rng.normal(size=count).astype(np.float32)
-    starts = np.zeros(count)
+    episode_starts = np.zeros(count)
     for t in range(steps):
         nothing = np.zeros((count, 1))
         value = torch.tensor(values[t])
-        theirs.add(nothing, nothing, rewards[t], starts, value, value)
-        starts = ended[t]
-    theirs.compute_returns_and_advantage(torch.tensor(last), starts)
+        theirs.add(nothing, nothing, rewards[t], episode_starts, value, value)
+        episode_starts = ended[t]
+    theirs.compute_returns_and_advantage(torch.tensor(last), episode_starts)
     ours = advantages_of(
         *(torch.tensor(x) for x in (rewards, values, last, ended, np.zeros_like(ended))),
-        torch.zeros(steps, count), gamma=0.99, lam=0.95,
+        torch.zeros(steps, count), gamma=0.99, gae_lambda=0.95,
     )  # fmt: skip
     assert ours.numpy() == pytest.approx(theirs.advantages, abs=1e-5)
 

@@ -5,7 +5,8 @@ import json
 
 import pytest
 
-from internav_data.camp.config import CampConfig, from_mapping, plain, preset
+from internav_data.camp.config import CampConfig, from_mapping, preset
+from internav_data.core.config import plain
 from internav_data.core.field_docs import descriptions
 from internav_data.records.errors import UsageError
 

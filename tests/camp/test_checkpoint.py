@@ -32,7 +32,8 @@ def kept(tmp_path, made):
 
 
 def test_an_agent_is_handed_on_alone(kept, made, tmp_path):
-    from internav_data.camp.run import Request, resume
+    from internav_data.camp.run import resume
+    from internav_data.camp.train import Request
 
     run, _ = kept
     folder = checkpoints.export_agent(run, tmp_path / "alone")

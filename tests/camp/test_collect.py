@@ -45,14 +45,14 @@ def test_cuts_are_valued_before_the_reset_and_ends_are_not(diary, config, method
     assert rollout.truncated.any()
     assert rollout.terminated.any()
     assert (rollout.final_values[~rollout.truncated] == 0).all()
-    state, starts = agent.initial_state(4), torch.ones(4, dtype=torch.bool)
+    state, episode_starts = agent.initial_state(4), torch.ones(4, dtype=torch.bool)
     for t in range(30):
         seen = {name: what[t] for name, what in rollout.batch.observations.items()}
         with torch.no_grad():
-            step = agent.act(seen, state, starts, uniforms[t])
+            step = agent.act(seen, state, episode_starts, uniforms[t])
             last = {name: torch.from_numpy(what) for name, what in env.shown[t + 1].items()}
             expected = agent.value(last, step.state)
-        state, starts = step.state, rollout.truncated[t] | rollout.terminated[t]
+        state, episode_starts = step.state, rollout.truncated[t] | rollout.terminated[t]
         cut = rollout.truncated[t]
         torch.testing.assert_close(rollout.final_values[t][cut], expected[cut])
         assert torch.equal(step.action, torch.from_numpy(env.actions[t]))
@@ -70,9 +70,9 @@ def test_who_is_done_is_reset_at_once_and_nobody_else(diary, config):
     assert [(t - 1) for t, _ in env.resets] == [t - 1 + 0 for t in [row + 1 for row in rows]]
     for (_, mask), row in zip(env.resets, rows, strict=True):
         assert mask.tolist() == over[row].tolist()
-    assert torch.equal(rollout.batch.starts[1:], over[:-1])
-    assert rollout.batch.starts[0].all()
-    assert collector.loop.starts.tolist() == over[-1].tolist()
+    assert torch.equal(rollout.batch.episode_starts[1:], over[:-1])
+    assert rollout.batch.episode_starts[0].all()
+    assert collector.loop.episode_starts.tolist() == over[-1].tolist()
 
 
 def test_buffers_that_are_written_again_do_no_harm(fake, config):

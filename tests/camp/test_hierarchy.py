@@ -7,13 +7,8 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from internav_data.camp.agents import (  # noqa: E402
-    AGENTS,
-    LEARNERS,
-    AuxiliaryAgent,
-    make_agent,
-)
-from internav_data.camp.agents.options import (  # noqa: E402
+from internav_data.camp.agents import AGENTS, LEARNERS, make_agent  # noqa: E402
+from internav_data.camp.agents.hierarchy import (  # noqa: E402
     ACTIONS_OF,
     DONE,
     NAVIGATE,
@@ -21,7 +16,9 @@ from internav_data.camp.agents.options import (  # noqa: E402
     PUSH,
     STOP,
     WAIT,
+    AuxiliaryAgent,
 )
+from internav_data.camp.agents.protocol import Agent  # noqa: E402
 from internav_data.camp.rollout import Collector, uniforms_of  # noqa: E402
 from internav_data.records.errors import UsageError  # noqa: E402
 
@@ -209,8 +206,8 @@ def acted(agent, count=1, steps=14, starts_at=()):
             "held": torch.zeros(count, dtype=torch.int64),
             "horizon": torch.ones(count, dtype=torch.int64),
         }
-        starts = torch.full((count,), t == 0 or t in starts_at)
-        step = agent.act(seen, state, starts, torch.rand(count, 2))
+        episode_starts = torch.full((count,), t == 0 or t in starts_at)
+        step = agent.act(seen, state, episode_starts, torch.rand(count, 2))
         state, record = step.state, step.record
         names = ("option", "choice", "decide", "open", "used", "forced")
         rows.append({name: getattr(record, name)[0].item() for name in names})
@@ -371,7 +368,7 @@ def test_ones_own_agent_joins_by_entry_point(config, monkeypatch):
 
     point = EntryPoint("mine", "internav_data.camp.agents.flat:RandomAgent", agents.GROUP)
     monkeypatch.setattr(agents, "entry_points", lambda **_: [point])
-    assert isinstance(make_agent("mine", config()), agents.Agent)
+    assert isinstance(make_agent("mine", config()), Agent)
     assert agents.agent_names()[-1] == "mine"
 
 

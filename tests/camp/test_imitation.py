@@ -9,7 +9,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from internav_data.camp.agents import LEARNERS, make_agent  # noqa: E402
-from internav_data.camp.agents.options import (  # noqa: E402
+from internav_data.camp.agents.hierarchy import (  # noqa: E402
     DONE,
     NAVIGATE,
     PICK,
@@ -89,7 +89,7 @@ def test_hrl_decides_at_every_step_and_never_waits():
 
 def test_labels_are_what_the_model_could_have_done(config):
     """Played by the state machine of the agent, labels give the same open options."""
-    from internav_data.camp.agents.options import option_step
+    from internav_data.camp.agents.hierarchy import option_step
 
     rng = np.random.default_rng(0)
     for _ in range(20):
@@ -143,8 +143,8 @@ def test_frames_begin_where_episodes_do(experts, config):
     shown.loop.reset(seed=0)
     batch = shown.collect(20)
     ages = batch.observations["goal"][..., 1] / 0.5
-    assert torch.equal(batch.starts, ages == 0)
-    assert batch.starts[1:].any()
+    assert torch.equal(batch.episode_starts, ages == 0)
+    assert batch.episode_starts[1:].any()
     which = batch.observations["goal"][..., 0] / 10
     for k in range(4):
         labels = [agent.labels(EXPERTS["abc"[int(w)]])[1] for w in which[:, k]]

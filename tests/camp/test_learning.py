@@ -69,14 +69,16 @@ def test_a_box_is_pushed_a_thing_picked_up_and_a_block_gone_round(method, settin
 class Forgetful(PPOAgent):
     """`ppo` whose hidden state is zeroed at every step: the same networks, feed-forward."""
 
-    def act(self, seen, state, starts, uniforms):
-        return super().act(seen, state, torch.ones_like(starts), uniforms)
+    def act(self, seen, state, episode_starts, uniforms):
+        return super().act(seen, state, torch.ones_like(episode_starts), uniforms)
 
     def value(self, seen, state):
         return super().value(seen, {name: torch.zeros_like(kept) for name, kept in state.items()})
 
     def evaluate(self, batch):
-        return super().evaluate(dataclasses.replace(batch, starts=torch.ones_like(batch.starts)))
+        return super().evaluate(
+            dataclasses.replace(batch, episode_starts=torch.ones_like(batch.episode_starts))
+        )
 
 
 def test_memory_is_used_where_it_is_needed_and_a_feed_forward_copy_fails(settings):

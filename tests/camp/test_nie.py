@@ -74,8 +74,8 @@ def test_the_loss_is_how_far_things_in_sight_went_unforeseen(collected):
     record.objects[..., 0] = 4
     record.corners[1:, :, 0, :, 0] += 0.1
     record.objects[5:, 1, 0] = 9  # another thing: nothing is known of where 4 went
-    rollout.batch.starts[1:] = False
-    rollout.batch.starts[3, 2] = True  # another episode
+    rollout.batch.episode_starts[1:] = False
+    rollout.batch.episode_starts[3, 2] = True  # another episode
     loss = agent.evaluate(rollout.batch).loss
     right = torch.zeros(8, 4)
     right[0] = 0.1

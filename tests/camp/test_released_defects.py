@@ -7,8 +7,9 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from internav_data.camp.agents import AGENTS, Agent, make_agent  # noqa: E402
-from internav_data.camp.agents.options import NAVIGATE, PICK, PUSH, option_step  # noqa: E402
+from internav_data.camp.agents import AGENTS, make_agent  # noqa: E402
+from internav_data.camp.agents.hierarchy import NAVIGATE, PICK, PUSH, option_step  # noqa: E402
+from internav_data.camp.agents.protocol import Agent  # noqa: E402
 from internav_data.camp.ppo import update  # noqa: E402
 from internav_data.camp.rollout import Collector, orders_of, uniforms_of  # noqa: E402
 from internav_data.records.errors import NotFiniteError  # noqa: E402
@@ -19,16 +20,16 @@ def test_defect_1_no_option_lives_on_a_module(collected):
     agent, _, lived = collected(
         "camp", rollouts=4, changes={"agent": {"initial_interaction_probability": 0.4}}
     )
-    assert {name for name, _ in agent.named_buffers()} == {"mask", "table", "tail"}
+    assert {name for name, _ in agent.named_buffers()} == {"mask", "done"}
     before = {k: v for k, v in vars(agent).items() if not k.startswith("_")}
     inside = False
     for rollout in lived:
         now = agent.evaluate(rollout.batch)
         torch.testing.assert_close(now.log_prob, rollout.log_probs, atol=1e-5, rtol=0)
-        record, starts = rollout.batch.record, rollout.batch.starts
-        assert not record.open[starts].any()
-        assert not record.used[starts].any()
-        assert record.decide[starts].all()
+        record, episode_starts = rollout.batch.record, rollout.batch.episode_starts
+        assert not record.open[episode_starts].any()
+        assert not record.used[episode_starts].any()
+        assert record.decide[episode_starts].all()
         acting = (record.option == PUSH) | (record.option == PICK)
         inside |= bool((rollout.truncated & acting).any())
     assert inside, "a time-out hit an interaction"
@@ -132,7 +133,7 @@ def test_defect_7_what_is_no_number_stops_and_is_named(fake, config, wrong, wher
 
 def test_defect_8_a_forced_end_is_told_to_the_networks(config):
     """The inputs of the step after the cap say that nothing is open."""
-    from internav_data.camp.agents.options import option_inputs
+    from internav_data.camp.agents.hierarchy import option_inputs
 
     opened = used = torch.zeros(1, dtype=torch.int64)
     told = []

@@ -6,7 +6,8 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from internav_data.camp.agents import AGENTS, AuxiliaryAgent, make_agent  # noqa: E402
+from internav_data.camp.agents import AGENTS, make_agent  # noqa: E402
+from internav_data.camp.agents.hierarchy import AuxiliaryAgent  # noqa: E402
 from internav_data.camp.networks import EpisodeSegments  # noqa: E402
 
 VARIANTS = [
@@ -40,7 +41,7 @@ def test_log_probabilities_and_values_are_those_of_the_rollout(
         parts = rollout.batch.select(torch.tensor([2, 0]))
         mine = agent.evaluate(parts).log_prob
         torch.testing.assert_close(mine, rollout.log_probs[:, [2, 0]], atol=1e-5, rtol=0)
-    assert any(rollout.batch.starts[1:].any() for rollout in lived)
+    assert any(rollout.batch.episode_starts[1:].any() for rollout in lived)
     if method == "camp":
         assert any(rollout.batch.state["open"].any() for rollout in lived[1:])
 
@@ -81,12 +82,12 @@ def test_chunks_of_a_gru_are_its_steps():
     torch.manual_seed(0)
     gru = torch.nn.GRU(5, 7)
     inputs, hidden = torch.randn(13, 4, 5), torch.randn(4, 7)
-    starts = torch.rand(13, 4) < 0.15
-    assert starts.any()
-    out, after = EpisodeSegments(starts).run(gru, inputs, hidden)
+    episode_starts = torch.rand(13, 4) < 0.15
+    assert episode_starts.any()
+    out, after = EpisodeSegments(episode_starts).run(gru, inputs, hidden)
     h = hidden
     for t in range(13):
-        h = h * (~starts[t]).unsqueeze(-1)
+        h = h * (~episode_starts[t]).unsqueeze(-1)
         row, h = gru(inputs[t : t + 1], h.unsqueeze(0))
         h = h.squeeze(0)
         torch.testing.assert_close(out[t], row[0], atol=1e-5, rtol=0)
@@ -95,9 +96,9 @@ def test_chunks_of_a_gru_are_its_steps():
 
 def test_a_chunk_is_one_call():
     """Boundaries are only where an episode begins."""
-    starts = torch.zeros(10, 3, dtype=torch.bool)
-    starts[4, 1] = starts[4, 2] = starts[7, 0] = True
-    assert EpisodeSegments(starts).bounds == [0, 4, 7, 10]
+    episode_starts = torch.zeros(10, 3, dtype=torch.bool)
+    episode_starts[4, 1] = episode_starts[4, 2] = episode_starts[7, 0] = True
+    assert EpisodeSegments(episode_starts).bounds == [0, 4, 7, 10]
     assert EpisodeSegments(torch.zeros(10, 3, dtype=torch.bool)).bounds == [0, 10]
 
 

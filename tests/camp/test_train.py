@@ -20,7 +20,8 @@ from internav_data.camp.config import (  # noqa: E402
     preset,
 )
 from internav_data.camp.data import TrainingData  # noqa: E402
-from internav_data.camp.run import Request, begin, forecast, resume  # noqa: E402
+from internav_data.camp.run import begin, forecast, resume  # noqa: E402
+from internav_data.camp.train import Request  # noqa: E402
 from internav_data.core.interrupts import InterruptedRunError  # noqa: E402
 from internav_data.records.errors import (  # noqa: E402
     CorruptDataError,

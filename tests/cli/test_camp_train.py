@@ -109,7 +109,8 @@ def test_a_checkpoint_that_is_no_checkpoint_is_refused(call, dataset, tmp_path):
         ({"progress": said["progress"] | {"log": "x"}}, "log"),
         ({"progress": said["progress"] | {"critics": {"main": -1}}}, "critics"),
         ({"progress": said["progress"] | {"window": 3}}, "window"),
-        ({"progress": said["progress"] | {"parts": [1]}}, "--stages"),
+        ({"progress": said["progress"] | {"parts": [1]}}, "parts[0]"),
+        ({"progress": said["progress"] | {"parts": ["all", "single"]}}, "--stages"),
     ):  # fmt: skip
         about.write_text(json.dumps(said | change))
         code, _, err = call(dataset, "--out", "runs/ppo-0", "--resume")

@@ -69,7 +69,7 @@ class Recorder:
     """Notes what it is asked; always turns left, and ends where its state has grown to four."""
 
     def __init__(self):
-        self.starts, self.uniforms, self.seen = [], [], []
+        self.episode_starts, self.uniforms, self.seen = [], [], []
 
     def parameters(self):
         return iter(())
@@ -80,11 +80,11 @@ class Recorder:
     def initial_state(self, count):
         return {"age": torch.zeros(count)}
 
-    def act(self, seen, state, starts, uniforms):
-        self.starts.append(starts.clone().tolist())
+    def act(self, seen, state, episode_starts, uniforms):
+        self.episode_starts.append(episode_starts.clone().tolist())
         self.uniforms.append(None if uniforms is None else uniforms.clone())
         self.seen.append({name: what.clone() for name, what in seen.items()})
-        age = torch.where(starts, torch.zeros(()), state["age"]) + 1
+        age = torch.where(episode_starts, torch.zeros(()), state["age"]) + 1
         action = torch.where(age >= 4, 11, 1)
         record = types.SimpleNamespace(
             option_probs=torch.tensor([[0.7, 0.1, 0.1, 0.1]]).repeat(len(age), 1),
@@ -97,7 +97,7 @@ def test_state_begins_anew_with_each_episode_and_numbers_are_the_episodes(played
     agent = Recorder()
     results = evaluate(policy(agent), played_data, EvaluationConfig(seed=5, batch=1, limit=3))
     assert [r.steps for r in results] == [4, 4, 4], "a state that leaked would end at once"
-    assert agent.starts == [[k % 4 == 0] for k in range(12)]
+    assert agent.episode_starts == [[k % 4 == 0] for k in range(12)]
     drawn = torch.cat(agent.uniforms).numpy()
     by_id = {e.episode_id: e for e in played_data}
     for k, result in enumerate(results):

@@ -14,39 +14,16 @@ from typing import TYPE_CHECKING, Any, Final
 import torch
 
 from internav_data.camp.agents.flat import PPOAgent, PPOIntentAgent, RandomAgent
-from internav_data.camp.agents.hierarchy import AuxiliaryAgent, Hierarchy
+from internav_data.camp.agents.hierarchy import Hierarchy
 from internav_data.camp.agents.nie import NIEAgent
-from internav_data.camp.agents.protocol import (
-    Agent,
-    AgentStep,
-    Batch,
-    Evaluated,
-    State,
-    StepRecord,
-)
 from internav_data.records import Purpose, TrainingStream, generator
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from internav_data.camp.agents.protocol import Agent
     from internav_data.camp.config import CampConfig
-
-__all__ = [
-    "AGENTS",
-    "LEARNERS",
-    "Agent",
-    "AgentStep",
-    "AuxiliaryAgent",
-    "Batch",
-    "Evaluated",
-    "Hierarchy",
-    "Method",
-    "State",
-    "StepRecord",
-    "agent_names",
-    "make_agent",
-]
 
 
 @dataclass(frozen=True, slots=True)

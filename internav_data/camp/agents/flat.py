@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import torch
 from torch import Tensor
 
-from internav_data.camp.agents.options import DONE, divergence
 from internav_data.camp.agents.protocol import (
     Agent,
     AgentStep,
@@ -24,20 +23,21 @@ from internav_data.camp.networks import (
     IntentConditionedPolicy,
     IntentPolicy,
     RecurrentActorCritic,
+    divergence,
     drawn,
     entropy_of,
     log_prob_of,
     uniform_intent,
 )
 from internav_data.records.errors import UsageError
-from internav_data.world.actions import ACTION_COUNT
+from internav_data.world.actions import ACTION_COUNT, Action
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from torch.nn import Parameter
 
-    from internav_data.camp.agents.protocol import State
+    from internav_data.camp.agents.protocol import Observations, State
     from internav_data.camp.config import CampConfig
     from internav_data.camp.networks import EpisodeSegments
 
@@ -112,23 +112,19 @@ class PPOAgent(Agent[FlatRecord]):
 
     def act(
         self,
-        observations: dict[str, Tensor],
+        observations: Observations,
         state: State,
-        starts: Tensor,
+        episode_starts: Tensor,
         uniforms: Tensor | None,
     ) -> AgentStep[FlatRecord]:
         """See `Agent`."""
-        ran = self.run(*one_step(observations), reset_where_done(state, starts))
+        ran = self.run(*one_step(observations), reset_where_done(state, episode_starts))
         log_probs = ran.log_probs[0]
         choice = drawn(log_probs, None if uniforms is None else uniforms[:, 1])
         probs = log_probs.exp()
         inputs = (None if x is None else x[0] for x in (ran.intent, ran.objects, ran.corners))
-        record = FlatRecord(choice, probs, probs[:, DONE], *inputs)
+        record = FlatRecord(choice, probs, probs[:, Action.DONE], *inputs)
         return AgentStep(choice, log_prob_of(log_probs, choice), ran.value[0], record, ran.state)
-
-    def value(self, observations: dict[str, Tensor], state: State) -> Tensor:
-        """See `Agent`."""
-        return self.run(*one_step(observations), state).value[0]
 
     def evaluate(self, batch: Batch[FlatRecord]) -> Evaluated:
         """See `Agent`."""
@@ -146,7 +142,7 @@ class PPOAgent(Agent[FlatRecord]):
 
     def run(
         self,
-        observations: dict[str, Tensor],
+        observations: Observations,
         segments: EpisodeSegments,
         state: State,
         record: FlatRecord | None = None,  # noqa: ARG002 - for those that work out more inputs
@@ -195,7 +191,7 @@ class PPOIntentAgent(PPOAgent):
 
     def run(
         self,
-        observations: dict[str, Tensor],
+        observations: Observations,
         segments: EpisodeSegments,
         state: State,
         record: FlatRecord | None = None,
@@ -230,24 +226,20 @@ class RandomAgent(Agent[StepRecord]):
 
     def act(
         self,
-        observations: dict[str, Tensor],
+        observations: Observations,
         state: State,
-        starts: Tensor,  # noqa: ARG002 - it has no memory
+        episode_starts: Tensor,  # noqa: ARG002 - it has no memory
         uniforms: Tensor | None,
     ) -> AgentStep[StepRecord]:
         """See `Agent`; the most probable action is the first."""
         goal = observations["goal"]
         log_probs = torch.full((len(goal), ACTION_COUNT), -math.log(ACTION_COUNT)).to(goal.device)
         choice = drawn(log_probs, None if uniforms is None else uniforms[:, 1])
-        value = self.value(observations, state)
+        value = goal.new_zeros(len(goal))
         return AgentStep(choice, log_probs[:, 0], value, StepRecord(choice), state)
-
-    def value(self, observations: dict[str, Tensor], state: State) -> Tensor:  # noqa: ARG002
-        """See `Agent`."""
-        return observations["goal"].new_zeros(len(observations["goal"]))
 
     def evaluate(self, batch: Batch[StepRecord]) -> Evaluated:
         """See `Agent`."""
-        nothing = torch.zeros(batch.starts.shape, device=batch.starts.device)
+        nothing = torch.zeros(batch.episode_starts.shape, device=batch.episode_starts.device)
         log = math.log(ACTION_COUNT)
         return Evaluated(nothing - log, nothing, nothing + log, batch.state)

@@ -1,4 +1,4 @@
-"""`camp` and `hrl`: a global policy chooses Navigate, Push and Pick (section 4 of the paper).
+"""`camp` and `hrl`: a global policy chooses the options Navigate, Push and Pick (section 4).
 
 `Hierarchy` is the model itself; `AuxiliaryAgent` trains its action policies one by one in the
 auxiliary tasks (section 5.2). Shapes: T steps, n environments.
@@ -6,58 +6,209 @@ auxiliary tasks (section 5.2). Shapes: T steps, n environments.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import torch
 from torch import Tensor, nn
 
-from internav_data.camp.agents.options import (
-    ACTIONS_OF,
-    DONE,
-    NAVIGATE,
-    OPTION_INPUTS,
-    OPTION_NAMES,
-    OPTIONS,
-    PICK,
-    PUSH,
-    STOP,
-    WAIT,
-    HierarchyRecord,
-    OptionRecord,
-    action_table,
-    initial_probabilities,
-    option_inputs,
-    option_labels,
-    option_step,
-)
 from internav_data.camp.agents.protocol import (
     Agent,
     AgentStep,
     Batch,
     Evaluated,
+    StepRecord,
     one_step,
     reset_where_done,
 )
+from internav_data.camp.config import INTERACTION_ACTIONS
 from internav_data.camp.networks import (
     Encoder,
     IntentConditionedPolicy,
     IntentPolicy,
     RecurrentActorCritic,
+    divergence,
     drawn,
     entropy_of,
     log_prob_of,
     uniform_intent,
 )
-from internav_data.world.actions import ACTION_COUNT
+from internav_data.world.actions import ACTION_COUNT, Action, OptionName, actions_of_option
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from torch.nn import Parameter
 
-    from internav_data.camp.agents.protocol import State
+    from internav_data.camp.agents.protocol import Observations, State
     from internav_data.camp.config import CampConfig
     from internav_data.camp.networks import EpisodeSegments
+
+NAVIGATE, PUSH, PICK, STOP = range(4)
+"""Options in the order of the global policy's logits. STOP executes Done. (0 in a state: no
+interaction is open.)"""
+OPTION_NAMES: Final[tuple[OptionName, ...]] = ("navigate", "push", "pick", "done")
+"""Options by number."""
+OPTIONS: Final = len(OPTION_NAMES)
+OPTION_INPUTS: Final = 3
+"""Number of inputs that tell of the open option; see `option_inputs`."""
+DONE: Final = int(Action.DONE)
+WAIT: Final = int(Action.WAIT)
+"""Action of the step at which an interaction hands control back."""
+ACTIONS_OF: Final[tuple[tuple[int, ...], ...]] = tuple(
+    tuple(int(action) for action in actions_of_option(option)) for option in OPTION_NAMES[:STOP]
+)
+"""Actions of the three policies (table 1), in the order of their logits; Done is the last."""
+# A run of pushes; pickups, drops and the turns between them; anything else.
+_RUNS: Final = re.compile("(?P<push>P+)|(?P<pick>I(?:T*I)*)|(?P<else>.)")
+_LETTERS: Final = {"turn": "T", "push": "P", "pick": "I", "drop": "I"}
+"""Letters in `_RUNS` of the kinds of action."""
+
+
+@dataclass(frozen=True, slots=True)
+class OptionRecord(StepRecord):
+    """Action of an option, and the option's state before it."""
+
+    option: Tensor
+    """Option that acts, int64."""
+    open: Tensor
+    """Interaction that was open before the step; 0 for none, int64."""
+    used: Tensor
+    """Actions that the open interaction has taken, int64."""
+
+
+@dataclass(frozen=True, slots=True)
+class HierarchyRecord(OptionRecord):
+    """Decision of the global policy and action of the option; the later fields are for logs."""
+
+    decide: Tensor
+    """Whether the global policy decided, bool."""
+    intent: Tensor | None = None
+    """P(i), (…, 12 or 4): equation 7."""
+    forced: Tensor | None = None
+    """Whether the interaction was closed by its 11th action, bool."""
+    option_probs: Tensor | None = None
+    """P(omega), (…, 4): equation 5."""
+    intended_option_probs: Tensor | None = None
+    """P(omega'), (…, 4): equation 6."""
+    done_probability: Tensor | None = None
+    """Probability that the step ends the episode."""
+
+    def statistics(self) -> dict[str, float]:
+        """Return the statistics of a rollout's decisions that are logged; see docs/training.md."""
+        decide, found = self.decide, {}
+        for number, name in enumerate(OPTION_NAMES):
+            found[f"share_{name}"] = float((self.option == number).float().mean())
+        found["done_probability"] = 0.0
+        if self.done_probability is not None and decide.any():
+            found["done_probability"] = float(self.done_probability[decide].mean())
+        interacting = (self.option == PUSH) | (self.option == PICK)
+        found["interactions"] = opened = int((interacting & decide).sum())
+        if opened:
+            found["interaction_length"] = float(interacting.sum()) / opened
+        forced = 0 if self.forced is None else int(self.forced.sum())
+        ended = forced + int((interacting & (self.choice == DONE)).sum())
+        if ended:
+            found["forced_share"] = forced / ended
+        chosen, intended = self.option_probs, self.intended_option_probs
+        if chosen is not None and intended is not None and decide.any():
+            found["intent_kl"] = divergence(chosen[decide], intended[decide])
+        return found
+
+
+def initial_probabilities(end: float, interact: float) -> tuple[list[float], list[float]]:
+    """Return the initial probabilities of Navigate's actions and of the options.
+
+    Done by the global policy and Done by Navigate end an episode with probability `end` together,
+    half each; the other options are as 1 - 2 interact - end : interact : interact
+    (.9 : .045 : .045).
+    """
+    weights = [1.0 - 2.0 * interact - end, interact, interact]
+    options = [(1.0 - end / 2.0) * weight / sum(weights) for weight in weights]
+    done = end / 2.0 / options[NAVIGATE]
+    moves = len(ACTIONS_OF[NAVIGATE]) - 1
+    return [(1.0 - done) / moves] * moves + [done], [*options, end / 2.0]
+
+
+def action_log_probs_of(option: int, logits: Tensor, *, may_end: bool = True) -> Tensor:
+    """Return log-probabilities (T, n, 12) of all actions from an option's logits (T, n, k).
+
+    The last of its k actions is Done; if it may not end, Done has no probability.
+    """
+    if not may_end:
+        logits = torch.cat([logits[..., :-1], torch.full_like(logits[..., -1:], -torch.inf)], -1)
+    actions = torch.tensor(ACTIONS_OF[option], device=logits.device)
+    blank = logits.new_full((*logits.shape[:2], ACTION_COUNT), -torch.inf)
+    return blank.index_copy(-1, actions, torch.log_softmax(logits, -1))
+
+
+def option_inputs(opened: Tensor, used: Tensor) -> Tensor:
+    """Return inputs on the open option, (…, 3): Push open, Pick open, actions used / 11.
+
+    The global, intent, Push and Pick policies take them.
+    """
+    parts = (opened == PUSH, opened == PICK, used / INTERACTION_ACTIONS)
+    return torch.stack([part.to(torch.float32) for part in parts], -1)
+
+
+def option_step(
+    option: Tensor, choice: Tensor, used: Tensor
+) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Return the option state after an action; all (n,).
+
+    Done of Push or Pick hands control back, even as the first action; after its 11th action an
+    interaction closes.
+
+    Returns
+    -------
+    open, used
+        Open interaction (0 for none) and the actions that it has used.
+    handed_back, forced
+        Whether the interaction was closed by its Done, or by its 11th action.
+    """
+    interacting = (option == PUSH) | (option == PICK)
+    handed_back = interacting & (choice == DONE)
+    spent = used + 1
+    forced = interacting & ~handed_back & (spent >= INTERACTION_ACTIONS)
+    still = (interacting & ~handed_back & ~forced).to(option.dtype)
+    return option * still, spent * still, handed_back, forced
+
+
+def option_labels(
+    actions: Sequence[int], *, temporally_extended: bool
+) -> tuple[list[int], HierarchyRecord]:
+    """Return an expert's actions as options take them, for cloning.
+
+    A maximal run of pushes is Push; pickups, drops and the rotations between them are Pick; Done is
+    the global policy's; the rest is Navigate. Temporally extended interactions are followed by a
+    hand-back, save one that its 11th action closed.
+
+    Returns
+    -------
+    actions
+        Actions of the environment, L of them, waits included.
+    record
+        Record (L,) of the same steps.
+    """
+    rows: list[tuple[int, int, int, int]] = []  # choice, option, open, used
+    letters = "".join(_LETTERS.get(Action(action).kind, ".") for action in actions)
+    for run in _RUNS.finditer(letters):
+        acting = {"push": PUSH, "pick": PICK}.get(run.lastgroup or "", NAVIGATE)
+        taken = list(actions[run.start() : run.end()])
+        if acting == NAVIGATE:
+            rows.append((taken[0], STOP if taken[0] == DONE else NAVIGATE, NAVIGATE, 0))
+            continue
+        if temporally_extended and len(taken) % INTERACTION_ACTIONS:
+            taken.append(DONE)
+        for number, action in enumerate(taken):
+            spent = number % INTERACTION_ACTIONS if temporally_extended else 0
+            rows.append((action, acting, acting if spent else NAVIGATE, spent))
+    choice, option, opened, used = torch.tensor(rows).reshape(-1, 4).unbind(1)
+    waits = (choice == DONE) & (option != STOP)
+    record = HierarchyRecord(choice, option, opened, used, decide=used == 0)
+    return choice.masked_fill(waits, WAIT).tolist(), record
+
 
 GLOBAL, INTENT, GRUS = 3, 4, 5
 """Hidden states: those of the three action policies, numbered as options are, then these two."""
@@ -94,8 +245,7 @@ class Hierarchy(Agent[HierarchyRecord]):
     """
 
     mask: Tensor
-    table: Tensor
-    tail: Tensor
+    done: Tensor
 
     def __init__(self, config: CampConfig, *, temporally_extended: bool = True) -> None:
         super().__init__()
@@ -121,8 +271,9 @@ class Hierarchy(Agent[HierarchyRecord]):
         mask = torch.zeros(OPTIONS)
         mask[[PUSH if name == "push" else PICK for name in agent.forbidden]] = -torch.inf
         self.register_buffer("mask", mask, persistent=False)
-        self.register_buffer("table", action_table(), persistent=False)
-        self.register_buffer("tail", torch.tensor([-torch.inf, 0.0]), persistent=False)
+        done = torch.full((ACTION_COUNT,), -torch.inf)
+        done[DONE] = 0.0
+        self.register_buffer("done", done, persistent=False)
 
     @property
     def policies(self) -> tuple[RecurrentActorCritic, RecurrentActorCritic, RecurrentActorCritic]:
@@ -138,13 +289,13 @@ class Hierarchy(Agent[HierarchyRecord]):
 
     def act(
         self,
-        observations: dict[str, Tensor],
+        observations: Observations,
         state: State,
-        starts: Tensor,
+        episode_starts: Tensor,
         uniforms: Tensor | None,
     ) -> AgentStep[HierarchyRecord]:
         """See `Agent`."""
-        state = reset_where_done(state, starts)
+        state = reset_where_done(state, episode_starts)
         ran = self.run(*one_step(observations), state, state["open"][None], state["used"][None])
         option_log_probs, action_log_probs = ran.option_log_probs[0], ran.action_log_probs[0]
         first, second = (None, None) if uniforms is None else uniforms.unbind(1)
@@ -168,11 +319,6 @@ class Hierarchy(Agent[HierarchyRecord]):
             choice.masked_fill(handed_back, WAIT), log_prob, ran.value[0], record, after
         )
 
-    def value(self, observations: dict[str, Tensor], state: State) -> Tensor:
-        """See `Agent`."""
-        opened, used = state["open"][None], state["used"][None]
-        return self.run(*one_step(observations), state, opened, used).value[0]
-
     def evaluate(self, batch: Batch[HierarchyRecord]) -> Evaluated:
         """See `Agent`."""
         record = batch.record
@@ -187,7 +333,7 @@ class Hierarchy(Agent[HierarchyRecord]):
 
     def run(
         self,
-        observations: dict[str, Tensor],
+        observations: Observations,
         segments: EpisodeSegments,
         state: State,
         opened: Tensor,
@@ -208,15 +354,12 @@ class Hierarchy(Agent[HierarchyRecord]):
         views = [encoder(observations) for encoder in self.encoders]  # (T, n, size) each
         told = option_inputs(opened, used)
         inputs = [views[0], *(torch.cat([views[k % len(views)], told], -1) for k in (PUSH, PICK))]
-        hidden = list(state["hidden"].unbind(1))
-        logits = []
+        hidden, log_probs = list(state["hidden"].unbind(1)), []
         for k, policy in enumerate(self.policies):
             out, hidden[k] = segments.run(policy.gru, inputs[k], hidden[k])
             may_end = k == NAVIGATE or self.temporally_extended
-            logits.append(self._action_log_probs(policy, out, may_end=may_end))
-        # (T, n, 16 + 2) -> (T, n, 4, 12): the same twelve actions for each option.
-        columns = torch.cat([*logits, self.tail.expand(*told.shape[:2], -1)], -1)
-        acts = columns.index_select(-1, self.table).view(*told.shape[:2], OPTIONS, ACTION_COUNT)
+            log_probs.append(action_log_probs_of(k, policy.actor(out), may_end=may_end))
+        acts = torch.stack([*log_probs, self.done.expand_as(log_probs[0])], -2)  # (T, n, 4, 12)
         features, intended = torch.cat([views[0], told], -1), None
         if not self.uses_intent:
             intent = uniform_intent(features, self.plan.embed.in_features)
@@ -239,14 +382,6 @@ class Hierarchy(Agent[HierarchyRecord]):
         if self.intends_options:
             return intended
         return (intended.unsqueeze(-1) * action_log_probs.exp()).sum(-2)
-
-    def _action_log_probs(
-        self, policy: RecurrentActorCritic, out: Tensor, *, may_end: bool
-    ) -> Tensor:
-        logits: Tensor = policy.actor(out)
-        if not may_end:
-            logits = torch.cat([logits[..., :-1], self.tail[:1].expand(*out.shape[:2], 1)], -1)
-        return torch.log_softmax(logits, -1)
 
     def labels(self, actions: Sequence[int]) -> tuple[list[int], HierarchyRecord]:
         """See `Agent`."""
@@ -299,13 +434,13 @@ class AuxiliaryAgent(Agent[OptionRecord]):
 
     def act(
         self,
-        observations: dict[str, Tensor],
+        observations: Observations,
         state: State,
-        starts: Tensor,
+        episode_starts: Tensor,
         uniforms: Tensor | None,
     ) -> AgentStep[OptionRecord]:
         """See `Agent`."""
-        state = reset_where_done(state, starts)
+        state = reset_where_done(state, episode_starts)
         option, opened, used = self._option, state["open"], state["used"]
         log_probs, value, hidden = self.run(
             *one_step(observations), state, opened[None], used[None]
@@ -317,11 +452,6 @@ class AuxiliaryAgent(Agent[OptionRecord]):
             opened, used = opened * 0, used * 0
         after = {"hidden": hidden, "open": opened, "used": used}
         return AgentStep(choice, log_prob_of(log_probs[0], choice), value[0], record, after)
-
-    def value(self, observations: dict[str, Tensor], state: State) -> Tensor:
-        """See `Agent`; of all environments, in their order."""
-        opened, used = state["open"][None], state["used"][None]
-        return self.run(*one_step(observations), state, opened, used)[1][0]
 
     def evaluate(self, batch: Batch[OptionRecord]) -> Evaluated:
         """See `Agent`."""
@@ -335,7 +465,7 @@ class AuxiliaryAgent(Agent[OptionRecord]):
 
     def run(
         self,
-        observations: dict[str, Tensor],
+        observations: Observations,
         segments: EpisodeSegments,
         state: State,
         opened: Tensor,
@@ -366,23 +496,11 @@ class AuxiliaryAgent(Agent[OptionRecord]):
                 inputs = torch.cat([inputs, option_inputs(opened, used)[:, columns]], -1)
             own = segments.select(columns)
             out, after = own.run(policy.gru, inputs, state["hidden"][columns])
-            actions = torch.tensor(ACTIONS_OF[task], device=out.device)
-            own_log_probs = torch.log_softmax(policy.actor(out), -1).to(log_probs.dtype)
-            padded = log_probs[:, columns].index_copy(-1, actions, own_log_probs)
-            log_probs = log_probs.index_copy(1, columns, padded)
+            own_log_probs = action_log_probs_of(task, policy.actor(out))
+            log_probs = log_probs.index_copy(1, columns, own_log_probs)
             value = value.index_copy(1, columns, policy.value(out))
             hidden = hidden.index_copy(0, columns, after)
         return log_probs, value, hidden
-
-    def labels(self, actions: Sequence[int]) -> tuple[list[int], OptionRecord]:
-        """Refuse: experts are cloned into whole agents.
-
-        Raises
-        ------
-        NotImplementedError
-            Always.
-        """
-        raise NotImplementedError("auxiliary tasks have no expert: clone into the hierarchy")
 
     def optimised(self) -> list[Parameter]:
         """See `Agent`: encoders and policies that have environments, critics too."""
@@ -398,8 +516,7 @@ class AuxiliaryAgent(Agent[OptionRecord]):
 
 def _of_option(action_log_probs: Tensor, option: Tensor) -> Tensor:
     """Return the log-probabilities (…, 12) of the option that acts, of (…, 4, 12)."""
-    index = option[..., None, None].expand(*option.shape, 1, ACTION_COUNT)
-    return action_log_probs.gather(-2, index).squeeze(-2)
+    return action_log_probs.take_along_dim(option[..., None, None], -2).squeeze(-2)
 
 
 def _log_prob(

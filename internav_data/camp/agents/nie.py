@@ -23,7 +23,7 @@ from internav_data.records.errors import UsageError
 from internav_data.world.actions import ACTION_COUNT, HORIZONS_DEG
 
 if TYPE_CHECKING:
-    from internav_data.camp.agents.protocol import Batch, Evaluated, State
+    from internav_data.camp.agents.protocol import Batch, Evaluated, Observations, State
     from internav_data.camp.config import CampConfig
     from internav_data.camp.networks import EpisodeSegments
 
@@ -49,7 +49,7 @@ class NIEAgent(PPOAgent):
 
     def run(
         self,
-        observations: dict[str, Tensor],
+        observations: Observations,
         segments: EpisodeSegments,
         state: State,
         record: FlatRecord | None = None,
@@ -59,9 +59,7 @@ class NIEAgent(PPOAgent):
         inputs = self.summarised(self.encoder(observations), objects, corners)
         return self.decide(inputs, segments, state)._replace(objects=objects, corners=corners)
 
-    def sight(
-        self, observations: dict[str, Tensor], record: FlatRecord | None
-    ) -> tuple[Tensor, Tensor]:
+    def sight(self, observations: Observations, record: FlatRecord | None) -> tuple[Tensor, Tensor]:
         """Return objects (T, n, K) and corners (T, n, K, 8, 3), recorded or found anew."""
         if record is None or record.objects is None or record.corners is None:
             return self.sighted(observations)
@@ -93,13 +91,13 @@ class NIEAgent(PPOAgent):
         ahead = self.predicted(self.object(corners.flatten(-2)), corners)
         ahead = ahead.take_along_dim(index, -3).squeeze(-3)  # after the action that was taken
         same = objects[:-1, :, :, None] == objects[1:, :, None, :]
-        same &= (objects[:-1, :, :, None] >= 0) & ~batch.starts[1:, :, None, None]
+        same &= (objects[:-1, :, :, None] >= 0) & ~batch.episode_starts[1:, :, None, None]
         apart = (ahead[:-1, :, :, None] - corners[1:, :, None]).abs().mean((-1, -2))
         loss = (apart * same).sum((-1, -2)) / same.sum((-1, -2)).clamp(min=1)
         return replace(found, loss=self._weight * functional.pad(loss, (0, 0, 0, 1)))
 
     @torch.no_grad()
-    def sighted(self, observations: dict[str, Tensor]) -> tuple[Tensor, Tensor]:
+    def sighted(self, observations: Observations) -> tuple[Tensor, Tensor]:
         """Return the nearest objects in sight: ids (T, n, K), -1 for none; corners (T, n, K, 8, 3).
 
         Corners are those of the box round an object's visible points, in metres from the eye.

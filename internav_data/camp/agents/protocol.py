@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
     from torch.nn import Parameter
 
+Observations = dict[str, Tensor]
+"""Observations by sensor: tensors (n, …), or (T, n, …) of several steps."""
 State = dict[str, Tensor]
 """Memory of each environment's episode: tensors (n, …) by name; zeros at its start."""
 
@@ -79,9 +81,9 @@ class AgentStep(Generic[R]):
 class Batch(Generic[R]):
     """Steps of some environments, to be evaluated once more."""
 
-    observations: dict[str, Tensor]
+    observations: Observations
     """(T, n, …) by sensor."""
-    starts: Tensor
+    episode_starts: Tensor
     """(T, n) bool: an episode begins at this step."""
     state: State
     """(n, …): memory before the first step."""
@@ -91,13 +93,13 @@ class Batch(Generic[R]):
     @cached_property
     def segments(self) -> EpisodeSegments:
         """Episode segments that GRUs run over."""
-        return EpisodeSegments(self.starts)
+        return EpisodeSegments(self.episode_starts)
 
     def select(self, columns: Tensor) -> Batch[R]:
         """Return the steps of some environments, by number (m,)."""
         return Batch(
             {name: values[:, columns] for name, values in self.observations.items()},
-            self.starts[:, columns],
+            self.episode_starts[:, columns],
             {name: values[columns] for name, values in self.state.items()},
             self.record.map(lambda values: values[:, columns]),
         )
@@ -141,9 +143,9 @@ class Agent(nn.Module, ABC, Generic[R]):
     @abstractmethod
     def act(
         self,
-        observations: dict[str, Tensor],
+        observations: Observations,
         state: State,
-        starts: Tensor,
+        episode_starts: Tensor,
         uniforms: Tensor | None,
     ) -> AgentStep[R]:
         """Choose actions; gradients are not needed.
@@ -154,16 +156,19 @@ class Agent(nn.Module, ABC, Generic[R]):
             Tensors (n, …) by sensor.
         state
             Memory after the step before.
-        starts : (n,) bool
+        episode_starts : (n,) bool
             Environments whose episode begins: their memory is cleared.
         uniforms : (n, 2)
             Random numbers in [0, 1) that options and actions are drawn by; None for the most
             probable.
         """
 
-    @abstractmethod
-    def value(self, observations: dict[str, Tensor], state: State) -> Tensor:
+    def value(self, observations: Observations, state: State) -> Tensor:
         """Return the critic's values (n,) of observations (n, …) after `state`."""
+        episode_starts = torch.zeros(
+            len(observations["goal"]), dtype=torch.bool, device=self.device
+        )
+        return self.act(observations, state, episode_starts, None).value
 
     @abstractmethod
     def evaluate(self, batch: Batch[R]) -> Evaluated:
@@ -211,18 +216,16 @@ class Agent(nn.Module, ABC, Generic[R]):
         return other
 
 
-def reset_where_done(state: State, starts: Tensor) -> State:
-    """Return a memory (n, …) that is zero where an episode begins; starts (n,) bool."""
+def reset_where_done(state: State, episode_starts: Tensor) -> State:
+    """Return a memory (n, …) that is zero where an episode begins; episode_starts (n,) bool."""
     return {
-        name: values.masked_fill(starts.reshape(-1, *[1] * (values.ndim - 1)), 0)
+        name: values.masked_fill(episode_starts.reshape(-1, *[1] * (values.ndim - 1)), 0)
         for name, values in state.items()
     }
 
 
-def one_step(observations: dict[str, Tensor]) -> tuple[dict[str, Tensor], EpisodeSegments]:
+def one_step(observations: Observations) -> tuple[Observations, EpisodeSegments]:
     """Return observations (n, …) as (1, n, …), and the segments of a step without a start."""
     goal = observations["goal"]
-    starts = torch.zeros(1, len(goal), dtype=torch.bool, device=goal.device)
-    return {name: values.unsqueeze(0) for name, values in observations.items()}, EpisodeSegments(
-        starts
-    )
+    segments = EpisodeSegments(torch.zeros(1, len(goal), dtype=torch.bool, device=goal.device))
+    return {name: values.unsqueeze(0) for name, values in observations.items()}, segments
