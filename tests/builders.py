@@ -27,6 +27,9 @@ from internav_data.records import (
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from internav_data.records import RGB, Quaternion, Vec2, Vec3
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -156,6 +159,14 @@ def rug() -> Asset:
     """Return a rug, which blocks nothing."""
     made = crate("Rug_0", (2.0, 1.4, 0.01), colour=(170, 120, 110))
     return replace(made, pushable=False, spawnable=False, blocks=False)
+
+
+def bounds_of(asset: Asset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lowest and highest corner of an asset's bounding box: two (3,) float64, metres."""
+    from internav_data.geometry import asset_corners
+
+    corners, _ = asset_corners(asset)
+    return corners.min(axis=0), corners.max(axis=0)
 
 
 def by_id(*assets: Asset) -> Mapping[str, Asset]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -93,12 +92,6 @@ class GenerationConfig:
         plan = self.house.floor_plan
         values["house"]["floor_plan"] = None if plan is None else _sha256_of(Path(plan))
         return values
-
-
-def identity_digest(identity: dict[str, Any]) -> str:
-    """Return the SHA-256 of a config's identity."""
-    text = json.dumps(identity, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def load_config(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from typing import TextIO
 
@@ -58,8 +57,3 @@ class GenerationProgress(ProgressLine):
         """Write the state if it is time for an update."""
         if self.due():
             self.update(self.line())
-
-
-def to_stderr() -> GenerationProgress:
-    """Return a progress line on stderr."""
-    return GenerationProgress(sys.stderr)

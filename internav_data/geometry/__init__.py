@@ -15,16 +15,14 @@ from internav_data.geometry.poses import (
     round_m,
     round_quaternion,
     transform,
-    yaw_of,
     yaw_quaternion,
 )
-from internav_data.geometry.solids import asset_bounds, asset_corners, centre_of_mass, part_corners
+from internav_data.geometry.solids import asset_corners, centre_of_mass, part_corners
 
 __all__ = [
     "HIGHEST_M",
     "LOWEST_M",
     "Polygons",
-    "asset_bounds",
     "asset_corners",
     "centre_of_mass",
     "clearance",
@@ -37,6 +35,5 @@ __all__ = [
     "round_quaternion",
     "transform",
     "wall_footprints",
-    "yaw_of",
     "yaw_quaternion",
 ]

@@ -39,12 +39,6 @@ def yaw_quaternion(yaw_deg: float) -> Quaternion:
     return round_quaternion((0.0, 0.0, math.sin(half), math.cos(half)))
 
 
-def yaw_of(quaternion: Quaternion) -> float:
-    """Return the yaw of a rotation, degrees in (-180, 180]: the heading of the rotated x axis."""
-    x, y, z, w = quaternion
-    return math.degrees(math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
-
-
 def multiply(first: Quaternion, second: Quaternion) -> Quaternion:
     """Return the Hamilton product: the rotation by `second`, then by `first`."""
     ax, ay, az, aw = first

@@ -75,12 +75,6 @@ def asset_corners(asset: Asset) -> tuple[NDArray[np.float64], NDArray[np.int64]]
     return stacked, offsets
 
 
-def asset_bounds(asset: Asset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the lowest and highest corner of the bounding box: two (3,) float64, metres."""
-    corners, _ = asset_corners(asset)
-    return corners.min(axis=0), corners.max(axis=0)
-
-
 def _hull_mass(points: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
     """Return the volume (m³) and centroid (3,) of the hull of points (n, 3), metres.
 

@@ -100,11 +100,6 @@ def dop8_of_rectangle(low_x: float, low_y: float, high_x: float, high_y: float) 
     )
 
 
-def dop8_of_disc(x: float, y: float, radius: float) -> Dop8:
-    """Return the 8-DOP of a disc, metres."""
-    return grown((x, x + y, y, y - x, -x, -x - y, -y, x - y), radius)
-
-
 def dop8_of_square(x: float, y: float, half: float) -> Dop8:
     """Return the 8-DOP of an axis-aligned square with sides of 2 · `half` metres."""
     return dop8_of_rectangle(x - half, y - half, x + half, y + half)

@@ -7,8 +7,6 @@ from collections import Counter
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Literal
 
-from internav_data.records.errors import ValidationError
-
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -79,19 +77,6 @@ class Findings:
     def to_json(self) -> str:
         """Return the whole result as a JSON object."""
         return json.dumps({"ok": self.ok, **asdict(self)}, indent=2)
-
-    def raise_if_any(self) -> None:
-        """Raise an error that names the first finding, if there is one.
-
-        Raises
-        ------
-        ValidationError
-            There is at least one finding.
-
-        """
-        if not self.ok:
-            rest = f" (and {self.total - 1} more)" if self.total > 1 else ""
-            raise ValidationError(f"{self.found[0]}{rest}; generate the dataset again")
 
 
 class FindingCollector:

@@ -5,6 +5,7 @@ import statistics
 
 import numpy as np
 import pytest
+from builders import bounds_of
 from scipy.spatial import ConvexHull
 
 from internav_data.catalog import ASSET_TYPES, FURNITURE, OBSTACLES, catalogue, split_of_asset
@@ -12,7 +13,7 @@ from internav_data.catalog.asset_types import by_name
 from internav_data.catalog.collection import VERSION, own_assets
 from internav_data.catalog.digest import digest_of
 from internav_data.catalog.drawing import draw_type, from_share
-from internav_data.geometry import asset_bounds, asset_corners, centre_of_mass
+from internav_data.geometry import asset_corners, centre_of_mass
 
 # Content of the released catalogue. A change of any design needs a new VERSION and a new digest.
 GOLDEN = "d2638562630dc7501d1653e77b29538676f64aa077e53315d9bea479744f7ddf"
@@ -165,7 +166,7 @@ def test_mass_grows_with_volume_around_the_sheets(kind):
 @pytest.mark.parametrize("type_", ASSET_TYPES)
 def test_bounds_are_the_size_exactly(type_):
     for asset in catalogue().of_type(type_):
-        low, high = asset_bounds(asset)
+        low, high = bounds_of(asset)
         w, d, h = asset.size
         np.testing.assert_allclose(low, (-w / 2, -d / 2, 0.0), atol=1e-6, err_msg=asset.asset_id)
         np.testing.assert_allclose(high, (w / 2, d / 2, h), atol=1e-6, err_msg=asset.asset_id)

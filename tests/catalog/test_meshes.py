@@ -2,13 +2,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from builders import bounds_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 from internav_data.catalog import ASSET_TYPES, asset_mesh, catalogue, part_triangles
 from internav_data.catalog.shapes import Paint, Sketch
-from internav_data.geometry import asset_bounds, part_corners
+from internav_data.geometry import part_corners
 
 PAINT = Paint((1, 2, 3), "wood")
 
@@ -21,7 +22,7 @@ def volume(vertices, faces):
 @pytest.mark.parametrize("type_", ASSET_TYPES)
 def test_parts_are_solid_convex_and_wound_outwards(type_):
     for asset in catalogue().of_type(type_)[:8]:
-        low, high = asset_bounds(asset)
+        low, high = bounds_of(asset)
         for part in asset.parts:
             vertices, faces = part_triangles(part)
             hull = ConvexHull(part_corners(part))

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import bounds_of
 
 from internav_data.catalog import catalogue, load_user_assets, split_of_asset, user_assets
-from internav_data.geometry import asset_bounds
 from internav_data.records.errors import UsageError
 
 pybullet_data = pytest.importorskip("pybullet_data")
@@ -30,7 +30,7 @@ def folder(tmp_path, name="thing.obj", toml="", mesh=None):
 
 
 def check(asset):
-    low, high = asset_bounds(asset)
+    low, high = bounds_of(asset)
     w, d, h = asset.size
     np.testing.assert_allclose(low, (-w / 2, -d / 2, 0.0), atol=1e-6)
     np.testing.assert_allclose(high, (w / 2, d / 2, h), atol=1e-6)

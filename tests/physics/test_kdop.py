@@ -12,7 +12,6 @@ from internav_data.geometry.headings import turned
 from internav_data.physics.frames import Frame
 from internav_data.physics.kdop import (
     EMPTY,
-    dop8_of_disc,
     dop8_of_rectangle,
     grown,
     overlap,
@@ -82,13 +81,6 @@ def test_a_margin_reaches_all_within_it(one, other, margin):
     a = grown(dop8_of(one), margin)
     assert overlap(a, dop8_of(other)) or one.distance(other) >= margin - 1e-6
     assert polygon_of(a).buffer(1e-6).covers(one.buffer(margin))
-
-
-@given(SPOTS, SPOTS, st.floats(0.01, 1.0))
-def test_a_disc_lies_inside_its_octagon_and_touches_all_sides(x, y, radius):
-    dop8 = dop8_of_disc(x, y, radius)
-    for (nx, ny), far in zip(NORMALS, dop8, strict=True):
-        assert abs(nx * x + ny * y + radius * math.hypot(nx, ny) - far) < NEARLY
 
 
 @given(SPOTS, SPOTS, st.floats(0.0, 2.0), st.floats(0.0, 2.0))

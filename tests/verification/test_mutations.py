@@ -1,6 +1,7 @@
 """A valid dataset is broken in one place at a time; the validator must name what broke."""
 
 import json
+import re
 from dataclasses import replace
 
 import pytest
@@ -9,7 +10,7 @@ from scenery import ASSETS, obstacle, small_scenes, write_dataset
 
 from internav_data.dataset import read_manifest, write_manifest
 from internav_data.records import Pose
-from internav_data.records.errors import CorruptDataError, UsageError, ValidationError
+from internav_data.records.errors import CorruptDataError, UsageError
 from internav_data.verification import validate
 
 
@@ -37,7 +38,6 @@ def test_valid_dataset_is_valid_at_every_level(dataset):
     assert findings.checked["episodes"] == 6
     assert "valid" in findings.summary()
     assert json.loads(findings.to_json())["ok"] is True
-    findings.raise_if_any()
 
 
 def test_workers_and_progress_change_nothing(dataset, monkeypatch):
@@ -82,8 +82,7 @@ def test_one_byte_changed(dataset):
     findings = validate(dataset)
     assert "files.sha256" in predicates(findings)
     assert all(f.file == path.relative_to(dataset).as_posix() for f in findings.found)
-    with pytest.raises(ValidationError, match=r"episodes/.*sha256|files\."):
-        findings.raise_if_any()
+    assert re.search(r"episodes/.*sha256|files\.", str(findings.found[0]))
 
 
 def test_every_byte_of_a_shard_is_watched(dataset):
