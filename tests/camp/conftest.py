@@ -5,6 +5,8 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
+from internav_data.world.actions import ACTION_COUNT
+
 
 @pytest.fixture(autouse=True)
 def _one_thread():
@@ -50,7 +52,7 @@ class FakeEnvironments:
 
     def step(self, actions):
         assert actions.shape == (self.num_envs,)
-        assert ((actions >= -1) & (actions < 12)).all()
+        assert ((actions >= -1) & (actions < ACTION_COUNT)).all()
         self.actions.append(actions.copy())
         self._ages += 1
         ended = (actions == 11) & self._done_ends

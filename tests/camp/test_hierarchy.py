@@ -21,8 +21,9 @@ from internav_data.camp.agents.hierarchy import (  # noqa: E402
 from internav_data.camp.agents.protocol import Agent  # noqa: E402
 from internav_data.camp.rollout import Collector, uniforms_of  # noqa: E402
 from internav_data.records.errors import UsageError  # noqa: E402
+from internav_data.world.actions import ACTION_COUNT  # noqa: E402
 
-ALLOWED = torch.zeros(4, 12, dtype=torch.bool)
+ALLOWED = torch.zeros(4, ACTION_COUNT, dtype=torch.bool)
 for _option, _actions in enumerate((*ACTIONS_OF, (DONE,))):
     ALLOWED[_option, list(_actions)] = True
 
@@ -77,7 +78,7 @@ def test_the_mixture_is_equation_7_by_hand(collected):
         record.intended_option_probs.double().numpy(),
         ran.action_log_probs.exp().detach().double().numpy(),
     )
-    right = np.zeros((8, 4, 12))
+    right = np.zeros((8, 4, ACTION_COUNT))
     for t in range(8):
         for k in range(4):
             for option, actions in enumerate((*ACTIONS_OF, (DONE,))):
@@ -326,10 +327,10 @@ def test_without_intent_the_trained_model_is_fed_the_plane(collected, method):
     assert agent.uses_intent
     assert {id(p) for p in plain.parameters()} == {id(p) for p in agent.parameters()}
     batch = rollout.batch
-    batch = with_intent(batch, torch.full((8, 4, 12), 1.0 / 12))
+    batch = with_intent(batch, torch.full((8, 4, ACTION_COUNT), 1.0 / ACTION_COUNT))
     right = agent.evaluate(batch).value
     torch.testing.assert_close(plain.evaluate(batch).value, right)
-    batch = with_intent(batch, torch.eye(12)[torch.zeros(8, 4, dtype=torch.int64)])
+    batch = with_intent(batch, torch.eye(ACTION_COUNT)[torch.zeros(8, 4, dtype=torch.int64)])
     torch.testing.assert_close(plain.evaluate(batch).value, right)
     assert not torch.allclose(agent.evaluate(batch).value, right)
 
@@ -345,7 +346,7 @@ def test_recursive_intent_is_the_intent_policy_run_on_its_own_first_intent(colle
     record, batch = rollout.batch.record, rollout.batch
     at = {name: what[:1] for name, what in batch.observations.items()}
     inputs = torch.cat([agent.encoders[0](at), torch.zeros(1, 4, 3)], -1)
-    mind, intent = agent.intent, torch.full((1, 4, 12), 1.0 / 12)
+    mind, intent = agent.intent, torch.full((1, 4, ACTION_COUNT), 1.0 / ACTION_COUNT)
     acts = ran_of(agent, batch).action_log_probs[:1].exp()
     for _ in range(2):
         out, _ = mind.gru(torch.cat([inputs, mind.embed(intent)], -1))  # from zeros, twice

@@ -159,7 +159,11 @@ def test_processes_have_the_same_tasks(scenes, tasks):
         for acts in ([0, 1, 5, 6, 9, 9], [11] * 6):
             ours, theirs = whole.step(np.array(acts)), two.step(np.array(acts))
             np.testing.assert_array_equal(ours[1], theirs[1])
-            assert ours[4].get("metrics", {}).keys() == theirs[4].get("metrics", {}).keys()
+            own, other = (infos.get("metrics", {}) for infos in (ours[4], theirs[4]))
+            assert own.keys() == other.keys()
+            for name, value in own.items():
+                np.testing.assert_array_equal(value, other[name])
+        assert own, "all have ended"
         seen, *_ = theirs
         np.testing.assert_array_equal(seen["rgb"], ours[0]["rgb"])
     finally:
@@ -187,7 +191,10 @@ def test_a_share_of_the_environments_is_that_part_of_all(tasks):
         np.testing.assert_array_equal(array[3:], theirs[name])
 
 
-def test_who_has_nothing_to_learn_from_is_told(scenes):
-    data = load_dataset(scenes, "train", [("obstacle_count", "<", 0)])
-    with pytest.raises(UsageError):
+def test_a_dataset_without_an_obstacle_to_push_is_refused(scenes):
+    data = load_dataset(scenes, "train")
+    plain = [e.episode_id for e in data if not any(o.pushable for o in e.obstacles)]
+    assert plain
+    data = load_dataset(scenes, "train", [("episode_id", "in", plain)])
+    with pytest.raises(UsageError, match="no obstacle to learn to push"):
         InterNavVectorEnv(1, data, 16, task="push").reset(seed=0)

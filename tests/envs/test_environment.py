@@ -165,7 +165,7 @@ def test_metrics_agree_with_another_count(small):
     house = dataset.scene(episode.scene_id)
     world = World.of_episode(HouseModel.of(house), episode, dataset.assets)
     ways, goal = TangentGraph.of(house), (episode.goal.x, episode.goal.y)
-    path, drops, total = 0.0, 0.0, 0.0
+    path, drops, total, interactions = 0.0, 0.0, 0.0, 0
     chosen = [a for a in actions(11, 150).tolist() if a != Action.DONE]
     for action in chosen:
         spot, steps = world.position, world.steps()
@@ -176,6 +176,7 @@ def test_metrics_agree_with_another_count(small):
             expected += ways.distance(spot, goal) - ways.distance(world.position, goal)
         elif action in range(5, 11) and result.success:
             now = world.steps()
+            interactions += 1
             if steps is not None and now is not None:
                 drops += 0.25 * (steps - now)
                 expected += 0.25 * (steps - now)
@@ -187,6 +188,8 @@ def test_metrics_agree_with_another_count(small):
         assert reward == pytest.approx(expected, abs=2e-4), Action(action).name
         total += reward
     *_, info = env.step(int(Action.DONE))
+    assert interactions > 0
+    assert path > 0.0
     said = info["metrics"]
     assert said["path_m"] == pytest.approx(path)
     assert said["interaction_reward_m"] == pytest.approx(drops)
