@@ -41,7 +41,9 @@ def small_run(tmp_path_factory):
 
 def test_generated_texts_are_up_to_date():
     updated = runpy.run_path(str(ROOT / "docs" / "update.py"))["updated"]
-    for path, text in updated().items():
+    texts = updated()
+    assert texts
+    for path, text in texts.items():
         assert path.read_text() == text, "run `python docs/update.py`"
 
 
@@ -60,14 +62,24 @@ def test_python_in_the_docs_runs(page, small_dataset, small_run, monkeypatch):
         exec(compile(code, page.name, "exec"), {})  # noqa: S102 - our own words
 
 
+def commands_in(page):
+    """Command lines of ours in a page."""
+    text = re.sub(r"(?m)^torchrun .* -m internav_cli\.camp_train", "camp-train", page.read_text())
+    return re.findall(r"^(?:internav-gen|camp-eval|camp-train) .*$", text, re.MULTILINE)
+
+
+def test_pages_have_commands_and_links():
+    assert sum(len(commands_in(page)) for page in PAGES) > 20
+    assert sum(page.read_text().count("](") for page in PAGES) > 20
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_commands_in_the_docs_exist_with_their_options(page):
     from click.testing import CliRunner
     from internav_cli import camp_eval, camp_train
     from internav_cli.main import cli
 
-    text = re.sub(r"(?m)^torchrun .* -m internav_cli\.camp_train", "camp-train", page.read_text())
-    for line in re.findall(r"^(?:internav-gen|camp-eval|camp-train) .*$", text, re.MULTILINE):
+    for line in commands_in(page):
         words = re.split(r" +#|[|]|> ", line)[0].split()
         command, path = {
             "internav-gen": (cli, words[1:2]),

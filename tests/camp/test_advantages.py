@@ -19,7 +19,6 @@ def _one(rewards, values, last, terminated, truncated, final, gamma=0.99, gae_la
 
 
 REWARDS, VALUES = [1.0, -0.01, 0.5, 10.0, 0.2], [0.5, 0.4, 0.3, 0.2, 0.1]
-NEVER = [False] * 5
 FINAL = [0.0, 0.7, 0.0, 0.0, 0.0]
 
 

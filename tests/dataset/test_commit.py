@@ -255,6 +255,7 @@ def test_tuples_in_a_configuration_are_lists_on_disk(tmp_path):
     build(tmp_path, range(2))
     assemble(tmp_path, IDENTITY, ASSETS, 2)
     open_staging(tmp_path, same)
+    assert done_scenes(tmp_path) == frozenset(range(2)), "nothing is made again"
 
 
 def test_foreign_folder_and_file_are_refused_untouched(tmp_path):

@@ -9,7 +9,7 @@ from dataclasses import replace
 import physical
 import pytest
 import scenery
-from builders import asset, part, scene_object
+from builders import UPRIGHT, asset, part, scene_object
 from scenery import ASSETS, Grid, brute_steps, write_dataset
 
 import internav_data.world.world
@@ -347,7 +347,7 @@ def test_what_leans_through_a_window_is_not_in_the_wall(scenes):
     for through, sills in ((house, 0), (replace(house, walls=(*walls, sill, lintel)), 1)):
         scene = CheckedScene(CheckedLayout(through, Shapes(assets)), FORCE)
         for z, inside in ((0.5, True), (0.925, False), (1.5, False), (2.2, True)):
-            pose = Pose(x, y, z, (0.0, 0.0, 0.0, 1.0))
+            pose = Pose(x, y, z, UPRIGHT)
             assert scene.overlaps_walls("Board", pose, 0.01) == (inside or not sills)
 
 
@@ -357,7 +357,7 @@ def test_what_carries_something_is_not_picked_up(scenes):
     assets = {**ASSETS, "Bar_1": asset("Bar_1", tall, size=(0.3, 0.4, 0.6), mass_kg=8.0)}
 
     def at(asset_id, x):
-        return MovableObject.of(Body.of(assets[asset_id], Pose(x, 2.0, 0.0, (0.0, 0.0, 0.0, 1.0))))
+        return MovableObject.of(Body.of(assets[asset_id], Pose(x, 2.0, 0.0, UPRIGHT)))
 
     outcome = episodes[0].obstacles[0].outcomes[4]
     scene = CheckedScene(CheckedLayout(house, Shapes(assets)), FORCE)
