@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from internav_data.camp.config import CampConfig
-    from internav_data.camp.train import Callback, Request
+    from internav_data.camp.train import Request, RowCallback
 
 CONFIG: Final = "config.toml"
 """File of a run's resolved settings, for people and for `--config`."""
@@ -28,7 +28,9 @@ _MEASURED: Final = 2
 
 
 def begin(
-    request: Request, callback: Callback | None = None, interrupted: Callable[[], int] = lambda: 0
+    request: Request,
+    callback: RowCallback | None = None,
+    interrupted: Callable[[], int] = lambda: 0,
 ) -> Trainer:
     """Train a new run to its end; see `Trainer` for the last two arguments.
 
@@ -56,7 +58,7 @@ def begin(
 def resume(
     request: Request,
     asked: Mapping[str, Any],
-    callback: Callback | None = None,
+    callback: RowCallback | None = None,
     interrupted: Callable[[], int] = lambda: 0,
 ) -> Trainer:
     """Train a run to its end from its last checkpoint.

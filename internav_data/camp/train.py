@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from internav_data.camp.rollout import Rollout
     from internav_data.camp.stages import TrainingStage
 
-    Callback = Callable[[Row], object]
+    RowCallback = Callable[[Row], object]
     """Function that is called with every row of the log."""
 
 INTERRUPTED: Final = "saved; go on with --resume"
@@ -110,7 +110,7 @@ class Trainer:
         request: Request,
         state: TrainState,
         checkpoint: Checkpoint | None = None,
-        callback: Callback | None = None,
+        callback: RowCallback | None = None,
         interrupted: Callable[[], int] = lambda: 0,
     ) -> None:
         self.run, self.method, self.config = request.out, request.method, request.config

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from torch.nn import Parameter
 
-    from internav_data.camp.agents.protocol import Observations, State
+    from internav_data.camp.agents.protocol import ObservationTensors, State
     from internav_data.camp.config import CampConfig
     from internav_data.camp.networks import EpisodeSegments
 
@@ -112,7 +112,7 @@ class PPOAgent(Agent[FlatRecord]):
 
     def act(
         self,
-        observations: Observations,
+        observations: ObservationTensors,
         state: State,
         episode_starts: Tensor,
         uniforms: Tensor | None,
@@ -142,7 +142,7 @@ class PPOAgent(Agent[FlatRecord]):
 
     def run(
         self,
-        observations: Observations,
+        observations: ObservationTensors,
         segments: EpisodeSegments,
         state: State,
         record: FlatRecord | None = None,  # noqa: ARG002 - for those that work out more inputs
@@ -191,7 +191,7 @@ class PPOIntentAgent(PPOAgent):
 
     def run(
         self,
-        observations: Observations,
+        observations: ObservationTensors,
         segments: EpisodeSegments,
         state: State,
         record: FlatRecord | None = None,
@@ -226,7 +226,7 @@ class RandomAgent(Agent[StepRecord]):
 
     def act(
         self,
-        observations: Observations,
+        observations: ObservationTensors,
         state: State,
         episode_starts: Tensor,  # noqa: ARG002 - it has no memory
         uniforms: Tensor | None,

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
     from torch.nn import Parameter
 
-    from internav_data.camp.agents.protocol import Observations, State
+    from internav_data.camp.agents.protocol import ObservationTensors, State
     from internav_data.camp.config import CampConfig
     from internav_data.camp.networks import EpisodeSegments
 
@@ -289,7 +289,7 @@ class Hierarchy(Agent[HierarchyRecord]):
 
     def act(
         self,
-        observations: Observations,
+        observations: ObservationTensors,
         state: State,
         episode_starts: Tensor,
         uniforms: Tensor | None,
@@ -333,7 +333,7 @@ class Hierarchy(Agent[HierarchyRecord]):
 
     def run(
         self,
-        observations: Observations,
+        observations: ObservationTensors,
         segments: EpisodeSegments,
         state: State,
         opened: Tensor,
@@ -434,7 +434,7 @@ class AuxiliaryAgent(Agent[OptionRecord]):
 
     def act(
         self,
-        observations: Observations,
+        observations: ObservationTensors,
         state: State,
         episode_starts: Tensor,
         uniforms: Tensor | None,
@@ -465,7 +465,7 @@ class AuxiliaryAgent(Agent[OptionRecord]):
 
     def run(
         self,
-        observations: Observations,
+        observations: ObservationTensors,
         segments: EpisodeSegments,
         state: State,
         opened: Tensor,

@@ -23,7 +23,7 @@ from internav_data.records.errors import UsageError
 from internav_data.world.actions import ACTION_COUNT, HORIZONS_DEG
 
 if TYPE_CHECKING:
-    from internav_data.camp.agents.protocol import Batch, Evaluated, Observations, State
+    from internav_data.camp.agents.protocol import Batch, Evaluated, ObservationTensors, State
     from internav_data.camp.config import CampConfig
     from internav_data.camp.networks import EpisodeSegments
 
@@ -49,7 +49,7 @@ class NIEAgent(PPOAgent):
 
     def run(
         self,
-        observations: Observations,
+        observations: ObservationTensors,
         segments: EpisodeSegments,
         state: State,
         record: FlatRecord | None = None,
@@ -59,7 +59,9 @@ class NIEAgent(PPOAgent):
         inputs = self.summarised(self.encoder(observations), objects, corners)
         return self.decide(inputs, segments, state)._replace(objects=objects, corners=corners)
 
-    def sight(self, observations: Observations, record: FlatRecord | None) -> tuple[Tensor, Tensor]:
+    def sight(
+        self, observations: ObservationTensors, record: FlatRecord | None
+    ) -> tuple[Tensor, Tensor]:
         """Return objects (T, n, K) and corners (T, n, K, 8, 3), recorded or found anew."""
         if record is None or record.objects is None or record.corners is None:
             return self.sighted(observations)
@@ -97,7 +99,7 @@ class NIEAgent(PPOAgent):
         return replace(found, loss=self._weight * functional.pad(loss, (0, 0, 0, 1)))
 
     @torch.no_grad()
-    def sighted(self, observations: Observations) -> tuple[Tensor, Tensor]:
+    def sighted(self, observations: ObservationTensors) -> tuple[Tensor, Tensor]:
         """Return the nearest objects in sight: ids (T, n, K), -1 for none; corners (T, n, K, 8, 3).
 
         Corners are those of the box round an object's visible points, in metres from the eye.

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from torch.nn import Parameter
 
-Observations = dict[str, Tensor]
+ObservationTensors = dict[str, Tensor]
 """Observations by sensor: tensors (n, …), or (T, n, …) of several steps."""
 State = dict[str, Tensor]
 """Memory of each environment's episode: tensors (n, …) by name; zeros at its start."""
@@ -81,7 +81,7 @@ class AgentStep(Generic[R]):
 class Batch(Generic[R]):
     """Steps of some environments, to be evaluated once more."""
 
-    observations: Observations
+    observations: ObservationTensors
     """(T, n, …) by sensor."""
     episode_starts: Tensor
     """(T, n) bool: an episode begins at this step."""
@@ -143,7 +143,7 @@ class Agent(nn.Module, ABC, Generic[R]):
     @abstractmethod
     def act(
         self,
-        observations: Observations,
+        observations: ObservationTensors,
         state: State,
         episode_starts: Tensor,
         uniforms: Tensor | None,
@@ -163,7 +163,7 @@ class Agent(nn.Module, ABC, Generic[R]):
             probable.
         """
 
-    def value(self, observations: Observations, state: State) -> Tensor:
+    def value(self, observations: ObservationTensors, state: State) -> Tensor:
         """Return the critic's values (n,) of observations (n, …) after `state`."""
         episode_starts = torch.zeros(
             len(observations["goal"]), dtype=torch.bool, device=self.device
@@ -224,7 +224,7 @@ def reset_where_done(state: State, episode_starts: Tensor) -> State:
     }
 
 
-def one_step(observations: Observations) -> tuple[Observations, EpisodeSegments]:
+def one_step(observations: ObservationTensors) -> tuple[ObservationTensors, EpisodeSegments]:
     """Return observations (n, …) as (1, n, …), and the segments of a step without a start."""
     goal = observations["goal"]
     segments = EpisodeSegments(torch.zeros(1, len(goal), dtype=torch.bool, device=goal.device))
