@@ -58,7 +58,7 @@ def test_plain_data_is_read_back():
         ({"seed": -1}, "seed is -1"),
     ],
 )
-def test_what_cannot_be_meant_is_refused(changes, said):
+def test_invalid_settings_are_refused(changes, said):
     with pytest.raises(UsageError, match=said.replace(".", r"\.")):
         from_mapping(preset("small"), changes, "file")
 

@@ -41,7 +41,7 @@ def test_reference_policies_are_measured_and_compared(call, dataset, tmp_path):
     assert "<figure" in (tmp_path / "b" / "report.html").read_text()
 
 
-def test_nothing_is_overwritten_unless_told(call, dataset, tmp_path):
+def test_nothing_is_overwritten_without_force(call, dataset, tmp_path):
     words = ("random", dataset, "--split", "val", "--max-steps", 5)
     assert call(*words)[0] == 0
     before = (tmp_path / "evaluation-val" / "tables.json").read_bytes()
@@ -105,7 +105,7 @@ def test_episodes_can_be_chosen(call, dataset, tmp_path):
         (("DATA", "DATA"), None, ["data"]),
     ],
 )
-def test_what_cannot_be_meant_is_one_line(call, dataset, tmp_path, words, code, said):
+def test_errors_of_camp_eval_are_one_line(call, dataset, tmp_path, words, code, said):
     got, out, err = call(*[dataset if word == "DATA" else word for word in words])
     assert got == code or (code is None and got in {2, 5})
     assert out == ""

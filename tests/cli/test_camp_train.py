@@ -86,7 +86,7 @@ def test_a_run_is_trained_and_measured(call, dataset, tmp_path):
         (("NOTHING",), 5, ["NOTHING", "manifest.json"]),
     ],
 )
-def test_what_cannot_be_meant_is_told_in_a_line(call, dataset, tmp_path, words, code, told):
+def test_errors_of_camp_train_are_one_line(call, dataset, tmp_path, words, code, told):
     given = [dataset if word == "DATA" else word for word in words]
     found, out, err = call(*given)
     assert (found, out) == (code, ""), err

@@ -123,7 +123,7 @@ def test_completion_is_there():
         (("assets", "--type", "Dragon"), ["Dragon", "Chair"]),
     ],
 )
-def test_what_cannot_be_meant_is_a_usage_error(tmp_path, words, expected):
+def test_invalid_arguments_are_usage_errors(tmp_path, words, expected):
     one_line(run(*words, cwd=tmp_path), 2, *expected)
     assert not list(tmp_path.iterdir()), "nothing is written"
 
@@ -153,7 +153,7 @@ def test_a_mesh_without_volume_is_named(tmp_path):
     one_line(run("assets", "--assets", tmp_path), 2, "flat.obj")
 
 
-def test_a_dataset_and_what_looks_at_it(dataset, tmp_path):
+def test_commands_that_read_a_dataset(dataset, tmp_path):
     stats = run("stats", dataset)
     assert stats.returncode == 0
     assert "Table 2 of the paper" in stats.stdout
@@ -229,7 +229,7 @@ def test_the_resolved_config_reads_back(tmp_path):
     assert "max_spawn_tries = 77" in told.stdout
 
 
-def test_a_dry_run_tells_time_and_size(tmp_path):
+def test_a_dry_run_forecasts_time_and_size(tmp_path):
     told = run("generate", *SMALL, "--dry-run", "--json", cwd=tmp_path)
     said = json.loads(told.stdout)
     assert (said["scenes"], said["episodes"]) == (3, 5)
@@ -239,7 +239,7 @@ def test_a_dry_run_tells_time_and_size(tmp_path):
 
 
 @pytest.mark.parametrize("where", ["", "cache", "file/below"])
-def test_the_doctor_says_where_solved_pushes_are_kept(tmp_path, where):
+def test_doctor_shows_the_result_cache(tmp_path, where):
     (tmp_path / "file").write_text("in the way")
     told = run("doctor", "--json", INTERNAV_CACHE_DIR=str(tmp_path / where) if where else "")
     check = next(c for c in json.loads(told.stdout) if c["name"] == "solved pushes")
@@ -253,7 +253,7 @@ def test_the_doctor_says_where_solved_pushes_are_kept(tmp_path, where):
     assert (check["remedy"] == "") == (state == "good")
 
 
-def test_the_doctor_finds_this_machine_fit(tmp_path):
+def test_doctor_passes_on_this_machine(tmp_path):
     told = run("doctor", "--out", tmp_path, "--json")
     checks = {check["name"]: check for check in json.loads(told.stdout)}
     assert told.returncode == 0
@@ -262,7 +262,7 @@ def test_the_doctor_finds_this_machine_fit(tmp_path):
 
 
 @pytest.mark.parametrize(("signum", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_ends_in_order_and_keeps_what_is_done(tmp_path, signum, code):
+def test_a_signal_ends_in_order_and_finished_scenes_stay(tmp_path, signum, code):
     words = ("--scenes", 500, "--episodes-per-scene", 2, "--rooms", 1, "--workers", 1)
     command = [GEN, "generate", "--out", tmp_path / "d", *map(str, words)]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)

@@ -86,7 +86,7 @@ def test_an_empty_variable_names_nothing(monkeypatch):
     assert dataset_folder("there") == Path("there")
 
 
-def test_settings_draw_a_fresh_house_whatever_is_there(call, tmp_path):
+def test_settings_draw_a_fresh_house_beside_any_dataset(call, tmp_path):
     code, _, err = call("internav-gen", "show", "--seed", 0, "--rooms", 1)
     assert code == 0, err
     assert "dataset" not in err

@@ -44,7 +44,7 @@ def dataset(tmp_path_factory):
     return out
 
 
-def test_an_expert_is_filmed_both_ways_and_a_file_is_not_lost(dataset, tmp_path):
+def test_an_expert_is_filmed_as_mp4_and_gif_and_no_file_is_overwritten(dataset, tmp_path):
     name = tmp_path / "there" / "film"
     words = ("replay", dataset, "scene-000002/0001", "--size", 160, "--fps", 4)
     told = run(*words, "--out", f"{name}.mp4", "--out", f"{name}.gif")
@@ -96,7 +96,7 @@ def test_actions_of_a_file_are_filmed(dataset, tmp_path):
         (("2/0", "--actions", "none.json"), ["none.json"]),
     ],
 )
-def test_what_cannot_be_filmed_is_one_line(dataset, tmp_path, monkeypatch, capsys, words, said):
+def test_errors_of_replay_are_one_line(dataset, tmp_path, monkeypatch, capsys, words, said):
     from internav_cli.main import main
 
     monkeypatch.chdir(tmp_path)
@@ -111,7 +111,7 @@ def test_what_cannot_be_filmed_is_one_line(dataset, tmp_path, monkeypatch, capsy
     assert not list(tmp_path.iterdir()), "nothing is written"
 
 
-def test_an_episode_without_an_expert_says_what_to_do(dataset, tmp_path):
+def test_an_episode_without_an_expert_gives_advice(dataset, tmp_path):
     from internav_cli import replay
 
     from internav_data.dataset import Identity, assemble, load_dataset, open_staging, stage_scene

@@ -14,7 +14,7 @@ from internav_data.core.lru import LRUCache
     st.integers(0, 12),
     st.lists(st.integers(0, 5), min_size=10, max_size=10),
 )
-def test_what_stays_is_what_was_used_last(keys, capacity, weights):
+def test_the_entries_used_last_stay(keys, capacity, weights):
     evicted, made = [], []
 
     def make(key):

@@ -112,7 +112,7 @@ def test_same_bytes_in_any_order_of_work(tmp_path):
 
 
 @pytest.mark.usefixtures("few_scenes_a_shard")
-def test_extended_is_what_is_built_at_once(tmp_path):
+def test_an_extended_dataset_equals_one_built_at_once(tmp_path):
     once, grown = tmp_path / "once", tmp_path / "grown"
     build(once, range(130), quarantined={5, 90})
     assemble(once, IDENTITY, ASSETS, 130)
@@ -196,7 +196,7 @@ def test_missing_scene_is_named(tmp_path):
     assert not has_manifest(tmp_path)
 
 
-def test_scene_without_episodes_is_kept(tmp_path):
+def test_a_scene_without_episodes_stays(tmp_path):
     build(tmp_path, range(3), episodes=0)
     assert assemble(tmp_path, IDENTITY, ASSETS, 3).counts["train"].scenes == 1
     build(tmp_path, range(3, 6))

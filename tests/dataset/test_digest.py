@@ -87,7 +87,7 @@ def test_any_change_changes_the_digest(change):
 
 
 @pytest.mark.parametrize("last", [[4], None])
-def test_what_lies_under_a_null_does_not_matter(last):
+def test_values_under_a_null_do_not_count(last):
     kind = pa.struct([pa.field("a", pa.list_(pa.field("element", pa.int32())))])
     columns = [
         pa.StructArray.from_arrays(

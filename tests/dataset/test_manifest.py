@@ -32,7 +32,7 @@ def test_newer_version_says_upgrade(damaged_folder):
         load_dataset(damaged_folder)
 
 
-def test_version_1_says_generate_anew(damaged_folder):
+def test_version_1_is_refused_with_advice(damaged_folder):
     edit(damaged_folder, lambda raw: raw.update(format_version=1))
     with pytest.raises(CorruptDataError, match="generate the dataset anew"):
         load_dataset(damaged_folder)
@@ -137,7 +137,7 @@ def test_nothing_of_the_machine_is_in_it(dataset_folder):
     assert str(dataset_folder.parent) not in text
 
 
-def test_unfinished_and_absent_are_told_apart(tmp_path):
+def test_errors_of_unfinished_and_absent_datasets_differ(tmp_path):
     with pytest.raises(CorruptDataError, match="no dataset here"):
         load_dataset(tmp_path)
     (tmp_path / ".work").mkdir()

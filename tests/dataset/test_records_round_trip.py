@@ -76,7 +76,7 @@ def test_any_run_of_rows_of_a_sliced_table_is_read(records, data):
         ({"start": strategies.plain(Start, x=math.inf)}, "start.x"),
     ],
 )
-def test_what_a_column_cannot_hold_is_refused_by_name(values, column):
+def test_a_value_that_its_column_cannot_hold_is_refused_by_name(values, column):
     episode = strategies.plain(Episode, **values)
     with pytest.raises(ValidationError, match=f"column {column}:"):
         to_table([episode], EPISODES)

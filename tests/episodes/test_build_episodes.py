@@ -305,7 +305,7 @@ def test_an_impossible_episode_is_quarantined_and_named(houses, pool):
         ("lateral_std_m", -1.0),
     ],
 )
-def test_settings_that_cannot_be_meant_are_refused(field, value):
+def test_invalid_settings_are_refused(field, value):
     with pytest.raises(UsageError, match=f"episodes.{field}: expected .* got {value}"):
         EpisodeConfig(**{field: value}).check()
 

@@ -73,7 +73,7 @@ def test_paths_in_a_file_are_relative_to_it(tmp_path):
         ("house.rooms=kitchen:40", ["10 rooms"]),
     ],
 )
-def test_what_cannot_be_meant(override, words):
+def test_invalid_settings_are_refused(override, words):
     message = refusal(override)
     for word in words:
         assert word in message, message

@@ -108,7 +108,7 @@ def runs(pid):
 
 
 @pytest.mark.parametrize("signum", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
-def test_what_is_done_stays_after_a_kill(tmp_path, signum, whole):
+def test_finished_scenes_stay_after_a_kill(tmp_path, signum, whole):
     out = tmp_path / "d"
     code = killed(out, signum)
     assert code == (-signal.SIGKILL if signum == signal.SIGKILL else 128 + signum)
@@ -199,7 +199,7 @@ def test_a_read_only_folder(tmp_path):
 
 
 @pytest.mark.parametrize(("scenes", "workers"), [(0, 1), (-1, 1), (10**7, 1), (1, -1)])
-def test_counts_that_cannot_be_meant(tmp_path, scenes, workers):
+def test_invalid_counts_are_refused(tmp_path, scenes, workers):
     with pytest.raises(UsageError):
         made(tmp_path / "d", scenes, workers=workers)
     assert not (tmp_path / "d").exists()

@@ -26,7 +26,7 @@ def dataset(tmp_path_factory):
     return out
 
 
-def test_python_makes_what_the_dataset_holds(dataset):
+def test_generate_episodes_equals_the_dataset(dataset):
     from internav_data.dataset import load_dataset
 
     held = [episode for episode in load_dataset(dataset) if episode.scene_id == "scene-000002"]
@@ -51,7 +51,7 @@ def test_redraws_of_all_scenes_are_in_manifest_and_report(dataset, tmp_path):
     assert compute_stats(dataset)["expert"]["solved"] == 5
 
 
-def test_unsolvable_episodes_are_kept_on_demand(monkeypatch, tmp_path):
+def test_unsolvable_episodes_stay_on_demand(monkeypatch, tmp_path):
     from internav_data.dataset import assemble, compute_stats, load_dataset, open_staging
     from internav_data.episodes import build
 
@@ -95,7 +95,7 @@ def test_a_scene_again_is_compared(dataset, tmp_path):
         scene_again(CONFIG, 2, 7, dataset)
 
 
-def test_a_dataset_that_holds_something_else_is_told(dataset, monkeypatch):
+def test_a_dataset_with_other_values_is_reported(dataset, monkeypatch):
     import internav_data.generation.reproduce as module
 
     true = module.made_again(CONFIG, 2, 1)
@@ -147,7 +147,7 @@ def test_unseen_assets_are_apart():
 
 
 @pytest.mark.parametrize(("count", "first"), [(0, 0), (1, -1)])
-def test_counts_that_cannot_be_meant(count, first):
+def test_invalid_counts_are_refused(count, first):
     house = generate_house(seed=0, scene=2, config=CONFIG)
     with pytest.raises(UsageError):
         generate_episodes(house, count, first, CONFIG)

@@ -65,7 +65,7 @@ def test_a_full_disk_ends_the_run():
     assert caught.value.exit_code == 1
 
 
-def test_once_stopped_only_tasks_under_way_end(tmp_path):
+def test_after_a_stop_only_running_tasks_end(tmp_path):
     ended = []
     with WorkerPool(2, Recipe(worker_stubs.noted, str(tmp_path))) as pool:
         for result in pool.run(range(1000), tick=lambda: not ended):
