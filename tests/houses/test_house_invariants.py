@@ -80,6 +80,7 @@ def test_one_closed_entrance_leads_outside(sample):
 
 
 def test_tall_things_do_not_stand_before_windows(sample):
+    judged = beside = 0
     for house in sample["paper"]:
         for window in house.windows:
             for thing in house.objects:
@@ -96,6 +97,10 @@ def test_tall_things_do_not_stand_before_windows(sample):
                     else (abs(thing.y - window.y) - d / 2, abs(thing.x - window.x) - w / 2)
                 )
                 assert along >= window.width_m / 2 - 1e-6 or away > 0.4, (house.scene_id, thing)
+                judged += 1
+                beside += away <= 0.4
+    assert judged > 1000
+    assert beside > 100, "tall things at the window's wall, beside it"
 
 
 def test_rooms_have_what_they_are_named_after(sample, oracle):
