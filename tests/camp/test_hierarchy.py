@@ -244,7 +244,8 @@ def test_a_hand_back_is_one_step_of_waiting_and_ends_nothing(config, option, fak
 def test_navigate_takes_one_step_and_done_ends(config):
     rows = acted(insist(make_agent("camp", config()), NAVIGATE, 0), steps=4)
     assert all(row["decide"] and row["action"] == 0 for row in rows)
-    by_navigate = acted(insist(make_agent("camp", config()), NAVIGATE, 5), steps=1)[0]
+    last = ACTIONS_OF[NAVIGATE].index(DONE)
+    by_navigate = acted(insist(make_agent("camp", config()), NAVIGATE, last), steps=1)[0]
     assert by_navigate["action"] == DONE
     agent = make_agent("camp", config())
     with torch.no_grad():

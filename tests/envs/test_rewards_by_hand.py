@@ -5,6 +5,7 @@ import pytest
 from internav_data.envs.sensors import point_goal
 from internav_data.envs.tasks import interaction_reward
 from internav_data.records.errors import UsageError
+from internav_data.world import ACTION_COUNT
 
 AHEAD, LEFT, PICK, DROP, DONE, WAIT = 0, 1, 9, 10, 11, -1
 PUSH_AHEAD = 5
@@ -123,9 +124,9 @@ def test_the_last_step_cuts_off(hand_run):
     assert run.step(DONE) == (pytest.approx(-0.01), True, False), "it ended by itself"
 
 
-@pytest.mark.parametrize("action", [12, -2, 99])
-def test_there_are_twelve_actions(hand_run, action):
-    with pytest.raises(UsageError, match="0 … 11"):
+@pytest.mark.parametrize("action", [ACTION_COUNT, -2, 99])
+def test_an_action_outside_the_table_is_refused(hand_run, action):
+    with pytest.raises(UsageError, match=f"0 … {ACTION_COUNT - 1}"):
         hand_run(divided=True).step(action)
 
 

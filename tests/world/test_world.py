@@ -19,7 +19,15 @@ from internav_data.navigation import CLEARANCE_M, Lattice
 from internav_data.physics import Body
 from internav_data.records import Pose
 from internav_data.records.errors import UsageError
-from internav_data.world import ACTIONS, Action, HouseModel, Interaction, StepResult, World
+from internav_data.world import (
+    ACTION_COUNT,
+    ACTIONS,
+    Action,
+    HouseModel,
+    Interaction,
+    StepResult,
+    World,
+)
 from internav_data.world.actions import actions_of_option
 from internav_data.world.world import BEHAVIOURS
 
@@ -154,7 +162,7 @@ def test_another_house_is_refused(worlds):
 
 
 def test_an_unknown_action_is_refused(small):
-    for action in (-2, 12):
+    for action in (-2, ACTION_COUNT):
         with pytest.raises(UsageError, match="expected 0 MOVE_AHEAD"):
             small.step(action)
 

@@ -30,7 +30,7 @@ from internav_data.camp.networks import (
     uniform_intent,
 )
 from internav_data.records.errors import UsageError
-from internav_data.world.actions import ACTION_COUNT, Action
+from internav_data.world.actions import ACTION_COUNT, ACTIONS, Action
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -99,8 +99,9 @@ class PPOAgent(Agent[FlatRecord]):
         self.hidden = config.network.hidden
         self.encoder = Encoder(config.network)
         done = config.agent.initial_done_probability
-        others = [(1.0 - done) / (ACTION_COUNT - 1)] * (ACTION_COUNT - 1)
-        self.policy = self._policy(self.encoder.size + extra, [*others, done])
+        other = (1.0 - done) / (ACTION_COUNT - 1)
+        probabilities = [done if action == Action.DONE else other for action in ACTIONS]
+        self.policy = self._policy(self.encoder.size + extra, probabilities)
 
     def _policy(self, inputs: int, probabilities: list[float]) -> RecurrentActorCritic:
         return RecurrentActorCritic(inputs, self.hidden, probabilities)
