@@ -270,7 +270,7 @@ FIRST_WORD = re.compile(r"[A-Za-z]+")
 ARRAY = re.compile(r"\b(?:NDArray|ndarray|Tensor)\b")
 """Annotation of an array; aliases of such annotations are found by `array_aliases`."""
 SHAPE = re.compile(
-    r"""\(\s*[\w.*+/-]+(?:\s[*+/-]\s[\w.]+)?\s*,  # (n, 2), (n,), (n + 1, 3), (n, …): with a comma
+    r"""\(\s*[\w.…*+/-]+(?:\s[*+/-]\s[\w.]+)?\s*,  # (n, 2), (n,), (n + 1, 3), (n, …): with a comma
         (?:\s*[\w.…*+/-]+(?:\s[*+/-]\s[\w.]+)?\s*,?)*\s*\)
         |\b\w+\s?\N{MULTIPLICATION SIGN}\s?\w+    # n times 2
         |\b\w+\sx\s\w+                            # n x 2
@@ -278,6 +278,8 @@ SHAPE = re.compile(
     re.VERBOSE,
 )
 """Statement of a shape in a docstring."""
+REFERENCE = re.compile(r"See `[\w.]+`")
+"""Docstring of an overriding method, which leaves its parameters to another docstring."""
 ALIAS = re.compile(r"_*[A-Z]\w*[a-z]\w*$")
 """Name of a type alias: in capitals and small letters."""
 
@@ -689,11 +691,16 @@ def array_functions(module: Module, aliases: frozenset[str]) -> list[Definition]
 _NOTHING = ast.Constant(None)
 
 
+def _states_shape(made: Definition) -> bool:
+    """Return whether a docstring states a shape, or refers to one that does."""
+    return bool(SHAPE.search(made.docstring) or REFERENCE.match(made.docstring))
+
+
 def missing_shapes(module: Module, aliases: frozenset[str]) -> Iterator[Finding]:
     """Yield public functions of arrays whose docstring states no shape, in strict rooms."""
     if module.room in STRICT_SHAPES:
         for made in array_functions(module, aliases):
-            if not SHAPE.search(made.docstring):
+            if not _states_shape(made):
                 text = f"{made.label} has arrays; state their shapes, as '(n, 2) float64, metres'"
                 yield Finding(module.path, made.line, "shapes", text)
 
@@ -756,7 +763,7 @@ def module_figures(module: Module, aliases: frozenset[str]) -> RoomFigures:
     return RoomFigures(
         (len(module.source.splitlines()),),
         sum(length > LONG_FUNCTION for length in function_lengths(module.tree, lines)),
-        (sum(bool(SHAPE.search(made.docstring)) for made in arrays), len(arrays)),
+        (sum(map(_states_shape, arrays)), len(arrays)),
         (needed - sum(1 for _ in undocumented_raises(module)), needed),
         comment_count(module.source),
         len(lines),

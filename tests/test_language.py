@@ -347,11 +347,21 @@ def test_arrays_without_a_shape_are_found_in_strict_rooms_only(annotation, monke
 
 @pytest.mark.parametrize(
     "text",
-    ["corners (n, 2)", "corners (n,)", "corners (n + 1, 2 * k)", "n x 2 corners", "a scalar"],
+    [
+        *("corners (n, 2)", "corners (n,)", "corners (n + 1, 2 * k)", "corners (…, 2)"),
+        *("n x 2 corners", "a scalar"),
+    ],
 )
 def test_shapes_are_recognised(text, monkeypatch):
     monkeypatch.setattr(language, "STRICT_SHAPES", frozenset({"geometry"}))
     assert found(ARRAYS.format("NDArray", text)) == ([], [])
+
+
+def test_an_overriding_method_may_refer_to_another_docstring(monkeypatch):
+    monkeypatch.setattr(language, "STRICT_SHAPES", frozenset({"geometry"}))
+    source = 'def area(corners: NDArray) -> float:\n    """{} `Polygon`: the area."""\n'
+    assert found(source.format("See")) == ([], [])
+    assert found(source.format("Unlike"))[0] == [("shapes", 1)]
 
 
 @pytest.mark.parametrize("text", ["corners (metres)", "corners (see there, or here and there)"])
