@@ -12,7 +12,7 @@ raises    a public function raises by name and its docstring has no `Raises` sec
 dialect   a class, function, argument, attribute, module or module constant has a name that was
           replaced by the field's word
 meaning   one class name or type alias is defined in two modules of the package
-shapes    a public function of arrays states no shape (only in rooms listed in `STRICT_SHAPES`)
+shapes    a public function of arrays states no shape in its docstring
 """
 
 from __future__ import annotations
@@ -258,12 +258,6 @@ DIALECT_OF_ROOM = {
     },
 }
 """Names that were replaced in one room only: the word is good elsewhere."""
-
-STRICT_SHAPES = frozenset(
-    {"benchmarks", "catalog", "dataset", "envs", "evaluation", "geometry", "houses"}
-    | {"navigation", "physics", "planner", "render", "verification", "views", "world"}
-)
-"""Rooms where a public function of arrays without a shape in its docstring is a finding."""
 
 FIRST_WORD = re.compile(r"[A-Za-z]+")
 """First word of a docstring."""
@@ -657,8 +651,13 @@ def array_aliases(modules: Sequence[Module]) -> frozenset[str]:
         made.name
         for module in modules
         for made in definitions(module)
-        if not made.owner and _is_alias(made) and made.node and ARRAY.search(ast.unparse(made.node))
+        if not made.owner and _is_alias(made) and made.node and _is_array(ast.unparse(made.node))
     )
+
+
+def _is_array(annotation: str) -> bool:
+    """Return whether an annotation is of arrays; a function of arrays is none."""
+    return bool(ARRAY.search(annotation)) and not annotation.startswith("Callable")
 
 
 def array_functions(module: Module, aliases: frozenset[str]) -> list[Definition]:
@@ -697,12 +696,11 @@ def _states_shape(made: Definition) -> bool:
 
 
 def missing_shapes(module: Module, aliases: frozenset[str]) -> Iterator[Finding]:
-    """Yield public functions of arrays whose docstring states no shape, in strict rooms."""
-    if module.room in STRICT_SHAPES:
-        for made in array_functions(module, aliases):
-            if not _states_shape(made):
-                text = f"{made.label} has arrays; state their shapes, as '(n, 2) float64, metres'"
-                yield Finding(module.path, made.line, "shapes", text)
+    """Yield public functions of arrays whose docstring states no shape."""
+    for made in array_functions(module, aliases):
+        if not _states_shape(made):
+            text = f"{made.label} has arrays; state their shapes, as '(n, 2) float64, metres'"
+            yield Finding(module.path, made.line, "shapes", text)
 
 
 def check(modules: Sequence[Module]) -> list[Finding]:

@@ -335,13 +335,8 @@ ARRAYS = 'def area(corners: {}) -> float:\n    """Return the area of {}."""\n'
 
 
 @pytest.mark.parametrize("annotation", ["NDArray[np.float64]", "np.ndarray", "torch.Tensor | None"])
-def test_arrays_without_a_shape_are_found_in_strict_rooms_only(annotation, monkeypatch):
-    source = ARRAYS.format(annotation, "corners")
-    monkeypatch.setattr(language, "STRICT_SHAPES", frozenset())
-    assert found(source) == ([], [])
-    monkeypatch.setattr(language, "STRICT_SHAPES", frozenset({"geometry"}))
-    assert found(source)[0] == [("shapes", 1)]
-    assert found(source, room="camp") == ([], [])
+def test_arrays_without_a_shape_are_found(annotation):
+    assert found(ARRAYS.format(annotation, "corners"))[0] == [("shapes", 1)]
     assert found(ARRAYS.format("float", "corners")) == ([], [])
 
 
@@ -352,31 +347,29 @@ def test_arrays_without_a_shape_are_found_in_strict_rooms_only(annotation, monke
         *("n x 2 corners", "a scalar"),
     ],
 )
-def test_shapes_are_recognised(text, monkeypatch):
-    monkeypatch.setattr(language, "STRICT_SHAPES", frozenset({"geometry"}))
+def test_shapes_are_recognised(text):
     assert found(ARRAYS.format("NDArray", text)) == ([], [])
 
 
-def test_an_overriding_method_may_refer_to_another_docstring(monkeypatch):
-    monkeypatch.setattr(language, "STRICT_SHAPES", frozenset({"geometry"}))
+def test_an_overriding_method_may_refer_to_another_docstring():
     source = 'def area(corners: NDArray) -> float:\n    """{} `Polygon`: the area."""\n'
     assert found(source.format("See")) == ([], [])
     assert found(source.format("Unlike"))[0] == [("shapes", 1)]
 
 
 @pytest.mark.parametrize("text", ["corners (metres)", "corners (see there, or here and there)"])
-def test_other_parentheses_are_no_shapes(text, monkeypatch):
-    monkeypatch.setattr(language, "STRICT_SHAPES", frozenset({"geometry"}))
+def test_other_parentheses_are_no_shapes(text):
     assert found(ARRAYS.format("NDArray", text))[0] == [("shapes", 1)]
 
 
-def test_aliases_of_arrays_are_arrays_where_they_are_imported(monkeypatch):
-    monkeypatch.setattr(language, "STRICT_SHAPES", frozenset({"geometry"}))
+def test_aliases_of_arrays_are_arrays_where_they_are_imported():
     typing = parse("Floats = NDArray[np.float64]\n", path="core/typing.py", room="core")
     user = ARRAYS.format("Floats", "corners")
     importing = "from internav_data.core.typing import Floats\n\n\n" + user
     assert [f.rule for f in language.check([typing, parse(importing)])] == ["shapes"]
     assert language.check([typing, parse(user)]) == []
+    function = parse("Floats = Callable[[NDArray], int]\n", path="core/typing.py", room="core")
+    assert language.check([function, parse(importing)]) == []
 
 
 def test_the_report_counts():

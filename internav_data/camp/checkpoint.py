@@ -369,7 +369,7 @@ def unpack(
     optimiser
         New optimiser of the same parameters.
     blank
-        Initial memory of the agent.
+        Initial memory of the agent, (n, …).
     own, count
         Numbers of this rank's environments, and how many there are.
 

@@ -47,7 +47,7 @@ class DistributedContext:
 
     @property
     def reduce(self) -> Reduce:
-        """All-reduce sum across ranks."""
+        """All-reduce sum across ranks, of tensors of any shape."""
         return alone if self.size == 1 else self.all_reduce
 
     def share(self, count: int, setting: str) -> range:
@@ -67,7 +67,7 @@ class DistributedContext:
         return range(self.rank * own, (self.rank + 1) * own)
 
     def all_reduce(self, tensor: Tensor) -> Tensor:
-        """Return the sum of a tensor across ranks, without gradient."""
+        """Return the sum of a tensor of any shape across ranks, without gradient."""
         total = tensor.detach().to(self.device, copy=True)
         distributed.all_reduce(total)
         return total.to(tensor.device)

@@ -32,7 +32,7 @@ _EPSILON = 1e-8
 
 
 def alone(tensor: Tensor) -> Tensor:
-    """Return a tensor as it is: the sum across a single rank."""
+    """Return a tensor of any shape as it is: the sum across a single rank."""
     return tensor
 
 
@@ -146,7 +146,7 @@ def step(
     max_grad_norm: float,
     reduce: Reduce = alone,
 ) -> float:
-    """Take one step of an optimiser; return the gradient's norm before it was clipped.
+    """Take one step of an optimiser on a scalar loss; return the gradient's norm before clipping.
 
     Raises
     ------

@@ -43,7 +43,7 @@ class StepRecord:
     """Number of the action that was drawn, int64."""
 
     def map(self, function: Callable[[Tensor], Tensor]) -> Self:
-        """Return the record with a function applied to every tensor."""
+        """Return the record with a function applied to every tensor, of any shape."""
         tensors = {f.name: getattr(self, f.name) for f in fields(self)}
         return replace(self, **{k: function(v) for k, v in tensors.items() if v is not None})
 
@@ -138,7 +138,7 @@ class Agent(nn.Module, ABC, Generic[R]):
 
     @abstractmethod
     def initial_state(self, count: int) -> State:
-        """Return the memory of `count` environments whose episodes begin: zeros."""
+        """Return the memory of `count` environments whose episodes begin: zeros, (count, …)."""
 
     @abstractmethod
     def act(
