@@ -252,10 +252,10 @@ def naive_step(
         out, last = policy.gru(view if number == NAVIGATE else told, hidden[number][None])
         after[number] = last[0]
         acts.append(torch.log_softmax(policy.actor(out[0]), -1))
-    inputs = torch.cat([told, agent.plan.embed(now.intent)[None]], 1)
-    out, last = agent.plan.gru(inputs, hidden[GLOBAL][None])
+    inputs = torch.cat([told, agent.global_policy.embed(now.intent)[None]], 1)
+    out, last = agent.global_policy.gru(inputs, hidden[GLOBAL][None])
     after[GLOBAL] = last[0]
-    plan = torch.log_softmax(agent.plan.actor(out[0]), -1)
+    plan = torch.log_softmax(agent.global_policy.actor(out[0]), -1)
     log_prob, entropy = torch.zeros(()), torch.zeros(())
     if now.decide:
         log_prob = log_prob + plan[int(now.option)]
@@ -264,7 +264,7 @@ def naive_step(
         own = acts[int(now.option)]
         log_prob = log_prob + own[ACTIONS_OF[int(now.option)].index(int(now.choice))]
         entropy = entropy - (own.exp() * own).sum()
-    return log_prob, agent.plan.critic(out[0])[0], entropy, torch.stack(after)
+    return log_prob, agent.global_policy.critic(out[0])[0], entropy, torch.stack(after)
 
 
 if __name__ == "__main__":

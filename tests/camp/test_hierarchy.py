@@ -44,7 +44,10 @@ def ran_of(agent, batch):
 def insist(agent, option, choice=None):
     """Let global always open an option, and its policy always take one of its actions."""
     with torch.no_grad():
-        for layer, wanted in ((agent.plan.actor, option), (agent.policies[option].actor, choice)):
+        for layer, wanted in (
+            (agent.global_policy.actor, option),
+            (agent.policies[option].actor, choice),
+        ):
             if wanted is not None:
                 layer.weight.zero_()
                 layer.bias.fill_(-40.0)
@@ -120,7 +123,7 @@ def test_what_is_drawn_has_the_probability_of_its_parts(collected, method):
 @pytest.mark.parametrize("method", ["camp", "ppo-intent"])
 def test_the_intent_policy_is_a_copy_made_at_synchronisation_only(collected, method):
     agent, _, (rollout, _) = collected(method)
-    deciding = agent.plan if method == "camp" else agent.policy
+    deciding = agent.global_policy if method == "camp" else agent.policy
 
     def pairs():
         for part in ("embed", "gru", "actor"):
@@ -153,7 +156,7 @@ def test_who_is_optimised():
     named = {name for name, parameter in agent.named_parameters() if id(parameter) in mine}
     left = {name for name, _ in agent.named_parameters()} - named
     assert {name.split(".")[0] for name in named} == {
-        "encoders", "plan", "navigate", "push", "pick"
+        "encoders", "global_policy", "navigate", "push", "pick"
     }  # fmt: skip
     critics = {f"{p}.critic.{w}" for p in ("navigate", "push", "pick") for w in ("weight", "bias")}
     assert {name for name in left if not name.startswith("intent.")} == critics
@@ -169,7 +172,7 @@ def test_no_gradient_flows_from_intents_to_action_policies(collected):
         for policy in agent.policies:
             for parameter in (*policy.gru.parameters(), *policy.actor.parameters()):
                 assert parameter.grad is None or not parameter.grad.any()
-        assert agent.plan.embed.weight.grad.any()
+        assert agent.global_policy.embed.weight.grad.any()
 
 
 @pytest.mark.parametrize("method", ["camp", "hrl"])
@@ -249,7 +252,7 @@ def test_navigate_takes_one_step_and_done_ends(config):
     assert by_navigate["action"] == DONE
     agent = make_agent("camp", config())
     with torch.no_grad():
-        agent.plan.actor.bias[STOP] = 60.0
+        agent.global_policy.actor.bias[STOP] = 60.0
     by_global = acted(agent, steps=1)[0]
     assert (by_global["option"], by_global["action"]) == (STOP, DONE)
 
@@ -265,7 +268,7 @@ def test_with_push_and_pick_forbidden_it_is_navigate(config, fake):
     """The same actions as Navigate alone, by the same numbers."""
     camp = make_agent("camp", config(agent={"forbidden": ["push", "pick"]}))
     with torch.no_grad():
-        camp.plan.actor.bias[STOP] = -60.0
+        camp.global_policy.actor.bias[STOP] = -60.0
     actions = []
     for agent in (camp, AuxiliaryAgent(camp, ["navigate"] * 4)):
         env = fake()
@@ -378,4 +381,6 @@ def test_parameters_are_a_function_of_name_and_config(config):
     one, two = (make_agent("camp", config()).state_dict() for _ in range(2))
     assert all(torch.equal(one[name], two[name]) for name in one)
     other = make_agent("camp", config(seed=1)).state_dict()
-    assert not torch.equal(one["plan.gru.weight_ih_l0"], other["plan.gru.weight_ih_l0"])
+    assert not torch.equal(
+        one["global_policy.gru.weight_ih_l0"], other["global_policy.gru.weight_ih_l0"]
+    )

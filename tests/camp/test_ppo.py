@@ -65,7 +65,7 @@ def test_a_new_critic_is_trained_alone(collected, config):
     before = parameters(agent)
     said = learnt(agent, rollout, config().ppo, critic_only=True)
     changed = {n for n, p in agent.named_parameters() if not torch.equal(p, before[n])}
-    assert changed == {"plan.critic.weight", "plan.critic.bias"}
+    assert changed == {"global_policy.critic.weight", "global_policy.critic.bias"}
     assert said["kl"] == pytest.approx(0.0, abs=1e-6)
     torch.testing.assert_close(
         agent.evaluate(rollout.batch).log_prob, rollout.log_probs, atol=1e-5, rtol=0

@@ -265,9 +265,11 @@ class Hierarchy(Agent[HierarchyRecord]):
         self.pick = RecurrentActorCritic(size + OPTION_INPUTS, self.hidden, even)
         self.intends_options = variant == "policy"
         intents = OPTIONS if self.intends_options else ACTION_COUNT
-        self.plan = IntentConditionedPolicy(size + OPTION_INPUTS, self.hidden, options, intents)
+        self.global_policy = IntentConditionedPolicy(
+            size + OPTION_INPUTS, self.hidden, options, intents
+        )
         if self.uses_intent:
-            self.intent = IntentPolicy(self.plan, recursive=variant == "recursive")
+            self.intent = IntentPolicy(self.global_policy, recursive=variant == "recursive")
         mask = torch.zeros(OPTIONS)
         mask[[PUSH if name == "push" else PICK for name in agent.forbidden]] = -torch.inf
         self.register_buffer("mask", mask, persistent=False)
@@ -282,7 +284,7 @@ class Hierarchy(Agent[HierarchyRecord]):
 
     def initial_state(self, count: int) -> State:
         """See `Agent`: hidden states, the open interaction (0: none), the actions it has used."""
-        weight = self.plan.actor.weight
+        weight = self.global_policy.actor.weight
         idle = torch.zeros(count, dtype=torch.int64, device=weight.device)
         hidden = weight.new_zeros(count, GRUS, self.hidden)
         return {"hidden": hidden, "open": idle, "used": idle.clone()}
@@ -362,15 +364,15 @@ class Hierarchy(Agent[HierarchyRecord]):
         acts = torch.stack([*log_probs, self.done.expand_as(log_probs[0])], -2)  # (T, n, 4, 12)
         features, intended = torch.cat([views[0], told], -1), None
         if not self.uses_intent:
-            intent = uniform_intent(features, self.plan.embed.in_features)
+            intent = uniform_intent(features, self.global_policy.embed.in_features)
         elif intent is None:
             intended, intent, hidden[INTENT] = self.intent(
                 features, hidden[INTENT], segments, lambda p: self.mixed(p, acts), self.mask
             )
-        conditioned = self.plan.condition(features, intent)
-        out, hidden[GLOBAL] = segments.run(self.plan.gru, conditioned, hidden[GLOBAL])
-        option_log_probs = torch.log_softmax(self.plan.actor(out) + self.mask, -1)
-        value, after = self.plan.value(out), torch.stack(hidden, 1)
+        conditioned = self.global_policy.condition(features, intent)
+        out, hidden[GLOBAL] = segments.run(self.global_policy.gru, conditioned, hidden[GLOBAL])
+        option_log_probs = torch.log_softmax(self.global_policy.actor(out) + self.mask, -1)
+        value, after = self.global_policy.value(out), torch.stack(hidden, 1)
         return ForwardOutput(option_log_probs, acts, value, intended, intent, after)
 
     def mixed(self, intended: Tensor, action_log_probs: Tensor) -> Tensor:
@@ -389,17 +391,21 @@ class Hierarchy(Agent[HierarchyRecord]):
 
     def optimised(self) -> list[Parameter]:
         """See `Agent`: neither the intent policy nor the critics of the policies' pretraining."""
-        parts = (self.encoders, self.plan, *(q for p in self.policies for q in (p.gru, p.actor)))
+        parts = (
+            self.encoders,
+            self.global_policy,
+            *(q for p in self.policies for q in (p.gru, p.actor)),
+        )
         return [parameter for part in parts for parameter in part.parameters()]
 
     def critics(self) -> list[Parameter]:
         """See `Agent`."""
-        return list(self.plan.critic.parameters())
+        return list(self.global_policy.critic.parameters())
 
     def synchronise(self) -> None:
         """See `Agent`."""
         if hasattr(self, "intent"):
-            self.intent.synchronise(self.plan)
+            self.intent.synchronise(self.global_policy)
 
 
 class AuxiliaryAgent(Agent[OptionRecord]):
