@@ -53,7 +53,7 @@ class Mixed:
     count
         Environments.
     seed
-        Of the episodes.
+        Seed of the episodes.
     ids
         Show instance ids too, for `nie`.
     """
@@ -142,7 +142,7 @@ class Mixed:
 
 
 class Cue:
-    """Which of two ways is right is shown at the first step alone.
+    """Environment whose first step alone shows the right one of two paths.
 
     The agent is carried along whatever it does (it cannot leave itself a sign), and at the fork a
     rotation chooses a way: 10 if it is the right one. Done ends the episode.

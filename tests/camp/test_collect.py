@@ -36,7 +36,7 @@ def diary(fake):
 
 @pytest.mark.parametrize("method", LEARNERS)
 def test_cuts_are_valued_before_the_reset_and_ends_are_not(diary, config, method):
-    """By what was seen last and the hidden states after the last step, worked out step by step."""
+    """Values come from the last observations and the hidden states after them, step by step."""
     env, agent = diary(), make_agent(method, config(agent={"initial_done_probability": 0.05}))
     collector = Collector(env, agent)
     collector.loop.reset()

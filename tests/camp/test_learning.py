@@ -1,4 +1,4 @@
-"""That learners learn, from scratch, by the project's own PPO: `make test-learning`.
+"""Agents learn from scratch, by the project's own PPO: `make test-learning`.
 
 Hyperparameters are those of the preset `small`, but for sizes and the learning rate. On seeds
 0 and 1 every learner needed 45 to 80 rollouts; they have 300.

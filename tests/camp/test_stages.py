@@ -1,4 +1,4 @@
-"""What is trained in which order, for how long: section 5.2, and the same steps for all."""
+"""Order and length of the training stages: section 5.2, and the same steps for all."""
 
 import itertools
 

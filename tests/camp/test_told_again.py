@@ -1,4 +1,4 @@
-"""What an agent did is told again, to the last probability, by every learner."""
+"""A replayed rollout has the probabilities that it was drawn with, for every agent."""
 
 import dataclasses
 

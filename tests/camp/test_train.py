@@ -54,7 +54,7 @@ def request_for(scenes, tmp_path):
 
 
 def written(run):
-    """What a run has left, without what the clock says."""
+    """Return the files of a run, without durations."""
     folder = find(run)
     rows = [json.loads(line) for line in (run / "log.jsonl").read_text().splitlines()]
     for row in rows:

@@ -1,4 +1,4 @@
-"""Where Push and Pick are learnt, judged by the definition."""
+"""Start poses of the tasks of Push and Pick, judged by their definition."""
 
 import pytest
 
@@ -33,7 +33,7 @@ def test_agents_stand_opposite_to_the_goal_and_can_act(small, kind):
 
 
 def test_no_start_is_in_a_pocket_that_nothing_leads_out_of(small, monkeypatch):
-    """Where the goal stays out of reach with every obstacle gone, no distance is finite."""
+    """No distance is finite where the goal stays out of reach with every obstacle gone."""
     dataset = load_dataset(small)
     episode = next(e for e in dataset if any(o.pickable for o in e.obstacles))
     stage = HouseModel.of(dataset.scene(episode.scene_id))

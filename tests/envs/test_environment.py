@@ -42,7 +42,7 @@ def many(dataset, count, mode="vector_entry_point", **arguments):
 
 
 def same(one, other):
-    """Whether two observations, infos or anything else are equal to the last bit."""
+    """Assert that two observations, infos or anything else are equal to the last bit."""
     if isinstance(one, dict):
         assert one.keys() == other.keys()
         for key in one:

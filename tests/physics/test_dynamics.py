@@ -125,7 +125,7 @@ def last_name(node):
 
 
 def readers_of_assets(folder):
-    """Where files read mass, friction or abilities of an asset, as file:line and code."""
+    """Return the lines that read mass, friction or abilities of an asset, as file:line and code."""
     return [
         f"{file.relative_to(folder)}:{node.lineno} {ast.unparse(node)}"
         for file in folder.rglob("*.py")

@@ -34,7 +34,7 @@ def cube(side=0.3):
 
 
 def lies_inside(hull, points, tol=0.0):
-    """Whether some of the points (n, 3) lie inside a hull; those outside its box do not."""
+    """Return whether some of the points (n, 3) lie inside a hull; those outside its box do not."""
     low, high = hull.points.min(axis=0) - tol, hull.points.max(axis=0) + tol
     near = points[((points >= low) & (points <= high)).all(axis=1)]
     return len(near) > 0 and (hull.find_simplex(near, tol=tol or None) >= 0).any()
