@@ -151,6 +151,8 @@ def _poses(
             continue
         there.i, there.j = i, j
         x, y = there.position
+        # Products of the offsets from the obstacle, along each axis; their sum, the scalar product,
+        # is below zero on the side of the obstacle that is turned away from the goal.
         across = (x - pose.x) * (episode.goal.x - pose.x)
         along = (y - pose.y) * (episode.goal.y - pose.y)
         if across + along >= 0.0:

@@ -93,6 +93,7 @@ class EpisodeRun:
         obstacles = ((assets[o.asset_id], o.pose) for o in episode.obstacles)
         self.props = loaded_house.static_scene.props(obstacles)
         distances = loaded_house.distance_field((episode.goal.i, episode.goal.j))
+        # The stored L of SPL belongs to the stored start; the task looks up that of another one.
         own = episode.shortest_path_m if start is None else None
         self.task = task(self.world, distances, config, own)
         self.actions: list[int] = []
@@ -118,6 +119,7 @@ class EpisodeRun:
         if result.success and result.action.changes_picture:
             self.stale = True
             self._update_props(result)
+        # Done in the last step allowed ends the episode; only what goes on is cut off.
         reward, terminated = self.task.step(result)
         truncated = not terminated and len(self.actions) >= self._config.max_steps
         self.done = terminated or truncated

@@ -71,7 +71,7 @@ def _serve(
             except InternavError as error:
                 pipe.send((False, error))
                 continue
-            # Observations are in the shared memory already.
+            # Observations lie in the shared memory already: only the rest goes through the pipe.
             pipe.send((True, answer if name == "state" else answer[1:]))
     except (EOFError, KeyboardInterrupt):
         return
@@ -144,6 +144,7 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
         declare_spaces(self, num_envs, image_size, sensors, autoreset=autoreset)
         self._copy = copy
         start = multiprocessing.get_context(context)
+        # No locks: each process writes rows of its own, and only before it answers.
         memory = {
             name: start.RawArray("B", math.prod(shape) * np.dtype(dtype).itemsize)
             for name, (shape, dtype) in buffer_shapes(num_envs, image_size, sensors).items()

@@ -97,6 +97,7 @@ class ObservationBuffer:
             for sensor in self._of_picture:
                 sensor.write(run, self._frames, self.buffers[sensor.name][row, ...])
         run.stale = False
+        # `[row, ...]` is a view even where an observation is a scalar.
         for sensor in self._of_state:
             sensor.write(run, self._frames, self.buffers[sensor.name][row, ...])
 

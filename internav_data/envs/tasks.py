@@ -218,6 +218,7 @@ class InteractiveNavigation(Task):
             return 0.0
         statistics.done[kind] += 1
         here = (world.i, world.j)
+        # Lattices are replaced, never changed: the one before the action is still at hand.
         before = self._lattice.distance(here, world.goal)
         after = world.lattice.distance(here, world.goal)
         reward = interaction_reward(before, after)

@@ -175,7 +175,7 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         terminated, truncated = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
         stepped: list[tuple[int, dict[str, Any]]] = []
         for k, action in enumerate(asked):
-            if self._done[k]:
+            if self._done[k]:  # next-step autoreset: this action is ignored
                 stepped.append((k, self._autoreset_slot(k)))
                 continue
             run = self.slots[k].run
