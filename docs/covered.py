@@ -19,6 +19,7 @@ from pathlib import Path
 
 from code_lines import ROOT, room_of
 from coverage import Coverage
+from coverage.exceptions import NoDataError
 from size import aligned
 
 COUNTS = ("num_statements", "covered_lines", "num_branches", "covered_branches")
@@ -36,9 +37,10 @@ def measured(root: Path) -> dict[Path, Counts]:
     """
     coverage = Coverage(config_file=str(root / "pyproject.toml"))
     coverage.load()
-    with tempfile.NamedTemporaryFile(suffix=".json") as file:
-        coverage.json_report(outfile=file.name)
-        files = json.loads(Path(file.name).read_text())["files"]
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder) / "coverage.json"
+        coverage.json_report(outfile=str(report))
+        files = json.loads(report.read_text())["files"]
     return {
         Path(name): tuple(each["summary"][key] for key in COUNTS) for name, each in files.items()
     }
@@ -77,7 +79,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("room", nargs="?", help="list the files of this room")
     options = parser.parse_args()
-    measures = measured(ROOT)
+    try:
+        measures = measured(ROOT)
+    except NoDataError:
+        parser.error("nothing has been measured: run `make coverage`")
     if options.room is None:
         text = table(by_room(measures))
     else:
