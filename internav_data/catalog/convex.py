@@ -49,9 +49,9 @@ def convex_pieces(path: Path, vertices: Floats, faces: Ints, max_parts: int) -> 
     UsageError
         When the mesh encloses no volume, or coacd cannot cut it.
     """
-    whole = _piece(vertices)
+    hull_piece = _piece(vertices)
     extent = np.ptp(vertices, axis=0)
-    if whole is None or extent.min() < _MIN_THICKNESS_M:
+    if hull_piece is None or extent.min() < _MIN_THICKNESS_M:
         raise UsageError(
             f"{path}: encloses no volume (it is flat: {' x '.join(f'{e:.4g}' for e in extent)} m); "
             "give it at least 1 mm of thickness"
@@ -59,18 +59,20 @@ def convex_pieces(path: Path, vertices: Floats, faces: Ints, max_parts: int) -> 
     import trimesh  # noqa: PLC0415 - only for users with meshes
 
     mesh = trimesh.Trimesh(vertices, faces, process=True)
-    solid = bool(mesh.is_watertight) and abs(float(mesh.volume)) >= _CONVEX_SHARE * whole.volume
+    solid = (
+        bool(mesh.is_watertight) and abs(float(mesh.volume)) >= _CONVEX_SHARE * hull_piece.volume
+    )
     if solid or max_parts == 1:
-        return [whole]
+        return [hull_piece]
     pieces = [
         piece for points in _cut(path, mesh, max_parts) if (piece := _piece(points)) is not None
     ]
     total = sum(piece.volume for piece in pieces)
     if total <= 0.0:
         raise UsageError(f"{path}: encloses no volume; close its surface or give it thickness")
-    kept = [piece for piece in pieces if piece.volume >= _MIN_SHARE * total]
-    kept.sort(key=lambda piece: (-piece.volume, piece.corners.min(axis=0).tolist()))
-    return kept[:max_parts]
+    large = [piece for piece in pieces if piece.volume >= _MIN_SHARE * total]
+    large.sort(key=lambda piece: (-piece.volume, piece.corners.min(axis=0).tolist()))
+    return large[:max_parts]
 
 
 def _cut(path: Path, mesh: Any, max_parts: int) -> list[Floats]:  # noqa: ANN401 - trimesh

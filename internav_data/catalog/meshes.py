@@ -32,8 +32,8 @@ def _fixed_faces(shape: Shape) -> Ints:
     """Return the triangles of a box, cylinder or sphere: those of the unit solid."""
     from internav_data.records import Part  # noqa: PLC0415 - as a value only here
 
-    origin, whole = (0.0, 0.0, 0.0), (2.0, 2.0, 2.0)
-    unit = Part(shape, origin, whole, (0.0, 0.0, 0.0, 1.0), (), (0, 0, 0), "wood")
+    origin, size = (0.0, 0.0, 0.0), (2.0, 2.0, 2.0)
+    unit = Part(shape, origin, size, (0.0, 0.0, 0.0, 1.0), (), (0, 0, 0), "wood")
     faces = hull_faces(part_corners(unit))
     faces.flags.writeable = False
     return faces

@@ -8,7 +8,7 @@ Tables: `[default]` holds for every mesh, `["duck.obj"]` for one file. Keys of b
 - `pushable`, `pickable`: at most one of them; by default pushable
 - `scale`: metres for each unit of the file, default 1
 - `up`: which axis points up in the file, "y" or "z"; by default y for GLB and glTF, z for others
-- `lay_flat`: turned onto the face on which it rests most surely; by default false, as it is
+- `lay_flat`: turned onto its most stable face; by default false
 - `max_parts`: at most so many convex parts, 1 to 32, default 12
 
 Without the file, every mesh gets the defaults. `ignore = true` leaves a file out.

@@ -199,7 +199,7 @@ def _finished(draft: HouseDraft) -> House:
     plan, grid = draft.plan, draft.plan.grid
     count = len(plan.types)
     surfaces, materials = draw_materials(draft.key, plan.types)
-    used = sorted({thing.asset_id for thing in draft.objects})
+    used = sorted({item.asset_id for item in draft.objects})
     return House(
         scene_id=f"scene-{draft.key.scene:06d}",
         scene=draft.key.scene,

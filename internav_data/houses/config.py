@@ -138,11 +138,11 @@ def _is_integer(text: str) -> bool:
     return body.removeprefix("-").removeprefix("+").isdecimal()
 
 
-def _count(text: str, whole: str) -> int:
+def _count(text: str, option: str) -> int:
     value = int(text)
     if not 1 <= value <= MAX_ROOMS:
         raise UsageError(
-            f"rooms '{whole}': a house has 1 to {MAX_ROOMS} rooms, got {value}; give {COUNT_HELP}"
+            f"rooms '{option}': a house has 1 to {MAX_ROOMS} rooms, got {value}; give {COUNT_HELP}"
         )
     return value
 

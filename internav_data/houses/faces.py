@@ -31,12 +31,12 @@ class WallFace:
     """Number of windows in the face."""
 
 
-def poses_along(edge: WallFace, along: Floats) -> Floats:
+def poses_along(face: WallFace, along: Floats) -> Floats:
     """Return poses at distances along a wall face.
 
     Parameters
     ----------
-    edge
+    face
         Wall face of a room.
     along
         (n,) float64: distances from the face's start, metres.
@@ -46,10 +46,10 @@ def poses_along(edge: WallFace, along: Floats) -> Floats:
     ndarray
         (n, 3) float64: x and y in metres, quarter turns.
     """
-    dx, dy = ((1, 0), (0, 1), (-1, 0), (0, -1))[edge.turn]
+    dx, dy = ((1, 0), (0, 1), (-1, 0), (0, -1))[face.turn]
     out = np.empty((len(along), 3))
     for k, p in enumerate(along):
-        out[k] = (round_m(edge.x + dx * p), round_m(edge.y + dy * p), edge.turn)
+        out[k] = (round_m(face.x + dx * p), round_m(face.y + dy * p), face.turn)
     return out
 
 

@@ -125,27 +125,27 @@ class RoomState:
         penalties: list[Floats] = []
         # A finger's breadth to the walls on either side, as to the one behind.
         left, right = group.left - BACK_GAP_M, group.right + BACK_GAP_M
-        for edge in self.wall_faces:
-            spare = edge.length - (right - left)
+        for face in self.wall_faces:
+            spare = face.length - (right - left)
             if spare < 0.0:
                 continue
             count = max(1, int(spare / step) + 1)
             along: Floats = np.arange(count, dtype=np.float64) * step - left
-            along[-1] = edge.length - right
-            ends = np.minimum(along + left, edge.length - along - right)
+            along[-1] = face.length - right
+            ends = np.minimum(along + left, face.length - along - right)
             # Metres, roughly: a corner 0.2 m nearer outweighs the jitter.
             penalty = 0.6 * rng.random(count)
             if placement == "corner":
                 penalty += 3.0 * ends
             elif placement == "centre":
                 penalty += (
-                    1.2 * np.abs(along + 0.5 * (left + right) - edge.length / 2) - 0.15 * spare
+                    1.2 * np.abs(along + 0.5 * (left + right) - face.length / 2) - 0.15 * spare
                 )
             elif placement == "sun":
-                penalty += 0.3 * ends - 0.8 * min(edge.windows, 1)
+                penalty += 0.3 * ends - 0.8 * min(face.windows, 1)
             # One draw for the whole wall, so that rooms do not all begin at the same one.
             penalty += 0.8 * float(rng.random())
-            poses.append(poses_along(edge, along))
+            poses.append(poses_along(face, along))
             penalties.append(penalty)
         if not poses:
             return np.empty((0, 3))

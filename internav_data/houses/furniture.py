@@ -75,8 +75,8 @@ def _times(rule: FurnitureRule, picker: Picker, area_m2: float, density: float) 
     expected = (rule.share + rule.per_m2 * area_m2) * density
     if rule.share >= CERTAIN:
         expected = max(1.0, expected)
-    whole = int(expected)
-    return min(MAX_GROUPS, whole + (draw < expected - whole))
+    certain = int(expected)
+    return min(MAX_GROUPS, certain + (draw < expected - certain))
 
 
 def _furnish_room(state: RoomState, types: frozenset[str], picker: Picker, density: float) -> None:

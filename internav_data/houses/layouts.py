@@ -111,7 +111,7 @@ def _wrap(
     host, guest = cell
     area = specs[guest].area_m2 * 1e4
     min_width = min_width_cm(specs[guest])
-    if float(rng.random()) < 0.3:  # noqa: PLR2004 - ensuite: the whole far end
+    if float(rng.random()) < 0.3:  # noqa: PLR2004 - ensuite: all of the far end
         depth = max(min_width, snapped(area / (x1 - x0)))
         far: Rect = (x0, y0, x1, y0 + depth) if hall_above else (x0, y1 - depth, x1, y1)
         return {host: carve([rect], far), guest: [far]}

@@ -41,6 +41,7 @@ def _kind(types: tuple[str, str], config: HouseConfig, rng: Generator) -> tuple[
 def _placed(span: WallSpan, width: int, rng: Generator) -> int:
     """Draw the low end of an opening: near an end of the wall, so that furniture has its length."""
     spare = span.length - width
+    # Both numbers are drawn whatever the case: later draws do not depend on this one's outcome.
     draw, where = float(rng.random()), float(rng.random())
     offset = min(spare, 5 + int(20 * where))
     if draw < 0.4:  # noqa: PLR2004 - near the low end
@@ -114,6 +115,7 @@ def draw_windows(
         cooking = name == "living" and "kitchen" not in floor_plan.types
         width, sill, height = ROOM_TYPES["studio" if cooking else name].window
         top = min(sill + height, ceiling_cm - 15)
+        # Windows of equal pitch, 1.1 m apart or more; a short wall has one where its jambs fit.
         room_for = (segment.length - 2 * JAMB_CM) // (width + 110)
         if room_for == 0 and segment.length >= width + 6 * JAMB_CM:
             room_for = 1

@@ -140,7 +140,7 @@ class Picker:
         return found[int(draw * len(found))] if found else None
 
     def smallest(self, kind: str) -> Asset | None:
-        """Return the asset of a type that takes the least floor; None where there is none."""
+        """Return the asset of a type with the smallest plan; None where there is none."""
         found = self.catalogue.of_type(kind)
         return min(found, key=lambda a: (a.size[0] * a.size[1], a.asset_id), default=None)
 

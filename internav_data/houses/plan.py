@@ -1,4 +1,4 @@
-"""Floor plans on whole centimetres: rooms as cells of a grid, with their walls and neighbours.
+"""Floor plans on integer centimetres: rooms as cells of a grid, with their walls and neighbours.
 
 The grid's lines are where walls may stand; each cell belongs to one room or to OUTSIDE. That makes
 rooms tile their outline by construction: there are no overlaps and no gaps to check afterwards.
@@ -192,12 +192,12 @@ class FloorGrid:
 def _without_straight(path: list[Corner]) -> tuple[Corner, ...]:
     """Drop corners in the middle of straight lines."""
     count = len(path)
-    kept: list[Corner] = []
+    corners: list[Corner] = []
     for k in range(count):
         (ax, ay), (bx, by), (cx, cy) = path[k - 1], path[k], path[(k + 1) % count]
         if (bx - ax) * (cy - by) != (by - ay) * (cx - bx):
-            kept.append((bx, by))
-    return tuple(kept)
+            corners.append((bx, by))
+    return tuple(corners)
 
 
 @dataclass(frozen=True, slots=True)

@@ -111,13 +111,14 @@ def _standards(types: list[str], config: HouseConfig, rng: Generator) -> list[Ro
 
 def _areas(standards: list[RoomStandard], config: HouseConfig, rng: Generator) -> list[float]:
     """Draw the wanted areas, centre line to centre line, m²."""
+    # Log-normal, so that no area is negative; the paper preset then fits the house to its total.
     spread = 0.14 if config.preset == "paper" else 0.10
     areas = [s.area_m2 * math.exp(spread * float(rng.standard_normal())) for s in standards]
     areas = [min(s.high_m2, max(s.low_m2, a)) for s, a in zip(standards, areas, strict=True)]
     if config.preset == "paper":
         count = len(areas)
-        whole = PAPER_AREA_M2 * count * math.exp(0.12 * float(rng.standard_normal()))
-        factor = whole / sum(areas) * config.scale_of(count) ** 2
+        total = PAPER_AREA_M2 * count * math.exp(0.12 * float(rng.standard_normal()))
+        factor = total / sum(areas) * config.scale_of(count) ** 2
         areas = [max(s.low_m2, a * factor) for s, a in zip(standards, areas, strict=True)]
     # Walls take about a tenth of a real room and a twentieth of a generous one.
     return [a + 0.24 * math.sqrt(a) + 0.02 for a in areas]

@@ -33,7 +33,7 @@ def room_count(seed: int, scene: int, shares: Mapping[int, float] = SHARES) -> i
     Parameters
     ----------
     seed
-        Turns the whole sequence, so that seeds differ in their first scenes.
+        Shifts the sequence, so that seeds differ in their first scenes.
     scene
         Index of the scene, 0 and up.
     shares

@@ -67,11 +67,14 @@ def slice_rooms(
     first, second = order[:cut], order[cut:]
     if float(rng.random()) < 0.5:  # noqa: PLR2004 - a fair coin
         first, second, share = second, first, 1.0 - share
+    # Mostly across the longer side; the random factor lets nearly square rectangles go either way.
     wide = (x1 - x0) * (0.75 + 0.5 * float(rng.random())) > (y1 - y0)
     low, high = (x0, x1) if wide else (y0, y1)
     near = max(min_width_cm(specs[k]) for k in first)
     far = max(min_width_cm(specs[k]) for k in second)
     at = snapped(low + share * (high - low))
+    # The minima of both sides first; where they exclude each other, at least a grid step remains
+    # and the plan is refused later.
     at = max(low + near, min(high - far, at))
     at = max(low + GRID_CM, min(high - GRID_CM, at))
     one: Rect = (x0, y0, at, y1) if wide else (x0, y0, x1, at)

@@ -81,7 +81,8 @@ def _pieces(
 
 
 def build_walls(grid: FloorGrid, openings: Sequence[Opening], ceiling_cm: int) -> tuple[Wall, ...]:
-    """Return the boxes of all walls: those along x own the corners."""
+    """Return the boxes of all walls, with holes for doors and windows."""
+    # Walls along x reach over the corners; walls along y are cut there, so that none overlap.
     along_x = _runs(grid, along_x=True)
     out: list[Wall] = []
     for line, low, high in along_x:
