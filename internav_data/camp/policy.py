@@ -173,9 +173,9 @@ def reference_policies_beside(dataset: Dataset[Episode]) -> list[str]:
 def row_name(about: About) -> str:
     """Return the name of a run's row: its method, and how it differs from the default one."""
     words = [about.method]
-    if about.method in {"camp", "ppo-intent"}:
-        words += [f"--intent {about.intent}"] if about.intent not in {"", "integrated"} else []
-        words += [f"--sync-every {about.sync_every}"] if about.sync_every not in {None, 3} else []
+    # Methods without an intent have none of these two.
+    words += [f"--intent {about.intent}"] if about.intent not in {"", "integrated"} else []
+    words += [f"--sync-every {about.sync_every}"] if about.sync_every not in {None, 3} else []
     words += ["--without-intent"] if about.without_intent else []
     words += ["(cloned only)"] if about.cloned_frames and about.environment_steps == 0 else []
     return " ".join(words)
@@ -203,10 +203,12 @@ def _loaded(run: Path) -> Any:  # noqa: ANN401 - an Agent, with what its checkpo
 
 def _facts(agent: object, about: About) -> About:
     """Return `about` with the agent's `method`, `config` and `progress`."""
+    from internav_data.camp.agents import AGENTS  # noqa: PLC0415 - torch
+
     progress = getattr(agent, "progress", None)
     known = progress if isinstance(progress, Mapping) else {}
     method = str(getattr(agent, "method", type(agent).__name__))
-    has_intent = method in {"camp", "ppo-intent"}
+    has_intent = method in AGENTS and AGENTS[method].intent
     parameters = getattr(agent, "parameters", None)
     count = sum(p.numel() for p in parameters()) if parameters is not None else None
     seed = getattr(getattr(agent, "config", None), "seed", None)

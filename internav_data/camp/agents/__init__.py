@@ -35,6 +35,8 @@ class Method:
     """Text for `docs/training.md`."""
     privileged: str = "none"
     """Privileged input: observations that a robot would not have."""
+    intent: bool = False
+    """Whether it has an intent, so that `--intent` and `--sync-every` make variants of it."""
 
 
 AGENTS: Final = {
@@ -42,6 +44,7 @@ AGENTS: Final = {
         Hierarchy,
         "a global policy opens Navigate, Push or Pick, conditioned on what the whole model is "
         "about to do (section 4)",
+        intent=True,
     ),
     "hrl": Method(
         partial(Hierarchy, temporally_extended=False),
@@ -52,6 +55,7 @@ AGENTS: Final = {
     "ppo-intent": Method(
         PPOIntentAgent,
         "`ppo`, conditioned on what its own copy of some rollouts ago is about to do (figure 2c)",
+        intent=True,
     ),
     "nie": Method(
         NIEAgent,
