@@ -22,9 +22,9 @@ def calling(capsys, monkeypatch, tmp_path):
         def run(*words):
             with pytest.raises(SystemExit) as ended:
                 main([str(word) for word in words])
-            told = capsys.readouterr()
-            assert "Traceback" not in told.err
-            return ended.value.code, told.out, told.err
+            output = capsys.readouterr()
+            assert "Traceback" not in output.err
+            return ended.value.code, output.out, output.err
 
         return run
 

@@ -35,7 +35,7 @@ def test_reference_policies_are_measured_and_compared(call, dataset, tmp_path):
     rows = json.loads(out)["tables"][0]["rows"]
     measured = [row["name"] for row in rows if row["source"] == "reference"]
     assert sorted(measured) == ["expert", "random", "shortest_path"]
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["a"], "compare writes where told alone"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a"], "compare writes into --out alone"
     code, out, err = call("compare", "a", "--dataset", dataset, "--out", "b")
     assert code == 0, err
     assert "<figure" in (tmp_path / "b" / "report.html").read_text()
@@ -81,7 +81,7 @@ def test_episodes_can_be_chosen(call, dataset, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "code", "said"),
+    ("words", "code", "expected"),
     [
         (("best", "DATA"), 2, ["best", "expert, shortest_path, random"]),
         (("random,best", "DATA"), 2, ["random,best"]),
@@ -105,13 +105,13 @@ def test_episodes_can_be_chosen(call, dataset, tmp_path):
         (("DATA", "DATA"), None, ["data"]),
     ],
 )
-def test_errors_of_camp_eval_are_one_line(call, dataset, tmp_path, words, code, said):
+def test_errors_of_camp_eval_are_one_line(call, dataset, tmp_path, words, code, expected):
     got, out, err = call(*[dataset if word == "DATA" else word for word in words])
     assert got == code or (code is None and got in {2, 5})
     assert out == ""
     (line,) = beside_the_dataset(err)
     assert line.startswith("camp-eval: ")
-    for word in said:
+    for word in expected:
         assert word in line
     assert not list(tmp_path.iterdir()), "nothing is written"
 

@@ -65,7 +65,7 @@ def test_a_run_is_trained_and_measured(call, dataset, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "code", "told"),
+    ("words", "code", "expected"),
     [
         (("DATA", "--nonsense"), 2, ["--nonsense"]),
         ((), 5, ["internav-dataset", "internav-gen generate"]),
@@ -86,12 +86,12 @@ def test_a_run_is_trained_and_measured(call, dataset, tmp_path):
         (("NOTHING",), 5, ["NOTHING", "manifest.json"]),
     ],
 )
-def test_errors_of_camp_train_are_one_line(call, dataset, tmp_path, words, code, told):
+def test_errors_of_camp_train_are_one_line(call, dataset, tmp_path, words, code, expected):
     given = [dataset if word == "DATA" else word for word in words]
     found, out, err = call(*given)
     assert (found, out) == (code, ""), err
     assert len(beside_the_dataset(err)) == 1
-    for word in told:
+    for word in expected:
         assert word in err
     assert not list(tmp_path.iterdir()), "nothing is written"
 
@@ -99,20 +99,20 @@ def test_errors_of_camp_train_are_one_line(call, dataset, tmp_path, words, code,
 def test_a_checkpoint_that_is_no_checkpoint_is_refused(call, dataset, tmp_path):
     assert call(dataset, *TINY, "--steps", 96)[0] == 0
     (about,) = (tmp_path / "runs" / "ppo-0" / "checkpoints").glob("*/checkpoint.json")
-    said = json.loads(about.read_text())
+    values = json.loads(about.read_text())
     for change, words in (
         ({"format": 99}, "format 99"),
-        ({"config": said["config"] | {"network": said["config"]["network"] | {"hidden": 16}}},
+        ({"config": values["config"] | {"network": values["config"]["network"] | {"hidden": 16}}},
          "another agent's weights"),
         ({"method": "camp"}, "another agent's weights"),
         ({"config": {"nothing": 1}}, "nothing"),
-        ({"progress": said["progress"] | {"log": "x"}}, "log"),
-        ({"progress": said["progress"] | {"critics": {"main": -1}}}, "critics"),
-        ({"progress": said["progress"] | {"window": 3}}, "window"),
-        ({"progress": said["progress"] | {"parts": [1]}}, "parts[0]"),
-        ({"progress": said["progress"] | {"parts": ["all", "single"]}}, "--stages"),
+        ({"progress": values["progress"] | {"log": "x"}}, "log"),
+        ({"progress": values["progress"] | {"critics": {"main": -1}}}, "critics"),
+        ({"progress": values["progress"] | {"window": 3}}, "window"),
+        ({"progress": values["progress"] | {"parts": [1]}}, "parts[0]"),
+        ({"progress": values["progress"] | {"parts": ["all", "single"]}}, "--stages"),
     ):  # fmt: skip
-        about.write_text(json.dumps(said | change))
+        about.write_text(json.dumps(values | change))
         code, _, err = call(dataset, "--out", "runs/ppo-0", "--resume")
         assert code == 5, err
         assert words in err

@@ -28,7 +28,7 @@ def run(*words, cwd=None, **env):
 
 
 def one_line(process, code, *words):
-    """The command failed with a code and said so in one line that holds these words."""
+    """The command failed with a code and one line that holds these words."""
     assert process.returncode == code, process.stderr
     lines = beside_the_dataset(process.stderr)
     assert len(lines) == 1, process.stderr
@@ -56,10 +56,10 @@ def test_help_has_examples_and_is_fast(words):
     seconds = []
     for _ in range(3):
         began = cpu_seconds()
-        told = run(*words)
+        result = run(*words)
         seconds.append(cpu_seconds() - began)
-    assert told.returncode == 0
-    assert "Examples:" in told.stdout
+    assert result.returncode == 0
+    assert "Examples:" in result.stdout
     # 200 ms are promised (0.13 s measured); a slow machine gets some more.
     assert min(seconds) < 0.6
 
@@ -77,8 +77,10 @@ def test_help_imports_nothing_heavy():
         "except SystemExit: pass\n"
         "print(sorted({'numpy', 'pyarrow', 'numba', 'pybullet', 'cv2'} & set(sys.modules)))"
     )
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert told.stdout.splitlines()[-1] == "[]"
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert result.stdout.splitlines()[-1] == "[]"
 
 
 def test_every_command_has_examples():
@@ -130,8 +132,8 @@ def test_invalid_arguments_are_usage_errors(tmp_path, words, expected):
 
 def test_an_unknown_key_in_a_file_is_named_with_its_file(tmp_path):
     (tmp_path / "mine.toml").write_text("[episodes]\nmax_obstacle = 3\n")
-    told = run("generate", "--out", "x", "--config", "mine.toml", cwd=tmp_path)
-    one_line(told, 2, "mine.toml", "episodes.max_obstacle", "episodes.max_obstacles")
+    result = run("generate", "--out", "x", "--config", "mine.toml", cwd=tmp_path)
+    one_line(result, 2, "mine.toml", "episodes.max_obstacle", "episodes.max_obstacles")
 
 
 def test_a_folder_that_holds_something_else(tmp_path):
@@ -143,8 +145,8 @@ def test_a_folder_that_holds_something_else(tmp_path):
 @pytest.mark.parametrize("text", ["not a plan", "[[rooms]]\n"])
 def test_a_broken_floor_plan(tmp_path, text):
     (tmp_path / "plan.toml").write_text(text)
-    told = run("generate", "--out", "x", "--floor-plan", "plan.toml", cwd=tmp_path)
-    one_line(told, 2, "plan.toml")
+    result = run("generate", "--out", "x", "--floor-plan", "plan.toml", cwd=tmp_path)
+    one_line(result, 2, "plan.toml")
     assert not (tmp_path / "x").exists()
 
 
@@ -182,9 +184,9 @@ def test_a_finished_dataset_is_left_alone(dataset):
 
 
 def test_options_of_episodes_are_settings():
-    told = run("generate", "--push-model", "kick", "--keep-unsolvable", "--print-config")
-    assert 'push_model = "kick"' in told.stdout
-    assert "keep_unsolvable = true" in told.stdout
+    result = run("generate", "--push-model", "kick", "--keep-unsolvable", "--print-config")
+    assert 'push_model = "kick"' in result.stdout
+    assert "keep_unsolvable = true" in result.stdout
 
 
 def test_a_single_episode_again(dataset):
@@ -218,31 +220,31 @@ def test_no_dataset_is_corrupt_data(tmp_path):
 
 
 def test_the_resolved_config_reads_back(tmp_path):
-    told = run(
+    result = run(
         "generate", "--print-config", "--rooms", "2-4", "--set", "episodes.max_spawn_tries=77"
     )
     path = tmp_path / "mine.toml"
-    path.write_text(told.stdout)
+    path.write_text(result.stdout)
     again = run("generate", "--print-config", "--config", path)
-    assert again.stdout == told.stdout
-    assert 'rooms = "2-4"' in told.stdout
-    assert "max_spawn_tries = 77" in told.stdout
+    assert again.stdout == result.stdout
+    assert 'rooms = "2-4"' in result.stdout
+    assert "max_spawn_tries = 77" in result.stdout
 
 
 def test_a_dry_run_forecasts_time_and_size(tmp_path):
-    told = run("generate", *SMALL, "--dry-run", "--json", cwd=tmp_path)
-    said = json.loads(told.stdout)
-    assert (said["scenes"], said["episodes"]) == (3, 5)
-    assert said["seconds"] > 0
-    assert said["bytes"] > 0
+    result = run("generate", *SMALL, "--dry-run", "--json", cwd=tmp_path)
+    values = json.loads(result.stdout)
+    assert (values["scenes"], values["episodes"]) == (3, 5)
+    assert values["seconds"] > 0
+    assert values["bytes"] > 0
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("where", ["", "cache", "file/below"])
 def test_doctor_shows_the_result_cache(tmp_path, where):
     (tmp_path / "file").write_text("in the way")
-    told = run("doctor", "--json", INTERNAV_CACHE_DIR=str(tmp_path / where) if where else "")
-    check = next(c for c in json.loads(told.stdout) if c["name"] == "solved pushes")
+    result = run("doctor", "--json", INTERNAV_CACHE_DIR=str(tmp_path / where) if where else "")
+    check = next(c for c in json.loads(result.stdout) if c["name"] == "solved pushes")
     state, found = {
         "": ("good", "none kept"),
         "cache": ("good", "MB at"),
@@ -254,9 +256,9 @@ def test_doctor_shows_the_result_cache(tmp_path, where):
 
 
 def test_doctor_passes_on_this_machine(tmp_path):
-    told = run("doctor", "--out", tmp_path, "--json")
-    checks = {check["name"]: check for check in json.loads(told.stdout)}
-    assert told.returncode == 0
+    result = run("doctor", "--out", tmp_path, "--json")
+    checks = {check["name"]: check for check in json.loads(result.stdout)}
+    assert result.returncode == 0
     assert {"Python", "pybullet", "cores", "disk", "numba cache"} <= set(checks)
     assert all(check["remedy"] for check in checks.values() if check["state"] != "good")
 
@@ -270,15 +272,15 @@ def test_a_signal_ends_in_order_and_finished_scenes_stay(tmp_path, signum, code)
     while not list(tmp_path.rglob("scene-*.work")) and time.monotonic() < deadline:
         time.sleep(0.05)
     process.send_signal(signum)
-    _, told = process.communicate(timeout=300)
+    _, result = process.communicate(timeout=300)
     assert process.returncode == code
-    assert len(beside_the_dataset(told)) == 1, told
-    assert "run the same command again to continue" in told
+    assert len(beside_the_dataset(result)) == 1, result
+    assert "run the same command again to continue" in result
     assert list(tmp_path.rglob("scene-*.work"))
 
 
 def test_a_reader_that_leaves_early_is_no_error():
     words = f"{GEN} assets --type SideTable | head -1"
-    told = subprocess.run(["bash", "-c", words], capture_output=True, text=True, check=True)
-    assert told.stdout.startswith("SideTable_")
-    assert told.stderr == ""
+    result = subprocess.run(["bash", "-c", words], capture_output=True, text=True, check=True)
+    assert result.stdout.startswith("SideTable_")
+    assert result.stderr == ""

@@ -47,10 +47,10 @@ def dataset(tmp_path_factory):
 def test_an_expert_is_filmed_as_mp4_and_gif_and_no_file_is_overwritten(dataset, tmp_path):
     name = tmp_path / "there" / "film"
     words = ("replay", dataset, "scene-000002/0001", "--size", 160, "--fps", 4)
-    told = run(*words, "--out", f"{name}.mp4", "--out", f"{name}.gif")
-    assert told.returncode == 0, told.stderr
-    assert told.stdout == ""
-    assert told.stderr.count("reaches the goal") == 2
+    result = run(*words, "--out", f"{name}.mp4", "--out", f"{name}.gif")
+    assert result.returncode == 0, result.stderr
+    assert result.stdout == ""
+    assert result.stderr.count("reaches the goal") == 2
     for kind in ("mp4", "gif"):
         good, frame = cv2.VideoCapture(f"{name}.{kind}").read()
         assert good
@@ -72,9 +72,9 @@ def test_actions_of_a_file_are_filmed(dataset, tmp_path):
         json.dumps({"episode_id": "scene-000002/0001", "actions": ["LookDown", "Done"]})
     )
     words = ("--size", 160, "--fps", 4, "--format", "gif")
-    told = run("replay", dataset, "--actions", mine, *words, cwd=tmp_path)
-    assert told.returncode == 0, told.stderr
-    assert "2 actions, does not end at the goal" in told.stderr
+    result = run("replay", dataset, "--actions", mine, *words, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert "2 actions, does not end at the goal" in result.stderr
     assert (tmp_path / "scene-000002-0001.gif").read_bytes().startswith(b"GIF89a")
     refused(run("replay", dataset, "0/0", "--actions", mine, *words), 2, "mine.json", "not for")
     mine.write_text('["Jump"]')
@@ -82,7 +82,7 @@ def test_actions_of_a_file_are_filmed(dataset, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "expected"),
     [
         (("99/0",), ["scene-000099/0000", "stats"]),
         (("2/9",), ["scene-000002/0009"]),
@@ -96,17 +96,17 @@ def test_actions_of_a_file_are_filmed(dataset, tmp_path):
         (("2/0", "--actions", "none.json"), ["none.json"]),
     ],
 )
-def test_errors_of_replay_are_one_line(dataset, tmp_path, monkeypatch, capsys, words, said):
+def test_errors_of_replay_are_one_line(dataset, tmp_path, monkeypatch, capsys, words, expected):
     from internav_cli.main import main
 
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as ended:
         main(["replay", str(dataset), *words])
-    told = capsys.readouterr()
+    result = capsys.readouterr()
     assert ended.value.code == 2
-    assert told.out == ""
-    (line,) = beside_the_dataset(told.err)
-    for word in said:
+    assert result.out == ""
+    (line,) = beside_the_dataset(result.err)
+    for word in expected:
         assert word in line
     assert not list(tmp_path.iterdir()), "nothing is written"
 

@@ -25,15 +25,15 @@ def test_flipped_bytes_are_never_silently_wrong(damaged_folder, truth, table):
     path = damaged_folder / file.path
     data = path.read_bytes()
     places = {"episodes": 50, "scenes": 15, "assets": 15}[table]
-    said = []
+    messages = []
     for at in rng(5).integers(0, len(data), places).tolist():
         path.write_bytes(data[:at] + bytes([data[at] ^ (1 << at % 8)]) + data[at + 1 :])
         try:
             assert read_all(damaged_folder) == truth
         except CorruptDataError as error:
-            said.append(str(error))
-    assert len(said) > places // 2
-    assert all(file.path in words and "generate" in words for words in said)
+            messages.append(str(error))
+    assert len(messages) > places // 2
+    assert all(file.path in words and "generate" in words for words in messages)
     path.write_bytes(data)
     assert read_all(damaged_folder) == truth
 

@@ -52,11 +52,11 @@ def test_files_obey_their_schemas(dataset_folder):
     for name in ("manifest", "stats"):
         schema = json.loads((dataset_folder / "schemas" / f"{name}.schema.json").read_text())
         check = jsonschema.Draft202012Validator(schema)
-        said = json.loads((dataset_folder / f"{name}.json").read_text())
-        check.validate(said)
+        values = json.loads((dataset_folder / f"{name}.json").read_text())
+        check.validate(values)
         assert schema["required"]
         for key in schema["required"]:
-            assert not check.is_valid({k: v for k, v in said.items() if k != key}), key
+            assert not check.is_valid({k: v for k, v in values.items() if k != key}), key
 
 
 def test_arrow_and_json_schemas_have_the_same_columns_and_nulls():

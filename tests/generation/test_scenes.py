@@ -70,8 +70,13 @@ def test_unsolvable_episodes_stay_on_demand(monkeypatch, tmp_path):
     assert [episode.expert for episode in held] == [None, None]
     assert all(obstacle.outcomes for episode in held for obstacle in episode.obstacles)
     assert "no expert" not in manifest.redraws
-    said = compute_stats(tmp_path)["expert"]
-    assert (said["solved"], said["solved_share"], said["spl"], said["refused"]) == (0, 0, 0, 0)
+    values = compute_stats(tmp_path)["expert"]
+    assert (values["solved"], values["solved_share"], values["spl"], values["refused"]) == (
+        0,
+        0,
+        0,
+        0,
+    )
 
 
 def test_real_scenes_have_the_same_bytes_for_any_workers(dataset, tmp_path):
@@ -85,8 +90,8 @@ def test_real_scenes_have_the_same_bytes_for_any_workers(dataset, tmp_path):
 def test_a_scene_again_is_compared(dataset, tmp_path):
     text, verdict = scene_again(CONFIG, 2, 1, dataset)
     assert "the same as in" in verdict
-    said = json.loads(text)
-    assert said["episode_id"] == "scene-000002/0001"
+    values = json.loads(text)
+    assert values["episode_id"] == "scene-000002/0001"
     assert "assets" not in json.loads(scene_again(CONFIG, 2)[0])["scene"]
     other = dataclasses.replace(CONFIG, seed=1)
     with pytest.raises(UsageError, match="another config"):
