@@ -101,6 +101,7 @@ class CheckedLattice:
         """Return the number of steps from every node to a goal, inf if none, shape (n,)."""
         if free is self.free and goal in self._distances:
             return self._distances[goal]
+        # Without weights scipy's Dijkstra counts edges, as a breadth-first search does.
         steps = dijkstra(self._graph(free), directed=False, indices=[goal], unweighted=True)[0]
         out = np.asarray(steps, dtype=np.float64)
         if free is self.free:

@@ -23,6 +23,7 @@ DEPTH_M = 0.001
 
 def plans_overlap(first: Geometry, second: Geometry, depth_m: float = DEPTH_M) -> bool:
     """Return whether two plans share a disc of diameter `depth_m` (or more)."""
+    # A strip as long as a room and thinner than the rounding has a large area but holds no disc.
     shared = shapely.intersection(first, second)
     if shapely.area(shared) < np.pi * (depth_m / 2.0) ** 2:
         return False
@@ -45,12 +46,17 @@ def _half_spaces(corners: Floats) -> Floats:
 
 
 def hulls_overlap(first: Floats, second: Floats, depth_m: float = DEPTH_M) -> bool:
-    """Return whether a ball of diameter `depth_m` fits into both hulls of corners (n, 3)."""
+    """Return whether a ball of diameter `depth_m` fits into both hulls of corners (n, 3).
+
+    The largest ball is the Chebyshev centre of all half-spaces, a linear programme (Boyd and
+    Vandenberghe 2004, section 8.5.1).
+    """
     try:
         planes = np.vstack([_half_spaces(first), _half_spaces(second)])
     except (QhullError, ValueError):  # a flat part has no inside
         return False
-    # Normals have length one, so the last column is the ball's radius.
+    # Unknowns are the centre and the radius r: n · x + r <= d for each half-space, largest r.
+    # Normals have length one, so that r is in metres.
     limits = np.column_stack([planes[:, :3], np.ones(len(planes))])
     answer = linprog(
         [0.0, 0.0, 0.0, -1.0],
@@ -78,6 +84,7 @@ def overlapping_slabs(
         if pair[0] >= pair[1] or pair in found or may_interlock(*pair):
             continue
         one, two = slabs[a], slabs[b]
+        # Heights first: an interval costs nothing, a hull a millisecond.
         if min(one.high, two.high) - max(one.low, two.low) <= depth_m:
             continue
         if plans_overlap(one.plan, two.plan, depth_m) and hulls_overlap(

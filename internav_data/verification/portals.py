@@ -49,9 +49,11 @@ class Portals:
         self._doors_of_room = np.zeros((len(rooms), len(doors)), dtype=np.bool_)
         for d, door in enumerate(doors):
             self._doors_of_room[[numbers[room] for room in door.rooms], d] = True
+        # Doors that share a room are joined by a straight line, whatever stands in between.
         beside = self._doors_of_room.T.astype(int) @ self._doors_of_room.astype(int) > 0
         gaps = shapely.distance(self._doors[:, None], self._doors[None, :])
         self._door_to_door_m = np.where(beside, gaps, np.inf).reshape(len(doors), len(doors))
+        # Floyd (1962) and Warshall (1962): all shortest chains, allowing door after door as a stop.
         for k in range(len(doors)):
             around = self._door_to_door_m[:, k : k + 1] + self._door_to_door_m[k : k + 1, :]
             self._door_to_door_m = np.minimum(self._door_to_door_m, around)

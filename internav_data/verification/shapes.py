@@ -120,6 +120,8 @@ def slice_of(corners: Floats, edges: Ints, low: float, high: float) -> Floats:
         return corners[:, :2]
     pieces = [corners[(z >= low) & (z <= high), :2]]
     first, second = corners[edges[:, 0]], corners[edges[:, 1]]
+    # Between two planes a convex solid is the hull of its corners there and of the points at which
+    # its edges cross the planes.
     for level in (low, high):
         cut = (first[:, 2] - level) * (second[:, 2] - level) < 0.0
         a, b = first[cut], second[cut]

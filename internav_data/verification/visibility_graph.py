@@ -74,6 +74,7 @@ class InflatedPolygons:
                 points = shapely.get_coordinates(ring)[:-1]
                 previous, following = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
                 bend = _cross(points - previous, following - points)
+                # A shortest path bends round convex corners alone: others would shorten it.
                 convex = bend > 0.0
                 corners.append(points[convex])
                 before.append(previous[convex])
