@@ -103,16 +103,18 @@ demo-train: $(STAMP) ## see CaMP learn on a small dataset: about five minutes
 	@echo "Look at   $(DEMO)/trained/report.html: tables, curves, where it went"
 	@echo "Watch     $(DEMO)/trained/videos: what it saw and meant, step by step"
 
-.PHONY: test
-test: $(STAMP) ## run the tests (but not the slow campaigns)
-	$(BIN)/python -m pytest -q -m 'not slow and not learning' -n 2 --dist loadfile $(ARGS)
+TESTS := -q -m 'not slow and not learning' -n 2 --dist loadfile
 
-.PHONY: coverage
-coverage: $(STAMP) ## run the tests, print what they cover a room: 1.8 times as slow
+.PHONY: test
+test: $(STAMP) ## run the tests (not the slow campaigns); COVERAGE=1 prints what they cover a room
+ifdef COVERAGE
 	rm -rf build/coverage && mkdir -p build/coverage
-	$(BIN)/coverage run -m pytest -q -m 'not slow and not learning' -n 2 --dist loadfile $(ARGS)
+	$(BIN)/coverage run -m pytest $(TESTS) $(ARGS)
 	$(BIN)/coverage combine --quiet
 	$(BIN)/python docs/covered.py
+else
+	$(BIN)/python -m pytest $(TESTS) $(ARGS)
+endif
 
 .PHONY: test-slow
 test-slow: $(STAMP) ## run the slow campaigns
@@ -147,11 +149,12 @@ bench: $(STAMP) ## run the benchmarks: JSON into bench-results/
 	@echo "Results: bench-results/*.json"
 
 .PHONY: check
-check: $(STAMP) ## lint, format, types, layers, schemas
+check: $(STAMP) ## lint, format, types, layers, language, schemas
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
+	$(BIN)/python docs/check_language.py
 	$(BIN)/internav-gen schema --out build/schemas
 	diff -r schemas build/schemas
 
