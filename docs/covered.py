@@ -1,4 +1,4 @@
-"""Print the share of each room that tests run, from what `make coverage` has measured.
+"""Print the share of each room that tests run, from what `make test COVERAGE=1` has measured.
 
     python docs/covered.py           # all rooms
     python docs/covered.py camp      # files of one room
@@ -33,7 +33,7 @@ def measured(root: Path) -> dict[Path, Counts]:
     Raises
     ------
     coverage.exceptions.NoDataError
-        Nothing was measured: run `make coverage` first.
+        Nothing was measured: run `make test COVERAGE=1` first.
     """
     coverage = Coverage(config_file=str(root / "pyproject.toml"))
     coverage.load()
@@ -82,7 +82,7 @@ def main() -> None:
     try:
         measures = measured(ROOT)
     except NoDataError:
-        parser.error("nothing has been measured: run `make coverage`")
+        parser.error("nothing has been measured: run `make test COVERAGE=1`")
     if options.room is None:
         text = table(by_room(measures))
     else:
