@@ -46,7 +46,7 @@ def test_a_cut_in_the_last_row_expects_what_was_seen_before_the_reset():
     assert _one(REWARDS, VALUES, 0.6, _at(3), _at(1, 4), final)[4] == pytest.approx(0.1 + 0.99 * 2)
 
 
-def _scalar(rewards, values, last, terminated, truncated, final, gamma, lam):
+def _scalar(rewards, values, last, terminated, truncated, final, gamma, gae_lambda):
     """Sum discounted surprises from each row on, in float64, until an end: the definition."""
     steps = len(rewards)
     found = np.zeros(steps)
@@ -62,7 +62,7 @@ def _scalar(rewards, values, last, terminated, truncated, final, gamma, lam):
             found[t] += weight * (rewards[k] + gamma * ahead - values[k])
             if terminated[k] or truncated[k]:
                 break
-            weight *= gamma * lam
+            weight *= gamma * gae_lambda
     return found
 
 
@@ -73,16 +73,16 @@ def test_agrees_with_a_scalar_reference(seed):
     floats = rng.normal(size=(3, steps, count))
     flags = rng.random((2, steps, count)) < 0.2
     last = rng.normal(size=count)
-    gamma, lam = rng.random(2)
+    gamma, gae_lambda = rng.random(2)
     found = advantages_of(
         *(torch.tensor(x, dtype=torch.float32) for x in (floats[0], floats[1], last)),
         *(torch.tensor(x) for x in flags),
-        torch.tensor(floats[2], dtype=torch.float32), gamma=gamma, gae_lambda=lam,
+        torch.tensor(floats[2], dtype=torch.float32), gamma=gamma, gae_lambda=gae_lambda,
     )  # fmt: skip
     for k in range(count):
         right = _scalar(
             floats[0][:, k], floats[1][:, k], last[k], flags[0][:, k], flags[1][:, k],
-            floats[2][:, k], gamma, lam,
+            floats[2][:, k], gamma, gae_lambda,
         )  # fmt: skip
         assert found[:, k].numpy() == pytest.approx(right, abs=1e-5)
 

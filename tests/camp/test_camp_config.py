@@ -44,7 +44,7 @@ def test_plain_data_is_read_back():
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "words"),
     [
         ({"ppo": {"clip_cof": 0.1}}, "did you mean 'ppo.clip_coef'"),
         ({"ppo": {"clip_coef": "much"}}, "expected a number"),
@@ -58,8 +58,8 @@ def test_plain_data_is_read_back():
         ({"seed": -1}, "seed is -1"),
     ],
 )
-def test_invalid_settings_are_refused(changes, said):
-    with pytest.raises(UsageError, match=said.replace(".", r"\.")):
+def test_invalid_settings_are_refused(changes, words):
+    with pytest.raises(UsageError, match=words.replace(".", r"\.")):
         from_mapping(preset("small"), changes, "file")
 
 

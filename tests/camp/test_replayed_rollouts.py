@@ -26,13 +26,13 @@ def curious(config):
     return {"agent": {"initial_interaction_probability": 0.3}}
 
 
-@pytest.mark.parametrize(("method", "told"), VARIANTS)
+@pytest.mark.parametrize(("method", "condition"), VARIANTS)
 @pytest.mark.parametrize("shared", [True, False])
 def test_log_probabilities_and_values_are_those_of_the_rollout(
-    collected, curious, method, told, shared
+    collected, curious, method, condition, shared
 ):
     """Across ends of episodes, and ends of rollouts in mid-interaction."""
-    changes = {"agent": {**curious["agent"], **told}, "network": {"shared_encoder": shared}}
+    changes = {"agent": {**curious["agent"], **condition}, "network": {"shared_encoder": shared}}
     agent, _, lived = collected(method, rollouts=4, changes=changes)
     for rollout in lived:
         now = agent.evaluate(rollout.batch)

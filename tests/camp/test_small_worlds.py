@@ -18,7 +18,7 @@ from small_worlds import (
 )
 
 
-def begun(kind, side=1):
+def started(kind, side=1):
     """Two cells of the corridor to the thing in the way, two more to its end, one to the goal."""
     env = Mixed(1, ids=True)
     env.reset()
@@ -42,7 +42,9 @@ START_M = 0.25 * 17**0.5
 @pytest.mark.parametrize(("kind", "right"), [(BOX, PUSH), (THING, PICKUP), (BLOCK, DONE)])
 def test_each_kind_is_cleared_by_its_own_action_alone(kind, right):
     for action in (PUSH, PICKUP):
-        whole, reached = paid(begun(kind), [AHEAD, action, AHEAD, AHEAD, AHEAD, RIGHT, AHEAD, DONE])
+        whole, reached = paid(
+            started(kind), [AHEAD, action, AHEAD, AHEAD, AHEAD, RIGHT, AHEAD, DONE]
+        )
         assert reached == (action == right)
         if reached:
             assert whole == pytest.approx(10 + 1 + START_M - 0.08)
@@ -54,21 +56,21 @@ def test_each_kind_is_cleared_by_its_own_action_alone(kind, right):
 def test_the_way_round_a_block_is_beside_it(side):
     out, back = (RIGHT, LEFT) if side > 0 else (LEFT, RIGHT)
     way = [out, AHEAD, back, AHEAD, AHEAD, AHEAD, AHEAD, DONE]
-    whole, reached = paid(begun(BLOCK, side), way)
+    whole, reached = paid(started(BLOCK, side), way)
     assert reached
     assert whole == pytest.approx(10 + START_M - 0.08)
-    assert not paid(begun(BLOCK, -side), way)[1]
-    assert not paid(begun(BOX, side), way)[1]
+    assert not paid(started(BLOCK, -side), way)[1]
+    assert not paid(started(BOX, side), way)[1]
 
 
 def test_what_is_put_down_in_the_way_closes_it_again():
     again = [AHEAD, PICKUP, DROP, PICKUP, DROP, PICKUP]
-    whole, _ = paid(begun(THING), again)  # one opening: the others were closed again
+    whole, _ = paid(started(THING), again)  # one opening: the others were closed again
     assert whole == pytest.approx(START_M - 0.25 * 10**0.5 + 1 - 0.06)
 
 
 def test_kinds_are_told_apart_by_sight():
-    views = {kind: begun(kind).look() for kind in (BOX, THING, BLOCK)}
+    views = {kind: started(kind).look() for kind in (BOX, THING, BLOCK)}
     assert [tuple(views[k]["rgb"][0, 17, 16]) for k in (BOX, BLOCK)] == [(220, 40, 40), (150,) * 3]
     assert tuple(views[THING]["rgb"][0, 19, 16]) == (40, 200, 60)
     assert [int(views[k]["ids"].max()) for k in views] == [1, 2, 3]
@@ -76,7 +78,7 @@ def test_kinds_are_told_apart_by_sight():
     assert views[BLOCK]["rgb"][0, :, :4].max() == views[BOX]["rgb"][0, :, -4:].max() == 20
     right = np.arctan(1 / 4)  # bearings to the left are positive
     assert views[BOX]["goal"][0].tolist() == pytest.approx([START_M, -right])
-    turned = begun(BOX)
+    turned = started(BOX)
     seen, *_ = turned.step(np.array([RIGHT]))
     assert seen["goal"][0].tolist() == pytest.approx([START_M, np.pi / 2 - right])
 

@@ -36,14 +36,14 @@ def test_durations_as_people_read_them():
     ]
 
 
-def begun(stream):
+def started(stream):
     progress = GenerationProgress(stream)
     progress.begin(scenes=100, done=40, episodes_left=600)
     return progress
 
 
 def test_the_line_has_rate_and_remaining_time(wait):
-    progress = begun(None)
+    progress = started(None)
     wait(10.0)
     for _ in range(10):
         progress.scene(10, expected=10)
@@ -53,7 +53,7 @@ def test_the_line_has_rate_and_remaining_time(wait):
 
 
 def test_a_first_run_that_compiles_says_so(wait):
-    progress = begun(None)
+    progress = started(None)
     wait(2.0)
     assert "compiling" not in progress.line()
     wait(18.0)
@@ -62,7 +62,7 @@ def test_a_first_run_that_compiles_says_so(wait):
 
 def test_a_terminal_gets_one_line_that_renews_itself(wait):
     stream = Terminal()
-    progress = begun(stream)
+    progress = started(stream)
     wait(1.0)
     progress.tick()
     wait(0.1)
@@ -74,7 +74,7 @@ def test_a_terminal_gets_one_line_that_renews_itself(wait):
 
 def test_a_file_gets_a_plain_line_now_and_then(wait):
     stream = io.StringIO()
-    progress = begun(stream)
+    progress = started(stream)
     wait(1.0)
     progress.tick()
     assert stream.getvalue() == ""
@@ -86,7 +86,7 @@ def test_a_file_gets_a_plain_line_now_and_then(wait):
 
 
 def test_silence_without_a_stream(wait, capsys):
-    progress = begun(None)
+    progress = started(None)
     wait(100.0)
     assert not progress.due()
     progress.tick()

@@ -159,11 +159,11 @@ def test_a_programme_is_kept(assets, oracle, rooms):
 
 
 def test_more_furnishing_means_more_things(assets):
-    def things(furnishing):
+    def object_count(furnishing):
         config = HouseConfig(rooms="6", furnishing=furnishing)
         return sum(len(build_house(2, k, config, assets).objects) for k in range(8))
 
-    assert things(0.2) < things(1.0) < things(1.8)
+    assert object_count(0.2) < object_count(1.0) < object_count(1.8)
 
 
 def test_more_loops_mean_more_doors(assets):

@@ -34,7 +34,7 @@ class Grid:
     rows: int
     side: float = 4.0
 
-    def house(self, scene=7, things=()):
+    def house(self, scene=7, objects=()):
         lines_x = [k * self.side - HALF_WALL for k in range(self.columns + 1)]
         lines_y = [k * self.side - HALF_WALL for k in range(self.rows + 1)]
         rooms = tuple(
@@ -53,7 +53,7 @@ class Grid:
             scene,
             doors=doors,
             walls=walls,
-            objects=tuple(things),
+            objects=tuple(objects),
             room_graph=tuple(sorted(d.rooms for d in doors)),
             assets=ASSETS,
         )
@@ -273,12 +273,12 @@ def small_scenes():
 
 def _scene(number):
     split = {0: "val", 1: "test"}.get(number, "train")
-    things = (
+    objects = (
         builders.scene_object(0, "Table_1", 0, 1.0, 0.6),
         builders.scene_object(1, "Cupboard_1", 1, 6.0, 3.5),
         builders.scene_object(2, "Box_1", 1, 6.5, 0.5, yaw_deg=45.0),
     )
-    house = replace(Grid(2, 1).house(number, things), split=split)
+    house = replace(Grid(2, 1).house(number, objects), split=split)
     start, goal = (4, 8), (28, 8)
     here, there = (1.0, 2.0), (7.0, 2.0)
     made = []

@@ -140,8 +140,8 @@ def test_what_does_not_block_has_no_footprint():
 # lattice
 
 
-def furnished(*things):
-    return Grid(2, 1).house(3, things)
+def furnished(*objects):
+    return Grid(2, 1).house(3, objects)
 
 
 def test_steps_are_those_of_a_brute_force():

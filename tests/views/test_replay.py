@@ -315,7 +315,7 @@ def test_actions_are_read_by_name_and_number(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "words"),
     [
         ("MoveAhead\nDone\n", "not JSON"),
         ("[" * 100_000, "not JSON"),
@@ -331,11 +331,11 @@ def test_actions_are_read_by_name_and_number(tmp_path):
         (" " * 1_000_001, "too large"),
     ],
 )
-def test_a_bad_file_of_actions_is_told_apart(tmp_path, text, said):
+def test_a_bad_file_of_actions_is_told_apart(tmp_path, text, words):
     path = tmp_path / "mine.json"
     path.write_text(text)
     with pytest.raises(UsageError, match=r"mine\.json") as caught:
         read_actions(path)
-    assert said in str(caught.value)
+    assert words in str(caught.value)
     with pytest.raises(UsageError, match=r"none\.json"):
         read_actions(tmp_path / "none.json")
