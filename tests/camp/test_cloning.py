@@ -12,6 +12,7 @@ from internav_data.camp.agents import LEARNERS, make_agent  # noqa: E402
 from internav_data.camp.agents.hierarchy import (  # noqa: E402
     DONE,
     NAVIGATE,
+    OPTION_NAMES,
     PICK,
     PUSH,
     STOP,
@@ -20,6 +21,8 @@ from internav_data.camp.agents.hierarchy import (  # noqa: E402
 )
 from internav_data.camp.cloning import Demonstrations, update  # noqa: E402
 from internav_data.camp.ppo import set_rate  # noqa: E402
+from internav_data.records.errors import UsageError  # noqa: E402
+from internav_data.world.actions import ACTIONS, actions_of_option  # noqa: E402
 
 AHEAD, LEFT, RIGHT, DOWN, PUSHED, UP, DROP = 0, 1, 2, 3, 5, 9, 10
 N, P, I, S = NAVIGATE, PUSH, PICK, STOP
@@ -60,6 +63,20 @@ def test_a_move_between_pickup_and_drop_makes_two_interactions(between):
     assert rows_of([UP, *between, DROP]) == [
         (I, UP, UP), (I, DONE, WAIT), *middle, (I, DROP, DROP), (I, DONE, WAIT)
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("action", ACTIONS, ids=lambda action: action.label)
+def test_every_action_is_labelled_with_an_option_that_can_take_it(action):
+    _, label = option_labels([action], temporally_extended=True)
+    taken_by = OPTION_NAMES[label.option[0]]
+    assert action in actions_of_option(taken_by)
+    assert taken_by == action.options[0], "its own option, not one that borrows it"
+
+
+@pytest.mark.parametrize("before", [[], [AHEAD], [PUSHED], [UP]])
+def test_an_action_that_no_option_takes_is_refused_by_name(before):
+    with pytest.raises(UsageError, match="action Wait: cannot be cloned"):
+        option_labels([*before, WAIT, DONE], temporally_extended=True)
 
 
 def test_decisions_and_what_is_told_of_them():

@@ -34,10 +34,11 @@ from internav_data.camp.networks import (
     log_prob_of,
     uniform_intent,
 )
+from internav_data.records.errors import UsageError
 from internav_data.world.actions import ACTION_COUNT, Action, OptionName, actions_of_option
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from torch.nn import Parameter
 
@@ -60,10 +61,22 @@ ACTIONS_OF: Final[tuple[tuple[int, ...], ...]] = tuple(
     tuple(int(action) for action in actions_of_option(option)) for option in OPTION_NAMES[:STOP]
 )
 """Actions of the three policies (table 1), in the order of their logits; Done is the last."""
-# A run of pushes; pickups, drops and the turns between them; anything else.
-_RUNS: Final = re.compile("(?P<push>P+)|(?P<pick>I(?:T*I)*)|(?P<else>.)")
-_LETTERS: Final = {"turn": "T", "push": "P", "pick": "I", "drop": "I"}
-"""Letters in `_RUNS` of the kinds of action."""
+
+
+def _letters(actions: Iterable[int]) -> str:
+    """Return one letter for each action, so that regular expressions find runs of them."""
+    return "".join(chr(ord("a") + action) for action in actions)
+
+
+def _run_of(option: OptionName) -> str:
+    """Return the pattern of an option's runs: own actions, borrowed ones only in between."""
+    taken = [action for action in actions_of_option(option) if action != Action.DONE]
+    own = _letters(action for action in taken if action.options[0] == option)
+    return f"[{own}](?:[{_letters(taken)}]*[{own}])?"
+
+
+_RUNS: Final = re.compile(f"(?P<push>{_run_of('push')})|(?P<pick>{_run_of('pick')})|(?P<else>.)")
+"""Runs of pushes; of pickups, drops and the turns between them; anything else."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,12 +203,21 @@ def option_labels(
         Actions of the environment, L of them, waits included.
     record
         Record (L,) of the same steps.
+
+    Raises
+    ------
+    UsageError
+        No option can take an action, so that cloning could not make it likely.
     """
     rows: list[tuple[int, int, int, int]] = []  # choice, option, open, used
-    letters = "".join(_LETTERS.get(Action(action).kind, ".") for action in actions)
-    for run in _RUNS.finditer(letters):
+    for run in _RUNS.finditer(_letters(actions)):
         acting = {"push": PUSH, "pick": PICK}.get(run.lastgroup or "", NAVIGATE)
         taken = list(actions[run.start() : run.end()])
+        if strange := [action for action in taken if action not in ACTIONS_OF[acting]]:
+            raise UsageError(
+                f"expert's action {Action(strange[0]).label}: cannot be cloned: option "
+                f"{OPTION_NAMES[acting]!r} cannot take it (`Action.options`)"
+            )
         if acting == NAVIGATE:
             rows.append((taken[0], STOP if taken[0] == DONE else NAVIGATE, NAVIGATE, 0))
             continue
