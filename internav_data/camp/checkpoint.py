@@ -358,7 +358,7 @@ def pack(optimiser: Optimizer, state: State, episode_starts: Tensor) -> dict[str
 
 
 def unpack(
-    tensors: Mapping[str, Tensor], optimiser: Optimizer, blank: State, own: range, count: int
+    tensors: Mapping[str, Tensor], optimiser: Optimizer, blank: State, local: range, count: int
 ) -> tuple[State, Tensor]:
     """Restore optimiser and random numbers; return the memory and starts of some environments.
 
@@ -370,7 +370,7 @@ def unpack(
         New optimiser of the same parameters.
     blank
         Initial memory of the agent, (n, …).
-    own, count
+    local, count
         Numbers of this rank's environments, and how many there are.
 
     Raises
@@ -397,7 +397,7 @@ def unpack(
         if found is None or tuple(found.shape) != shape or found.dtype != like.dtype:
             got = None if found is None else (found.dtype, tuple(found.shape))
             raise CorruptDataError(f"checkpoint: {name}: expected {like.dtype} {shape}, got {got}")
-        return found[own.start : own.stop].to(like.device)
+        return found[local.start : local.stop].to(like.device)
 
     state = {name: rows(f"{_STATE}/{name}", like) for name, like in blank.items()}
     episode_starts = rows(_STARTS, torch.zeros(1, dtype=torch.bool))
@@ -410,7 +410,7 @@ def unpack(
     return state, episode_starts
 
 
-def snapshots_of(progress: Mapping[str, Any], own: range) -> list[EpisodeSnapshot]:
+def snapshots_of(progress: Mapping[str, Any], local: range) -> list[EpisodeSnapshot]:
     """Return the snapshots of the environments with these numbers.
 
     Raises
@@ -421,8 +421,8 @@ def snapshots_of(progress: Mapping[str, Any], own: range) -> list[EpisodeSnapsho
     from internav_data.envs.slot import EpisodeSnapshot  # noqa: PLC0415 - the camera's kernels
 
     states = progress.get("environments")
-    if not isinstance(states, list) or len(states) < own.stop:
+    if not isinstance(states, list) or len(states) < local.stop:
         raise CorruptDataError(
-            f"checkpoint: progress: environments: expected a list of {own.stop} at least"
+            f"checkpoint: progress: environments: expected a list of {local.stop} at least"
         )
-    return [EpisodeSnapshot.from_json(state) for state in states[own.start : own.stop]]
+    return [EpisodeSnapshot.from_json(state) for state in states[local.start : local.stop]]

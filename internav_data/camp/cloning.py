@@ -116,7 +116,7 @@ class Demonstrations:
         for taken_step in self.loop.run(act, steps):
             self._taken = [taken + 1 for taken in self._taken]
             for k, taken in enumerate(self._taken):
-                taken_step.over[k] |= taken == len(self._actions[k])
+                taken_step.reset_mask[k] |= taken == len(self._actions[k])
         record = type(records[0]).stack(records).map(lambda values: values.to(self.agent.device))
         return Batch(seen.rows, torch.stack(start_rows).to(self.agent.device), self.state, record)
 

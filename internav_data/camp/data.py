@@ -74,15 +74,15 @@ class TrainingData:
         return found
 
     def environments(
-        self, stage: TrainingStage, config: CampConfig, own: range, sensors: Sequence[str]
+        self, stage: TrainingStage, config: CampConfig, local: range, sensors: Sequence[str]
     ) -> Environments:
-        """Return a stage's environments with the numbers in `own`."""
+        """Return a stage's environments with the numbers in `local`."""
         from internav_data.envs.make import make_vector  # noqa: PLC0415 - the camera's kernels
 
         env: Any = make_vector(
-            len(own), self.episodes(single_room=stage.single_room),
-            min(config.run.workers, len(own)), autoreset=False, copy=False, sensors=sensors,
-            task=stage.tasks[own.start : own.stop] or "interactive",
+            len(local), self.episodes(single_room=stage.single_room),
+            min(config.run.workers, len(local)), autoreset=False, copy=False, sensors=sensors,
+            task=stage.tasks[local.start : local.stop] or "interactive",
             image_size=config.network.image_size, max_steps=config.run.max_steps,
             failed_done_reward=config.data.failed_done_reward,
             house_cache_size=config.data.house_cache_size,

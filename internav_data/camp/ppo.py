@@ -95,13 +95,13 @@ def update(
     rows: list[dict[str, float]] = []
     stopped, device = False, rollout.rewards.device
     minibatches = [
-        columns
+        environments
         for order in orders
-        for columns in torch.tensor(order, device=device).chunk(config.num_minibatches)
+        for environments in torch.tensor(order, device=device).chunk(config.num_minibatches)
     ]
-    for columns in minibatches:
-        goals = advantages[:, columns], returns[:, columns]
-        losses, row = _losses(agent, rollout, columns, goals, config, reduce)
+    for environments in minibatches:
+        estimates = advantages[:, environments], returns[:, environments]
+        losses, row = _losses(agent, rollout, environments, estimates, config, reduce)
         rows.append(row)
         # Stop before the step that would leave the rollout's policy too far behind.
         stopped = row["kl"] > limit
@@ -177,25 +177,25 @@ def step(
 def _losses(
     agent: Agent[Any],
     rollout: Rollout,
-    columns: Tensor,
-    goals: tuple[Tensor, Tensor],
+    environments: Tensor,
+    estimates: tuple[Tensor, Tensor],
     config: PPOConfig,
     reduce: Reduce,
 ) -> tuple[dict[str, Tensor], dict[str, float]]:
     """Return the means of a minibatch, with gradients, and as they are logged, across ranks.
 
-    `columns` (m,) are its environments, `goals` their advantages and returns, (T, m) each.
+    `environments` (m,) holds their numbers, `estimates` their advantages and returns, (T, m) each.
     """
-    advantages, returns = goals
-    now = agent.evaluate(rollout.batch.select(columns))
-    check_finite(columns, now.log_prob, now.value)
-    log_ratio = now.log_prob - rollout.log_probs[:, columns]
+    advantages, returns = estimates
+    now = agent.evaluate(rollout.batch.select(environments))
+    check_finite(environments, now.log_prob, now.value)
+    log_ratio = now.log_prob - rollout.log_probs[:, environments]
     ratio = log_ratio.exp()
     clipped = ratio.clamp(1.0 - config.clip_coef, 1.0 + config.clip_coef)
     gain = torch.minimum(ratio * advantages, clipped * advantages)
     errors = (now.value - returns).square()
     if config.clip_vloss:
-        before = rollout.values[:, columns]
+        before = rollout.values[:, environments]
         near = before + (now.value - before).clamp(-config.clip_coef, config.clip_coef)
         errors = torch.maximum(errors, (near - returns).square())
     extra = torch.zeros_like(gain) if now.loss is None else now.loss
@@ -214,8 +214,8 @@ def _losses(
     return losses, {**dict(zip(losses, means, strict=True)), "ratio_error": error}
 
 
-def check_finite(columns: Tensor, *outputs: Tensor) -> None:
-    """Check outputs of networks (T, m) for environments with numbers `columns` (m,).
+def check_finite(environments: Tensor, *outputs: Tensor) -> None:
+    """Check outputs of networks (T, m) for environments with numbers `environments` (m,).
 
     Raises
     ------
@@ -225,7 +225,7 @@ def check_finite(columns: Tensor, *outputs: Tensor) -> None:
     for output in outputs:
         fine = output.detach().isfinite().all(0)
         if not bool(fine.all()):
-            k = int(columns[~fine][0])
+            k = int(environments[~fine][0])
             raise NotFiniteError(
                 f"environment {k}: the networks' outputs are not finite; lower the learning rate, "
                 "or resume from the last checkpoint with another seed"

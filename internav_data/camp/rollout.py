@@ -253,11 +253,11 @@ def _finished(t: int, step: LoopStep) -> list[Finished]:
     """Return the episodes that ended by a step, with those metrics that the environment gave."""
     metrics = step.infos.get("metrics", {})
     names = [name for name in metrics if not name.startswith("_")]
-    everywhere = np.ones(len(step.over), np.bool_)
+    everywhere = np.ones(len(step.reset_mask), np.bool_)
     return [
         Finished(
             k, t,
             {n: metrics[n][k].item() for n in names if metrics.get(f"_{n}", everywhere)[k]},
         )
-        for k in np.flatnonzero(step.over).tolist()
+        for k in np.flatnonzero(step.reset_mask).tolist()
     ]  # fmt: skip

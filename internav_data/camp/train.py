@@ -77,7 +77,7 @@ class StageRun:
     optimiser: Optimizer
     source: Collector | Demonstrations
     """Environments in which it acts, or in which experts act for it."""
-    own: range
+    local: range
     """Numbers of this rank's environments."""
     seed: int
     """Seed of the first of them."""
@@ -127,11 +127,11 @@ class Trainer:
         for single in {stage.single_room for stage in self.stages}:
             self.data.episodes(single_room=single)  # refuses a dataset without any
         self.ranks = distributed_context(device_of(request.device))
-        own = self.ranks.share(config.ppo.num_envs, "ppo.num_envs")
-        if len(own) % config.ppo.num_minibatches:
+        local = self.ranks.share(config.ppo.num_envs, "ppo.num_envs")
+        if len(local) % config.ppo.num_minibatches:
             raise UsageError(
                 f"ppo.num_minibatches is {config.ppo.num_minibatches}: it must divide the "
-                f"{len(own)} environments of each of {self.ranks.size} processes"
+                f"{len(local)} environments of each of {self.ranks.size} processes"
             )
         progress = checkpoint.progress if checkpoint else {}
         if checkpoint:
@@ -232,14 +232,14 @@ class Trainer:
     def open(self, stage: TrainingStage) -> StageRun:
         """Open a stage's environments, new or as they were in the checkpoint."""
         sizes = self.config.cloning if stage.clones else self.config.ppo
-        own = self.ranks.share(
+        local = self.ranks.share(
             sizes.num_envs, "cloning.num_envs" if stage.clones else "ppo.num_envs"
         )
-        env = self.data.environments(stage, self.config, own, self.agent.sensors)
-        seed = order_seed(self.config.seed, stage.name) + own.start
+        env = self.data.environments(stage, self.config, local, self.agent.sensors)
+        seed = order_seed(self.config.seed, stage.name) + local.start
         learner: Agent[Any] = self.agent
         if stage.tasks and isinstance(self.agent, Hierarchy):
-            tasks = stage.tasks[own.start : own.stop]
+            tasks = stage.tasks[local.start : local.stop]
             learner = AuxiliaryAgent(self.agent, tasks, stage.tasks)
         optimiser = torch.optim.Adam(learner.optimised(), stage.rate)
         source: Collector | Demonstrations = Collector(env, learner, seed)
@@ -248,14 +248,14 @@ class Trainer:
         if self._checkpoint is not None and self.state.done:
             tensors, progress = self._checkpoint.training, self._checkpoint.progress
             source.state, episode_starts = unpack(
-                tensors, optimiser, source.state, own, sizes.num_envs
+                tensors, optimiser, source.state, local, sizes.num_envs
             )
-            source.restore(snapshots_of(progress, own), episode_starts.numpy())
+            source.restore(snapshots_of(progress, local), episode_starts.numpy())
         else:
             if not stage.tasks:
                 self.agent.synchronise()
             source.loop.reset(seed=seed)
-        return StageRun(stage, learner, optimiser, source, own, seed)
+        return StageRun(stage, learner, optimiser, source, local, seed)
 
     def update(self, now: StageRun) -> Row:
         """Take one update of a stage; return the row to be logged.
@@ -296,15 +296,16 @@ class Trainer:
         """Collect a rollout, and take PPO's update on it."""
         state, stage, config = self.state, now.stage, self.config.ppo
         began, collector.loop.env_s = time.perf_counter(), 0.0
-        over = state.done / stage.updates
-        over = stage.decay_from + (stage.decay_to - stage.decay_from) * over
-        rate = ppo.set_rate(now.optimiser, stage.rate, over)
-        uniforms = uniforms_of(self.config.seed, state.updates, now.own, config.num_steps)
+        decay = stage.decay_from + (stage.decay_to - stage.decay_from) * (
+            state.done / stage.updates
+        )
+        rate = ppo.set_rate(now.optimiser, stage.rate, decay)
+        uniforms = uniforms_of(self.config.seed, state.updates, now.local, config.num_steps)
         rollout = collector.collect(uniforms)
         collected_s = time.perf_counter() - began
         learnt = state.critics.get(stage.critic, 0)
         critic_only = learnt < config.critic_warmup_rollouts and bool(now.learner.critics())
-        orders = orders_of(self.config.seed, state.updates, config.update_epochs, len(now.own))
+        orders = orders_of(self.config.seed, state.updates, config.update_epochs, len(now.local))
         losses = ppo.update(
             now.learner, now.optimiser, rollout, config, orders,
             critic_only=critic_only, reduce=self.ranks.reduce,
@@ -315,7 +316,7 @@ class Trainer:
         state.critics[stage.critic] = learnt + 1
         if not stage.tasks and state.done % self.config.agent.sync_every == 0:
             self.agent.synchronise()
-        episodes, decisions = self._statistics(rollout, now.own)
+        episodes, decisions = self._statistics(rollout, now.local)
         return {
             "step": state.environment_steps, "update": state.updates,
             "updates": self._total_updates, "stage": stage.name, "stage_update": state.done,
@@ -324,9 +325,9 @@ class Trainer:
             "time": rates(steps, (collector.loop.env_s, collected_s, self.lap())),
         }  # fmt: skip
 
-    def _statistics(self, rollout: Rollout, own: range) -> tuple[Row, Row]:
+    def _statistics(self, rollout: Rollout, local: range) -> tuple[Row, Row]:
         """Return the statistics of a rollout's episodes and decisions, across ranks."""
-        ended = [(each.step, own[each.environment], each.metrics) for each in rollout.finished]
+        ended = [(each.step, local[each.environment], each.metrics) for each in rollout.finished]
         ended = sorted(self.ranks.all_gather_items(ended), key=lambda each: each[:2])
         episodes = self._window.add([metrics for _, _, metrics in ended])
         record = rollout.batch.record.map(lambda values: self.ranks.all_gather(values, 1))

@@ -41,7 +41,7 @@ class Catalogue:
 
 
 @lru_cache(maxsize=1)
-def own_assets() -> tuple[Asset, ...]:
+def generated_assets() -> tuple[Asset, ...]:
     """Draw the assets of all types in the table, the obstacles first."""
     obstacles = (asset for kind in OBSTACLES for asset in draw_type(kind, spawnable=True))
     furniture = (asset for kind in FURNITURE for asset in draw_type(kind, spawnable=False))
@@ -57,7 +57,7 @@ def catalogue(asset_dirs: tuple[Path, ...] = ()) -> Catalogue:
     UsageError
         When a folder cannot be read as assets, or two folders hold the same asset_id.
     """
-    assets = {asset.asset_id: asset for asset in own_assets()}
+    assets = {asset.asset_id: asset for asset in generated_assets()}
     for directory in asset_dirs:
         from internav_data.catalog.user_assets import load_user_assets  # noqa: PLC0415 - trimesh
 

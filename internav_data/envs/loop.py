@@ -61,7 +61,7 @@ class LoopStep:
     terminated: Bools
     truncated: Bools
     infos: dict[str, Any]
-    over: Bools
+    reset_mask: Bools
     """Environments that are reset after this step, (n,); the caller may add some."""
     reset_options: dict[str, Any] = field(default_factory=dict)
     """Further options of that reset; the caller may add some, as "episode_id"."""
@@ -119,14 +119,16 @@ class EnvironmentLoop:
             began = time.perf_counter()
             observations, rewards, terminated, truncated, infos = self.env.step(actions)
             self.env_s += time.perf_counter() - began
-            over = terminated | truncated
+            reset_mask = terminated | truncated
             self.observations = observations
-            step = LoopStep(actions, observations, rewards, terminated, truncated, infos, over)
+            step = LoopStep(
+                actions, observations, rewards, terminated, truncated, infos, reset_mask
+            )
             yield step
-            self.episode_starts = step.over
-            if step.over.any():
+            self.episode_starts = step.reset_mask
+            if step.reset_mask.any():
                 began = time.perf_counter()
-                options = {"reset_mask": step.over, **step.reset_options}
+                options = {"reset_mask": step.reset_mask, **step.reset_options}
                 self.observations, self.infos = self.env.reset(options=options)
                 self.env_s += time.perf_counter() - began
             taken += 1

@@ -78,7 +78,9 @@ class EpisodeStatistics:
         default_factory=lambda: dict.fromkeys(INTERACTION_KINDS, 0)
     )
     """Interactions by kind."""
-    done: dict[ActionKind, int] = field(default_factory=lambda: dict.fromkeys(INTERACTION_KINDS, 0))
+    succeeded: dict[ActionKind, int] = field(
+        default_factory=lambda: dict.fromkeys(INTERACTION_KINDS, 0)
+    )
     """Successful interactions by kind."""
     interaction_m: float = 0.0
     """Sum of the finite drops of the lattice distance by interactions, metres."""
@@ -97,11 +99,11 @@ class EpisodeStatistics:
             "steps": self.steps,
             "path_m": SPACING_M * self.moves,
             "pushes_tried": self.tried["push"],
-            "pushes_done": self.done["push"],
+            "pushes_done": self.succeeded["push"],
             "picks_tried": self.tried["pick"],
-            "picks_done": self.done["pick"],
+            "picks_done": self.succeeded["pick"],
             "drops_tried": self.tried["drop"],
-            "drops_done": self.done["drop"],
+            "drops_done": self.succeeded["drop"],
             "interaction_reward_m": self.interaction_m,
             "openings": self.openings,
             "closings": self.closings,
@@ -117,7 +119,7 @@ class Task(ABC):
     world
         World at the episode's start; a task reads it and never changes it.
     distances
-        Any-angle distances to the goal without obstacles.
+        Euclidean distances to the goal without obstacles.
     config
         Settings.
     shortest_path_m
@@ -128,7 +130,7 @@ class Task(ABC):
     success : bool
         Whether the task was fulfilled; known once Done was taken.
     distance_m : float
-        Any-angle distance from the agent to the goal without obstacles, metres.
+        Euclidean distance from the agent to the goal without obstacles, metres.
     statistics : EpisodeStatistics
         Counters and sums so far.
     """
@@ -200,7 +202,7 @@ class InteractiveNavigation(Task):
         }
 
     def _moved(self) -> float:
-        """Return the drop of the any-angle distance without obstacles, metres."""
+        """Return the drop of the Euclidean distance without obstacles, metres."""
         self.statistics.moves += 1
         after = self.distances.at(self.world.i, self.world.j)
         if math.isinf(after):
@@ -216,7 +218,7 @@ class InteractiveNavigation(Task):
         statistics.tried[kind] += 1
         if not result.success:
             return 0.0
-        statistics.done[kind] += 1
+        statistics.succeeded[kind] += 1
         here = (world.i, world.j)
         # Lattices are replaced, never changed: the one before the action is still at hand.
         before = self._lattice.distance(here, world.goal)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from internav_data.records import Pose
     from internav_data.world import World
 
-PUSHES: Final = ("push_east", "push_north", "push_west", "push_south")
+PUSH_DIRECTIONS: Final = ("push_east", "push_north", "push_west", "push_south")
 """Actions of outcomes by heading 0 to 3: along +x, +y, -x and -y of the house."""
 PICK: Final = "pick"
 """Action of outcomes in which the obstacle is picked up."""
@@ -33,9 +33,9 @@ Distances = tuple[int | None, float | None]
 def outcomes_of(world: World, before: Distances | None = None) -> tuple[tuple[Outcome, ...], ...]:
     """Return the outcomes of every obstacle of a world, in the obstacles' order.
 
-    There are five for each obstacle: `PUSHES` in order, then `PICK`. A failed one leaves the
-    distances as they are; its reason is "not pushable", "not pickable", a reason of `PushResult` or
-    "something rests on it".
+    There are five for each obstacle: `PUSH_DIRECTIONS` in order, then `PICK`. A failed one leaves
+    the distances as they are; its reason is "not pushable", "not pickable", a reason of
+    `PushResult` or "something rests on it".
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def outcomes_of(world: World, before: Distances | None = None) -> tuple[tuple[Ou
         Those distances before any interaction, if they are known already.
 
     """
-    before = before or (world.steps(), world.obstructed_path_m())
+    before = before or (world.path_steps(), world.obstructed_path_m())
     return tuple(
         (
             *(_pushed(world, index, heading, before, lifted) for heading in range(4)),
@@ -71,7 +71,7 @@ class _Lifted:
     def distances(self) -> Distances:
         """Distances to the goal without the object."""
         there = self._there
-        return there.steps(), None if self._path is None else self._path[0]
+        return there.path_steps(), None if self._path is None else self._path[0]
 
     @cached_property
     def _there(self) -> World:
@@ -91,7 +91,7 @@ class _Lifted:
             return None, None
         there = self._there.copy()
         there.put([(self._index, pose)])
-        steps = None if best_steps is None else there.steps()
+        steps = None if best_steps is None else there.path_steps()
         # A path that the object leaves free is still the shortest one.
         if self._path is None or keeps_clear(self._path[1], there.items[self._index].footprint):
             return steps, best_path_m
@@ -100,20 +100,20 @@ class _Lifted:
 
 def _pushed(world: World, index: int, heading: int, before: Distances, lifted: _Lifted) -> Outcome:
     if not world.items[index].dynamics.pushable:
-        return _failed(PUSHES[heading], "not pushable", before)
+        return _failed(PUSH_DIRECTIONS[heading], "not pushable", before)
     # Without the agent: an outcome is a fact about the object, wherever an agent may stand.
     pushed = world.simulate_push(index, heading, agent=False)
     if not pushed.success:
-        return _failed(PUSHES[heading], pushed.reason, before, pushed.seconds)
+        return _failed(PUSH_DIRECTIONS[heading], pushed.reason, before, pushed.seconds)
     if pushed.moved:
         # Other objects moved too: the world without this one says nothing about their new poses.
         there = world.copy()
         there.put([(index, pushed.pose), *pushed.moved])
-        steps, obstructed_path_m = there.steps(), there.obstructed_path_m()
+        steps, obstructed_path_m = there.path_steps(), there.obstructed_path_m()
     else:
         steps, obstructed_path_m = lifted.laid(pushed.pose)
     return Outcome(
-        action=PUSHES[heading],
+        action=PUSH_DIRECTIONS[heading],
         success=True,
         displacement_m=pushed.displacement_m,
         path_steps_after=steps,

@@ -177,11 +177,11 @@ class _Round:
             self._fill_slot(slot)
         loop.reset(seed=self._seed, options={"episode_id": self._ids})
         for step in loop.run(self._act):
-            for slot in np.flatnonzero(step.over).tolist():
+            for slot in np.flatnonzero(step.reset_mask).tolist():
                 self._ended(slot, step.infos)
                 self._fill_slot(slot)
             step.reset_options["episode_id"] = self._ids
-            if callback is not None and step.over.any():
+            if callback is not None and step.reset_mask.any():
                 callback(len(self._found), len(self._numbers))
             if all(episode is None for episode in self._episodes):
                 break

@@ -120,8 +120,8 @@ class HouseDraft:
 
 def draw_rooms(draft: HouseDraft) -> None:
     """Choose the rooms' types and wanted areas, unless the user gave a floor plan."""
-    own = draft.config.floor_plan is not None
-    draft.rooms = () if own else programme(draft.key, draft.config)
+    user_plan = draft.config.floor_plan is not None
+    draft.rooms = () if user_plan else programme(draft.key, draft.config)
 
 
 def draw_plan(draft: HouseDraft) -> None:

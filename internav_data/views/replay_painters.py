@@ -426,13 +426,15 @@ class Footer:
         height = _fitting(canvas, shot.text, 13.0 * unit, room)
         y = self.height - 20.0 * unit
         canvas.text((left, y), shot.text, height, _MOODS[shot.mood], anchor="left")
-        steps = "blocked: no way to the goal" if shot.steps is None else f"{shot.steps} steps"
-        if shot.steps is not None:
+        steps = (
+            "blocked: no way to the goal" if shot.path_steps is None else f"{shot.path_steps} steps"
+        )
+        if shot.path_steps is not None:
             steps = f"to the goal: {steps}"
         parts = [steps]
         held = [k for k, pose in shot.poses.items() if pose is None]
         parts += [f"in hand: {self._story.name(k)}" for k in held]
-        colour = _STRIP_BAD if shot.steps is None else _FAINT
+        colour = _STRIP_BAD if shot.path_steps is None else _FAINT
         canvas.text((left, y - 24.0 * unit), "   ".join(parts), 9.5 * unit, colour, anchor="left")
         self._paint_actions(canvas, shot.moment.step)
         return canvas.finished()

@@ -37,7 +37,7 @@ class Moment:
         The state. Not to be changed.
     result
         Result of the last action; None at the start.
-    steps
+    path_steps
         Lattice distance from the agent to the goal, objects as they lie; None when cut off.
     """
 
@@ -45,7 +45,7 @@ class Moment:
     total: int
     world: World
     result: StepResult | None
-    steps: int | None
+    path_steps: int | None
 
     def pose(self, item: int) -> Pose | None:
         """Return the pose of an item; None while it is held."""
@@ -124,10 +124,10 @@ def play(
     chosen = [Action(action) for action in _checked(actions)]
     if Action.DONE in chosen:
         chosen = chosen[: chosen.index(Action.DONE) + 1]
-    moments = [Moment(0, len(chosen), world.copy(), None, world.steps())]
+    moments = [Moment(0, len(chosen), world.copy(), None, world.path_steps())]
     for k, action in enumerate(chosen, 1):
         result = world.step(action)
-        moments.append(Moment(k, len(chosen), world.copy(), result, world.steps()))
+        moments.append(Moment(k, len(chosen), world.copy(), result, world.path_steps()))
     home = range(len(model.items))
     moved = [k for k in home if any(m.world.items[k] is not model.items[k] for m in moments)]
     return Story(episode, model, tuple(moments), tuple(moved))
@@ -169,10 +169,10 @@ def describe(story: Story, moment: Moment) -> str:
 
 def _opened(story: Story, moment: Moment) -> str:
     """Describe whether the last action opened or closed the path to the goal."""
-    before = story.moments[moment.step - 1].steps
-    if before is None and moment.steps is not None:
+    before = story.moments[moment.step - 1].path_steps
+    if before is None and moment.path_steps is not None:
         return " - the way is open"
-    if before is not None and moment.steps is None:
+    if before is not None and moment.path_steps is None:
         return " - the way is cut off"
     return ""
 
@@ -216,7 +216,7 @@ class Shot:
         Caption, and the mood that decides its colour.
     target
         Item to highlight, or -1.
-    steps
+    path_steps
         Lattice distance to the goal; None when cut off.
     """
 
@@ -231,7 +231,7 @@ class Shot:
     text: str
     mood: Mood
     target: int
-    steps: int | None
+    path_steps: int | None
 
 
 def shots(story: Story, fps: float) -> Iterator[Shot]:
@@ -304,7 +304,7 @@ def _still(
         text=text,
         mood=mood,
         target=target,
-        steps=state.steps,
+        path_steps=state.path_steps,
     )
 
 
@@ -338,7 +338,7 @@ def _in_motion(story: Story, before: Moment, after: Moment, share: float, text: 
         text=text,
         mood="plain",
         target=-1,
-        steps=after.steps,
+        path_steps=after.path_steps,
     )
 
 
@@ -367,7 +367,7 @@ def _slide(
             text=text,
             mood="plain",
             target=result.target,
-            steps=still.steps,
+            path_steps=still.path_steps,
         )
 
 

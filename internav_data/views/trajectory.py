@@ -161,7 +161,7 @@ def _paint_end(canvas: Canvas, story: Story) -> None:
     tip = (at[0] + 0.8 * _AGENT_M * math.cos(turn), at[1] + 0.8 * _AGENT_M * math.sin(turn))
     canvas.line([at, tip], PAPER, 2.0)
     if not story.success:
-        gave_up = world.steps() is None
+        gave_up = world.path_steps() is None
         words = "cut off" if gave_up else "not at the goal"
         last = story.moments[-1].result
         if last is None or last.action != Action.DONE:

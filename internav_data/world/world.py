@@ -392,7 +392,7 @@ class World:
         """Indices of the obstacles among `items`."""
         return range(len(self.model.items), len(self.items))
 
-    def steps(self) -> int | None:
+    def path_steps(self) -> int | None:
         """Return the lattice distance to the goal, objects as they lie; None when cut off."""
         return self.lattice.distance((self.i, self.j), self.goal)
 

@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 
 from internav_data.catalog import ASSET_TYPES, FURNITURE, OBSTACLES, catalogue, split_of_asset
 from internav_data.catalog.asset_types import by_name
-from internav_data.catalog.collection import VERSION, own_assets
+from internav_data.catalog.collection import VERSION, generated_assets
 from internav_data.catalog.digest import digest_of
 from internav_data.catalog.drawing import draw_type, from_share
 from internav_data.geometry import asset_corners, centre_of_mass
@@ -197,8 +197,8 @@ def test_stored_numbers_are_rounded():
 
 
 def test_ids_are_unique_and_sorted():
-    own = own_assets()
-    assert len({a.asset_id for a in own}) == len(own) == len(ASSETS)
+    generated = generated_assets()
+    assert len({a.asset_id for a in generated}) == len(generated) == len(ASSETS)
     assert list(catalogue().assets) == sorted(catalogue().assets)
     assert all(key == asset.asset_id for key, asset in catalogue().assets.items())
 
@@ -234,7 +234,7 @@ def test_digest_sees_every_change():
 
 
 def test_drawing_a_type_needs_no_other():
-    pots = tuple(asset for asset in own_assets() if asset.type == "Pot")
+    pots = tuple(asset for asset in generated_assets() if asset.type == "Pot")
     assert draw_type(ASSET_TYPES["Pot"], spawnable=True) == pots
 
 
@@ -250,7 +250,7 @@ def test_a_new_type_redraws_no_other():
     ]
     others = tuple(asset for asset in drawn if asset.type != "Parcel")
     assert len(drawn) == len(others) + new.asset_count
-    assert others == own_assets()
+    assert others == generated_assets()
 
 
 def test_numbers_are_the_released_ones():

@@ -168,14 +168,14 @@ def test_metrics_agree_with_another_count(small):
     path, drops, total, interactions = 0.0, 0.0, 0.0, 0
     chosen = [a for a in actions(11, 150).tolist() if a != Action.DONE]
     for action in chosen:
-        spot, steps = world.position, world.steps()
+        spot, steps = world.position, world.path_steps()
         result = world.step(action)
         expected = -0.01
         if world.position != spot:
             path += math.dist(spot, world.position)
             expected += ways.distance(spot, goal) - ways.distance(world.position, goal)
         elif action in range(5, 11) and result.success:
-            now = world.steps()
+            now = world.path_steps()
             interactions += 1
             if steps is not None and now is not None:
                 drops += 0.25 * (steps - now)

@@ -79,7 +79,7 @@ def test_after_the_last_step_the_next_episode_has_begun(loop):
 
 def test_a_caller_may_end_episodes_and_choose_the_next_ones(loop):
     for step in loop.run(lambda *_: np.ones(2, int), 1):
-        step.over[1] = True
+        step.reset_mask[1] = True
         step.reset_options["episode_id"] = ["a", "b"]
     assert loop.env.resets[-1] == (None, [False, True], ["a", "b"])
     assert loop.episode_starts.tolist() == [False, True]

@@ -28,7 +28,7 @@ def test_interactions_pay_what_they_do_to_the_way(before, after, reward):
 
 def test_a_crate_is_carried_out_of_a_door(hand_run):
     run = hand_run(divided=True)
-    assert run.world.steps() is None
+    assert run.world.path_steps() is None
     assert run.step(AHEAD).reward == pytest.approx(0.24), "3.0 m to 2.75 m, less the step"
     assert run.step(PICK).reward == pytest.approx(0.99), "the way is open"
     for _ in range(11):
@@ -66,7 +66,7 @@ def test_opening_and_closing_a_way_earns_nothing(hand_run):
 
 def test_a_shorter_way_earns_its_metres(hand_run):
     run = hand_run(divided=False)
-    assert run.world.steps() == 20, "16 straight on, two up and two down round the crate"
+    assert run.world.path_steps() == 20, "16 straight on, two up and two down round the crate"
     assert run.step(PICK).reward == pytest.approx(1.0 - 0.01)
     assert run.task.metrics()["interaction_reward_m"] == pytest.approx(1.0)
     assert run.task.metrics()["openings"] == 0

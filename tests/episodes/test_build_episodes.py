@@ -216,7 +216,7 @@ def test_outcomes_and_expert_are_those_of_a_fresh_world(houses, episodes):
             assert tuple(o.outcomes for o in episode.obstacles) == outcomes_of(world())
             assert replay(world(), episode.expert.actions) == episode.expert
             # What the columns say of the start is what the world says.
-            assert (world().steps(), world().obstructed_path_m()) == (
+            assert (world().path_steps(), world().obstructed_path_m()) == (
                 episode.obstructed_path_steps,
                 episode.obstructed_path_m,
             )

@@ -6,7 +6,7 @@ import pytest
 
 from internav_data.catalog import catalogue
 from internav_data.episodes import build_episodes
-from internav_data.episodes.outcomes import PICK, PUSHES, outcomes_of
+from internav_data.episodes.outcomes import PICK, PUSH_DIRECTIONS, outcomes_of
 from internav_data.geometry import Polygons
 from internav_data.houses import HouseConfig, build_house
 from internav_data.navigation import Lattice, TangentGraph
@@ -31,7 +31,7 @@ def test_every_obstacle_has_five(tables):
     for episode, _, table in tables:
         assert len(table) == len(episode.obstacles)
         for obstacle, outcomes in zip(episode.obstacles, table, strict=True):
-            assert [o.action for o in outcomes] == [*PUSHES, PICK]
+            assert [o.action for o in outcomes] == [*PUSH_DIRECTIONS, PICK]
             assert all(o.reason == "not pushable" for o in outcomes[:4]) != obstacle.pushable
             assert (outcomes[4].reason == "not pickable") != obstacle.pickable
             for outcome in outcomes:

@@ -165,7 +165,7 @@ def test_the_environment_says_what_the_definitions_say(played_data, who):
         between = CheckedPath(
             CheckedLayout(house, Shapes(played_data.assets)), world.position, world.goal_point
         )
-        assert between.agrees(result.distance_m), "any-angle, no obstacle about"
+        assert between.agrees(result.distance_m), "Euclidean, no obstacle about"
         assert MEASURES["distance_m"].of([result]) == result.distance_m
         worked += result.pushes_done + result.picks_done
         moved += found["moves"]

@@ -242,7 +242,7 @@ def test_fields_count_what_the_lattice_counts(episodes):
         assert (nearest[there] >= steps[there]).all()
         costs = problem.costs(masks, EVERYTHING, problem.prices(world))
         ahead = int(costs[problem.pose(world)])
-        assert (ahead < FAR) == (world.steps() is not None)
+        assert (ahead < FAR) == (world.path_steps() is not None)
         # There and back are equally far, and equally cut off.
         goal = 4 * (world.goal[0] * problem.ny + world.goal[1])
         assert ahead == reach[goal : goal + 4].min()

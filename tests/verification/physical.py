@@ -51,7 +51,9 @@ def played(house, episode, model="force"):
     world = World.of_episode(stage, episode, ASSETS, model)
     # A tenth of a millimetre of settling may show in the way.
     episode = replace(
-        episode, obstructed_path_steps=world.steps(), obstructed_path_m=world.obstructed_path_m()
+        episode,
+        obstructed_path_steps=world.path_steps(),
+        obstructed_path_m=world.obstructed_path_m(),
     )
     outcomes = outcomes_of(world)
     return replace(

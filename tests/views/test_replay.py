@@ -119,8 +119,8 @@ def test_a_slide_runs_from_where_it_stood_to_where_it_lies(tried):
     assert x == sorted(x)
     assert len(set(x)) == 31
     assert cut[0].text == "push ahead: Chair 1"
-    assert cut[0].steps is None
-    assert cut[-1].steps is not None
+    assert cut[0].path_steps is None
+    assert cut[-1].path_steps is not None
 
 
 def test_what_is_held_is_told_and_leaves_an_outline(model, hand_episode):

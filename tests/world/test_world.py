@@ -149,7 +149,7 @@ def test_options_take_their_own_actions_then_borrowed_ones_and_done():
 
 def test_an_episode_begins_with_its_own_distances(worlds):
     for episode, world in worlds:
-        assert world.steps() == episode.obstructed_path_steps
+        assert world.path_steps() == episode.obstructed_path_steps
         assert world.obstructed_path_m() == episode.obstructed_path_m
         assert world.shortest_path_m() == episode.shortest_path_m
         assert world.horizon_deg == 30
@@ -326,8 +326,8 @@ def test_a_push_opens_the_way_exactly_when_the_lattice_says_so(worlds):
                 Polygons.joined([world.model.footprints, *polygons]), world.model.house.outline
             )
             start = (episode.start.i, episode.start.j)
-            assert there.steps() == fresh.distance(start, world.goal)
-            opened += episode.obstructed_path_steps is None and there.steps() is not None
+            assert there.path_steps() == fresh.distance(start, world.goal)
+            opened += episode.obstructed_path_steps is None and there.path_steps() is not None
     assert opened
 
 
