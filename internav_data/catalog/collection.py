@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from internav_data.records import Asset
 
 VERSION = 1
-"""Raised with every change of what the catalogue holds: datasets name it."""
+"""Version of the catalogue, raised with every change of an asset: datasets name it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,6 +20,7 @@ from internav_data.camp.agents.hierarchy import (  # noqa: E402
 )
 from internav_data.camp.agents.protocol import Agent  # noqa: E402
 from internav_data.camp.rollout import Collector, uniforms_of  # noqa: E402
+from internav_data.envs.sensors import DEFAULT_SENSORS, SENSORS  # noqa: E402
 from internav_data.records.errors import UsageError  # noqa: E402
 from internav_data.world.actions import ACTION_COUNT  # noqa: E402
 
@@ -357,6 +358,19 @@ def test_recursive_intent_is_the_intent_policy_run_on_its_own_first_intent(colle
         meant = torch.softmax(mind.actor(out), -1)
         intent = (meant.unsqueeze(-1) * acts).sum(-2)
     torch.testing.assert_close(intent[0], record.intent[0], atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize("method", AGENTS)
+def test_the_table_of_methods_states_every_privileged_sensor(config, method):
+    taken = set(make_agent(method, config()).sensors)
+    privileged = taken & {s.name for s in SENSORS.values() if "privileged" in s.description}
+    stated = AGENTS[method].privileged
+    assert (stated != "none") == bool(privileged), f"{method}: stated {stated}, takes {privileged}"
+
+
+def test_the_sensors_of_every_environment_are_not_privileged():
+    assert "privileged" in SENSORS["ids"].description
+    assert not any("privileged" in SENSORS[name].description for name in DEFAULT_SENSORS)
 
 
 def test_unknown_methods_and_unfit_variants_are_refused(config):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import pytest
 
 from internav_data.houses import HouseConfig, build_house
+from internav_data.houses.room_types import ROOM_TYPES
 
 SCENES = 33
 """Scenes of the default programme: every number of rooms from 1 to 10 occurs."""
@@ -41,6 +42,10 @@ def digest(case, assets):
 @pytest.mark.parametrize("case", GOLDEN)
 def test_houses_are_the_released_ones(case, assets):
     assert digest(case, assets) == GOLDEN[case]
+
+
+def test_the_goldens_hold_every_type_of_room():
+    assert sorted(ALL_TYPES.split(",")) == sorted(ROOM_TYPES)
 
 
 def test_the_goldens_hold_every_number_of_rooms(assets):

@@ -66,6 +66,11 @@ def test_a_forgotten_fact_is_named():
             RoomType(**{key: value for key, value in facts.items() if key != name})
 
 
+@pytest.mark.parametrize("name", ROOM_TYPES)
+def test_the_doors_of_every_type_have_a_cost_of_their_own(name):
+    assert any(name in pair for pair in ROOM_PAIRS), f"no record's `pairs` name '{name}'"
+
+
 def test_every_furniture_group_is_made_and_used():
     used = {rule.group for record in ROOM_TYPES.values() for rule in record.furniture}
     assert used == set(GROUP_MAKERS)

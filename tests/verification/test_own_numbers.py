@@ -5,7 +5,8 @@ import pytest
 from internav_data.houses import standards
 from internav_data.verification import houses, interactions, objects
 from internav_data.verification.ranges import EPISODE_RULES
-from internav_data.world.actions import ACTION_COUNT, PUSHES, Action
+from internav_data.verification.replay.expert_replay import TURNS
+from internav_data.world.actions import ACTION_COUNT, ACTIONS, PUSHES, Action
 
 
 @pytest.mark.parametrize(
@@ -23,6 +24,22 @@ from internav_data.world.actions import ACTION_COUNT, PUSHES, Action
 )
 def test_the_validators_actions_are_those_of_the_world(name, number):
     assert getattr(interactions, name) == number
+
+
+@pytest.mark.parametrize("action", ACTIONS, ids=lambda action: action.label)
+def test_the_replay_of_experts_knows_what_every_action_does(action):
+    own = interactions
+    known = {
+        "move": {own.MOVE},
+        "turn": set(TURNS),
+        "look": {Action.LOOK_DOWN, Action.LOOK_UP},  # no pose changes, so the replay ignores them
+        "push": set(own.PUSHES),
+        "pick": {own.PICK},
+        "drop": {own.DROP},
+        "done": {own.DONE},
+    }
+    assert action in known[action.kind]
+    assert TURNS.get(action, 0) == (action.quarter_turns if action.kind == "turn" else 0)
 
 
 def test_the_validator_accepts_every_action_and_no_other():
