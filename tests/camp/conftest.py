@@ -5,7 +5,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from internav_data.world.actions import ACTION_COUNT
+from internav_data.world.actions import ACTION_COUNT, Action
 
 
 @pytest.fixture(autouse=True)
@@ -55,7 +55,7 @@ class FakeEnvironments:
         assert ((actions >= -1) & (actions < ACTION_COUNT)).all()
         self.actions.append(actions.copy())
         self._ages += 1
-        ended = (actions == 11) & self._done_ends
+        ended = (actions == Action.DONE) & self._done_ends
         cut = (self._ages >= self._lengths) & ~ended
         infos = {}
         if (ended | cut).any():

@@ -8,6 +8,7 @@ torch = pytest.importorskip("torch")
 
 from internav_data.camp.agents import make_agent  # noqa: E402
 from internav_data.records.errors import UsageError  # noqa: E402
+from internav_data.world.actions import ACTION_COUNT  # noqa: E402
 
 SIZE = 16
 
@@ -62,7 +63,7 @@ def test_the_nearest_come_first_and_no_more_than_asked_for(agent):
 def test_at_the_start_nothing_is_foreseen_to_move(agent):
     corners = torch.randn(2, 5, 8, 3)
     ahead = agent.predicted(torch.randn(2, 5, 64), corners)
-    torch.testing.assert_close(ahead, corners.unsqueeze(-3).expand(2, 5, 12, 8, 3))
+    torch.testing.assert_close(ahead, corners.unsqueeze(-3).expand(2, 5, ACTION_COUNT, 8, 3))
 
 
 def test_the_loss_is_how_far_things_in_sight_went_unforeseen(collected):

@@ -89,7 +89,7 @@ def test_a_cue_is_gone_after_the_first_step_and_leaves_no_trace():
     assert len(np.unique(first["rgb"].reshape(64, -1), axis=0)) == 2
     rng = np.random.default_rng(0)
     for _ in range(env.steps_to_fork):
-        seen, *_ = env.step(rng.integers(0, 11, 64))
+        seen, *_ = env.step(rng.integers(0, DONE, 64))
         assert all(len(np.unique(what.reshape(64, -1), axis=0)) == 1 for what in seen.values())
     right = env.right.copy()
     *_, infos = env.step(np.full(64, RIGHT))

@@ -19,14 +19,16 @@ from internav_data.generation import generate, load_config
 from internav_data.navigation import TangentGraph
 from internav_data.records.errors import CorruptDataError, UsageError
 from internav_data.world import Action, HouseModel, World
+from internav_data.world.actions import ACTION_COUNT, ACTIONS, INTERACTION_KINDS
 
 EVERY = tuple(SENSORS)
-WEIGHTS = np.array([8, 1.5, 1.5, 0.3, 0.3, 1, 1, 1, 1, 1.5, 1.5, 0.4])
+WEIGHT_OF = {"move": 8, "turn": 1.5, "look": 0.3, "push": 1, "pick": 1.5, "drop": 1.5, "done": 0.4}
+WEIGHTS = np.array([WEIGHT_OF[action.kind] for action in ACTIONS])
 
 
 def actions(seed, *shape):
     rng = np.random.default_rng(seed)
-    return rng.choice(12, size=shape, p=WEIGHTS / WEIGHTS.sum())
+    return rng.choice(ACTION_COUNT, size=shape, p=WEIGHTS / WEIGHTS.sum())
 
 
 def make(dataset, **arguments):
@@ -135,7 +137,7 @@ def test_a_state_is_an_episode_and_its_actions(small):
     env = make(small)
     env.reset(seed=1)
     for action in actions(4, 60).tolist():
-        env.step(action % 11)  # all but Done
+        env.step(Action.MOVE_AHEAD if action == Action.DONE else action)
     env.unwrapped.wait()
     state = env.unwrapped.state()
     assert state.actions[-1] == -1
@@ -174,7 +176,7 @@ def test_metrics_agree_with_another_count(small):
         if world.position != spot:
             path += math.dist(spot, world.position)
             expected += ways.distance(spot, goal) - ways.distance(world.position, goal)
-        elif action in range(5, 11) and result.success:
+        elif result.action.kind in INTERACTION_KINDS and result.success:
             now = world.path_steps()
             interactions += 1
             if steps is not None and now is not None:
@@ -349,7 +351,7 @@ def test_gymnasiums_own_processes(small):
 def test_a_vector_without_autoreset_waits(small):
     env = many(small, 2, autoreset=False)
     env.reset(seed=0)
-    *_, terminated, _, infos = env.step([11, -1])
+    *_, terminated, _, infos = env.step([Action.DONE, Action.WAIT])
     assert terminated.tolist() == [True, False]
     assert infos["_metrics"].tolist() == [True, False]
     with pytest.raises(UsageError, match="reset_mask"):

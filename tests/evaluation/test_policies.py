@@ -10,6 +10,7 @@ import pytest
 from internav_data.camp.policy import AgentPolicy, candidate, reference_policies_beside, row_name
 from internav_data.evaluation.evaluator import EvaluationConfig, episode_generator, evaluate
 from internav_data.records.errors import UsageError
+from internav_data.world.actions import ACTION_COUNT, Action
 
 torch = pytest.importorskip("torch")
 agents = pytest.importorskip("internav_data.camp.agents")
@@ -85,7 +86,7 @@ class Recorder:
         self.uniforms.append(None if uniforms is None else uniforms.clone())
         self.seen.append({name: what.clone() for name, what in seen.items()})
         age = torch.where(episode_starts, torch.zeros(()), state["age"]) + 1
-        action = torch.where(age >= 4, 11, 1)
+        action = torch.where(age >= 4, int(Action.DONE), int(Action.ROTATE_LEFT))
         record = types.SimpleNamespace(
             option_probs=torch.tensor([[0.7, 0.1, 0.1, 0.1]]).repeat(len(age), 1),
             option=torch.zeros(len(age), dtype=torch.int64),
@@ -110,6 +111,8 @@ def test_state_begins_anew_with_each_episode_and_numbers_are_the_episodes(played
 
 
 def test_what_led_to_an_action_can_be_shown(played_data, make):
+    from internav_data.camp.agents.hierarchy import OPTION_NAMES
+
     agent = policy(make("camp"))
     agent.begin(2, 0)
     for slot in range(2):
@@ -128,7 +131,7 @@ def test_what_led_to_an_action_can_be_shown(played_data, make):
     for title, names, shares, chosen in agent.notes(1):
         titles[title] = names, chosen
         assert sum(shares) == pytest.approx(1.0, abs=1e-5)
-        assert len(names) == len(shares) in {4, 12}
+        assert len(names) == len(shares) in {len(OPTION_NAMES), ACTION_COUNT}
     assert {"option", "intent"} <= set(titles)
     assert titles["option"][1] >= 0
     assert titles["intent"][1] == -1

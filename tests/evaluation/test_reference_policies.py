@@ -3,6 +3,7 @@ from __future__ import annotations
 import networkx as nx
 import numpy as np
 import pytest
+from scipy import stats
 
 from internav_data.evaluation.evaluator import EvaluationConfig, evaluate
 from internav_data.evaluation.metrics import summary
@@ -15,6 +16,7 @@ from internav_data.evaluation.reference_policies import (
 from internav_data.navigation import Lattice
 from internav_data.records.errors import UsageError
 from internav_data.world import Action, HouseModel, World
+from internav_data.world.actions import ACTION_COUNT
 
 STEPS = ((1, 0), (0, 1), (-1, 0), (0, -1))
 INTERACTIONS = set(range(Action.PUSH_AHEAD, Action.DROP + 1))
@@ -121,7 +123,7 @@ def test_ties_of_the_nearest_go_by_the_walk():
 
 
 def test_chance_is_even_and_of_the_episode(played_data, rows):
-    counts = np.bincount([a for r in rows["random"] for a in r.actions], minlength=12)
+    counts = np.bincount([a for r in rows["random"] for a in r.actions], minlength=ACTION_COUNT)
     assert (counts > 0).all()
     assert (
         evaluate(reference_policy("random", played_data), played_data, EvaluationConfig(batch=2))
@@ -135,10 +137,10 @@ def test_chance_is_even_and_of_the_episode(played_data, rows):
         drawn += [int(policy.act({})[0]) for _ in range(3)]
     many = []
     policy.start(0, played_data[0])
-    many = [int(policy.act({})[0]) for _ in range(12_000)]
+    many = [int(policy.act({})[0]) for _ in range(1000 * ACTION_COUNT)]
     expected = 1000.0
-    chi2 = ((np.bincount(many, minlength=12) - expected) ** 2 / expected).sum()
-    assert chi2 < 31.3, "99.9 % of even chances with 11 degrees of freedom"
+    chi2 = ((np.bincount(many, minlength=ACTION_COUNT) - expected) ** 2 / expected).sum()
+    assert chi2 < stats.chi2.ppf(0.999, ACTION_COUNT - 1), "99.9 % of even chances"
     assert drawn[:3] == drawn[len(played_data) * 3 : len(played_data) * 3 + 3], "keyed"
 
 

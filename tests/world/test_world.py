@@ -87,7 +87,7 @@ def test_actions_have_the_released_order():
         "PUSH_LEFT PICKUP DROP DONE WAIT"
     )
     assert [action.name for action in Action] == names.split()
-    assert [int(action) for action in Action] == [*range(12), -1]
+    assert [int(action) for action in Action] == [*range(ACTION_COUNT), -1]
     assert tuple(Action)[:-1] == ACTIONS
 
 
