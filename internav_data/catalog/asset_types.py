@@ -150,4 +150,5 @@ def by_name(types: Iterable[AssetType]) -> dict[str, AssetType]:
 
 
 ASSET_TYPES: Mapping[str, AssetType] = by_name((*OBSTACLES, *FURNITURE))
-"""All asset types by name."""
+"""All asset types by name: `OBSTACLES` and `FURNITURE` joined. A new type is a row
+in one of those two."""

@@ -34,6 +34,8 @@ MAX_SIZE_M, MIN_SIZE_M = 5.0, 0.01
 _DENSITY_KG_M3 = 200.0
 _GREY: RGB = (168, 164, 156)
 _GRID_M = 2e-4
+_STL_HEADER, _STL_TRIANGLE = 84, 50
+"""Bytes of a binary STL: header with the number of triangles as its last four, each triangle."""
 
 
 def load_user_assets(directory: Path) -> tuple[Asset, ...]:
@@ -140,27 +142,59 @@ def _read(path: Path) -> tuple[Floats, NDArray[np.int64], RGB]:
         raise UsageError(f"{path}: {size} bytes, expected 1 to {MAX_BYTES}; export fewer triangles")
     import trimesh  # noqa: PLC0415 - only for users with meshes
 
+    suffix, content = path.suffix[1:].lower(), path.read_bytes()
     try:
         # From memory and without a resolver: nothing that the file refers to is opened.
         loaded: Any = trimesh.load(
-            io.BytesIO(path.read_bytes()), file_type=path.suffix[1:].lower(), resolver=None
+            io.BytesIO(content), file_type=suffix, resolver=None, process=False
         )
+        finite = _processed(loaded, suffix)
         mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
         vertices = np.asarray(mesh.vertices, dtype=np.float64)
         faces = np.asarray(mesh.faces, dtype=np.int64)
     except Exception as error:
         # Readers of broken files fail in every way there is: all mean the same to the user.
-        text = str(error).splitlines()[0][:120] if str(error) else type(error).__name__
         raise UsageError(
-            f"{path}: cannot be read as a mesh ({text}); export it again as GLB, OBJ or STL"
+            f"{path}: cannot be read as a mesh ({_reason(error, suffix, content)}); "
+            "export it again as GLB, OBJ or STL"
         ) from error
     if len(faces) == 0 or len(vertices) == 0:
         raise UsageError(f"{path}: holds no triangles; export a mesh, not points or curves")
     if len(faces) > MAX_FACES:
         raise UsageError(f"{path}: {len(faces)} triangles, at most {MAX_FACES}; simplify it")
-    if not np.isfinite(vertices).all():
+    if not finite:
         raise UsageError(f"{path}: has corners that are not numbers; export it again")
     return vertices, faces, _mean_colour(mesh)
+
+
+def _processed(loaded: Any, suffix: str) -> bool:  # noqa: ANN401 - trimesh is imported when used
+    """Merge equal vertices as trimesh does by default; return whether all were finite before.
+
+    trimesh's processing drops what is not finite without a word, hence the order.
+    """
+    meshes = list(loaded.geometry.values()) if hasattr(loaded, "geometry") else [loaded]
+    finite = all(bool(np.isfinite(mesh.vertices).all()) for mesh in meshes)
+    if suffix != "glb":  # which trimesh leaves as it is
+        for mesh in meshes:
+            if hasattr(mesh, "process"):  # not so points and curves, which are refused later
+                mesh.process()
+    return finite
+
+
+def _reason(error: Exception, suffix: str, content: bytes) -> str:
+    """Return the reason why a file cannot be read, in one line."""
+    if suffix == "stl" and content.lstrip()[:5].lower() != b"solid":
+        # trimesh reads a binary STL of the wrong length as text, and fails on that.
+        if len(content) < _STL_HEADER:
+            return f"{len(content)} bytes, a binary STL has {_STL_HEADER} at least"
+        count = int.from_bytes(content[_STL_HEADER - 4 : _STL_HEADER], "little")
+        expected = _STL_HEADER + _STL_TRIANGLE * count
+        if len(content) != expected:
+            return f"{len(content)} bytes, its header of {count} triangles means {expected}"
+    if isinstance(error, ModuleNotFoundError):
+        # For text that is no UTF-8, trimesh looks for a library that guesses encodings.
+        return "not UTF-8 text"
+    return str(error).splitlines()[0][:120] if str(error) else type(error).__name__
 
 
 def _mean_colour(mesh: Any) -> RGB:  # noqa: ANN401 - trimesh is imported when used

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from internav_data.houses.config import HouseConfig
     from internav_data.houses.plan import Corner, FloorPlan, Opening
     from internav_data.houses.programme import RoomSpec
-    from internav_data.records import SceneObject, Vec2
+    from internav_data.records import Material, SceneObject, Vec2
 
 
 def _metres(corners: Sequence[Corner]) -> tuple[Vec2, ...]:
@@ -116,6 +116,10 @@ class HouseDraft:
     """Set by `place_windows`."""
     objects: tuple[SceneObject, ...] = field(init=False, repr=False)
     """Set by `place_furniture`."""
+    surfaces: Sequence[tuple[str, str]] = field(init=False, repr=False)
+    """Set by `choose_materials`: materials of floor and walls by room."""
+    materials: tuple[Material, ...] = field(init=False, repr=False)
+    """Set by `choose_materials`."""
 
 
 def draw_rooms(draft: HouseDraft) -> None:
@@ -164,12 +168,18 @@ def place_furniture(draft: HouseDraft) -> None:
     )
 
 
+def choose_materials(draft: HouseDraft) -> None:
+    """Draw the materials of floors and walls."""
+    draft.surfaces, draft.materials = draw_materials(draft.key, draft.plan.types)
+
+
 STAGES: tuple[Callable[[HouseDraft], None], ...] = (
     draw_rooms,
     draw_plan,
     place_doors,
     place_windows,
     place_furniture,
+    choose_materials,
 )
 """Stages of a draft, in order. Each has random numbers of its own: a stage that draws more or
 fewer of them changes no other."""
@@ -195,10 +205,9 @@ def build_house(
 
 
 def _finished(draft: HouseDraft) -> House:
-    """Turn a draft on centimetres into the record in metres, with its walls and surfaces."""
+    """Turn a draft on centimetres into the record in metres, with its walls."""
     plan, grid = draft.plan, draft.plan.grid
     count = len(plan.types)
-    surfaces, materials = draw_materials(draft.key, plan.types)
     used = sorted({item.asset_id for item in draft.objects})
     return House(
         scene_id=f"scene-{draft.key.scene:06d}",
@@ -207,12 +216,12 @@ def _finished(draft: HouseDraft) -> House:
         split=split_of_scene(draft.key.scene),
         preset=draft.config.preset,
         outline=_metres(grid.polygon(frozenset(range(count)))),
-        rooms=_rooms(plan, surfaces, draft.ceiling_cm),
+        rooms=_rooms(plan, draft.surfaces, draft.ceiling_cm),
         doors=tuple(_door(k, o) for k, o in enumerate(draft.doors)),
         windows=tuple(_window(k, o) for k, o in enumerate(draft.windows)),
         walls=build_walls(grid, (*draft.doors, *draft.windows), draft.ceiling_cm),
         objects=draft.objects,
-        materials=materials,
+        materials=draft.materials,
         room_graph=tuple(sorted({o.rooms for o in draft.doors if o.open})),
         area_m2=round_m(sum(grid.area_cm2(room) for room in range(count)) / 1e4),
         assets={asset_id: draft.catalogue.assets[asset_id] for asset_id in used},

@@ -1,8 +1,11 @@
-"""Per-process physics engine backed by an on-disk result cache shared by the user's processes.
+"""Wrapper of a physics engine that looks solutions up in the result cache before it solves.
 
-A problem is plain data and its solution depends on nothing else, so solutions are kept on disk
-(`result_cache`). They recur: on free ground an object settles and slides the same way in every
-house, and training meets the scenes that generation has solved.
+This module knows physics: which problems are equal, what a solution depends on besides, and how it
+is packed into bytes. The file on disk that holds those bytes is `result_cache`, which knows none.
+
+A problem is plain data and its solution depends on nothing else. Solutions recur: on free ground
+an object settles and slides the same way in every house, and training meets the scenes that
+generation has solved.
 """
 
 from __future__ import annotations

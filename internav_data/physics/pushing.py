@@ -162,17 +162,18 @@ def push(
     movers: Movers = ()
     failure: Failure = "too heavy"
 
-    def moves() -> bool:
-        return shift_m(body.asset, body.pose, problem.frame.leave(solution.poses[0])) >= SUCCESS_M
-
     # An object that is too heavy alone is not lighter among others, nor freer beside the agent.
-    known = _met(problem, (body.asset,), free) if moves() else {}
+    known = _met(problem, (body.asset,), free) if _is_moved(body, problem.frame, free) else {}
     if known:
         failure = "something is in the way"
         solution, movers = _push_among(problem, None, known)
     collider = _collider(problem.frame, agent, agent_gap_m)
     moving = (body.asset, *_assets(movers))
-    if collider is not None and moves() and _meets(problem, collider, moving, solution):
+    if (
+        collider is not None
+        and _is_moved(body, problem.frame, solution)
+        and _meets(problem, collider, moving, solution)
+    ):
         # Only now: a push that never comes near the agent has one solution, wherever it stands.
         failure = "the agent is in the way"
         solution, movers = _push_among(problem, collider, known)
@@ -198,7 +199,7 @@ def count_movers(
     """
     problem = _Problem.of(body, heading, near, spec, engine)
     free = _push_alone(problem.pushed, spec, problem.solver)
-    if shift_m(body.asset, body.pose, problem.frame.leave(free.poses[0])) < SUCCESS_M:
+    if not _is_moved(body, problem.frame, free):
         return 0
 
     def loose(dop8: Dop8) -> list[tuple[int, Body]]:
@@ -245,6 +246,11 @@ def _push_among(
             for sweep in solution.sweeps:
                 known.update(problem.near(grown(frame.leave_dop8(sweep), FAR_M)))
     return solution, movers
+
+
+def _is_moved(body: Body, frame: Frame, solution: PushSolution) -> bool:
+    """Return whether a solution moves the pushed object far enough for a success."""
+    return shift_m(body.asset, body.pose, frame.leave(solution.poses[0])) >= SUCCESS_M
 
 
 def _assets(movers: Movers) -> tuple[Asset, ...]:

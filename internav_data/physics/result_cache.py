@@ -1,7 +1,9 @@
-"""Result cache on disk: solutions of physics shared by all processes of a user, present and later.
+"""File on disk from keys to values, both bytes, shared by all processes of a user.
 
-It is a SQLite file in the user's cache folder, which several processes may read and write at once.
-Cache errors are never raised: unreadable entries are recomputed, unwritable ones dropped.
+Its values are solutions of physics, of which it knows nothing: keys, packing and the engine that
+asks are in `cache`. It is a SQLite file in the user's cache folder, which several processes may
+read and write at once. Cache errors are never raised: unreadable entries are recomputed,
+unwritable ones dropped.
 """
 
 from __future__ import annotations

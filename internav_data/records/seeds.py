@@ -1,5 +1,17 @@
 """The only source of random numbers: a generator derived from (seed, purpose, scene, …).
 
+A purpose with several uses has sub-streams, whose id takes the place of one word of the key:
+
+=========== ================== ========================
+purpose     sub-streams        word that holds their id
+=========== ================== ========================
+PROGRAMME   `ProgrammeStream`  `episode`
+FLOOR_PLAN  `FloorPlanStream`  `draw`
+LOADER      `LoaderStream`     `attempt`
+EVALUATION  `EvaluationStream` `attempt`
+TRAINING    `TrainingStream`   `attempt`
+=========== ================== ========================
+
 Stored data and training runs depend on every number here. Never renumber: append.
 """
 
@@ -48,57 +60,57 @@ class ProgrammeStream(IntEnum):
     """Sub-stream ids within `Purpose.PROGRAMME`, passed as `episode`."""
 
     COUNTS = 0
-    """Sub-stream id within Purpose.PROGRAMME: offset of the sequence of room counts."""
+    """Offset of the sequence of room counts."""
     ROOMS = 1
-    """Sub-stream id within Purpose.PROGRAMME: types and areas of the rooms of a scene."""
+    """Types and areas of the rooms of a scene."""
 
 
 class FloorPlanStream(IntEnum):
     """Sub-stream ids within `Purpose.FLOOR_PLAN`, passed as `draw`."""
 
     CANDIDATES = 0
-    """Sub-stream id within Purpose.FLOOR_PLAN: candidate plans and their door trees."""
+    """Candidate plans and their door trees."""
     CEILING = 1
-    """Sub-stream id within Purpose.FLOOR_PLAN: height of the ceiling."""
+    """Height of the ceiling."""
 
 
 class LoaderStream(IntEnum):
     """Sub-stream ids within `Purpose.LOADER`, passed as `attempt`."""
 
     ROWS = 0
-    """Sub-stream id within Purpose.LOADER: order of all rows, or rows to sample."""
+    """Order of all rows, or rows to sample."""
     HOUSES = 1
-    """Sub-stream id within Purpose.LOADER: order of runs of episodes, each within one house."""
+    """Order of runs of episodes, each within one house."""
     EPISODES = 2
-    """Sub-stream id within Purpose.LOADER: order of the episodes within one house."""
+    """Order of the episodes within one house."""
 
 
 class EvaluationStream(IntEnum):
     """Sub-stream ids within `Purpose.EVALUATION`, passed as `attempt`."""
 
     ACTIONS = 0
-    """Sub-stream id within Purpose.EVALUATION: actions of a policy in one episode."""
+    """Actions of a policy in one episode."""
     SUBSET = 1
-    """Sub-stream id within Purpose.EVALUATION: episodes to evaluate where not all are."""
+    """Episodes to evaluate where not all are."""
     BOOTSTRAP = 2
-    """Sub-stream id within Purpose.EVALUATION: resamples of a bootstrap interval."""
+    """Resamples of a bootstrap interval."""
 
 
 class TrainingStream(IntEnum):
     """Sub-stream ids within `Purpose.TRAINING`, passed as `attempt`."""
 
     ACTIONS = 0
-    """Sub-stream id within Purpose.TRAINING: actions of one environment; `scene` is its index."""
+    """Actions of one environment; `scene` is its index."""
     MINIBATCHES = 1
-    """Sub-stream id within Purpose.TRAINING: order of environments in the minibatches."""
+    """Order of environments in the minibatches."""
     PARAMETERS = 2
-    """Sub-stream id within Purpose.TRAINING: initial parameters of the networks."""
+    """Initial parameters of the networks."""
     EPISODES = 3
-    """Sub-stream id within Purpose.TRAINING: order of episodes; `draw` is the stage."""
+    """Order of episodes; `draw` is the stage."""
     AUXILIARY = 4
-    """Sub-stream id within Purpose.TRAINING: obstacle that an auxiliary episode is about."""
+    """Obstacle that an auxiliary episode is about."""
     TORCH = 5
-    """Sub-stream id within Purpose.TRAINING: torch's own random numbers."""
+    """Torch's own random numbers."""
 
 
 def generator(

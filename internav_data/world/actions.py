@@ -1,8 +1,10 @@
 """The table of actions, and the result of one.
 
-Everything that depends on actions is read off `Action`: action spaces, the policies' options,
-captions, names in files and the documentation. To add one, add a row and, for a new kind, its
-behaviour: a row of `BEHAVIOURS` in `internav_data.world.world`.
+Action spaces, the policies' options, captions, names in files and the documentation are read off
+`Action`. Three places hold what is not in the table: behaviour by kind (`BEHAVIOURS` in
+`internav_data.world.world`), the expert's moves (`internav_data.planner`), and the validator's own
+table of actions (`internav_data.verification`), which is written again on purpose.
+To add an action, see CONTRIBUTING.md.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import shutil
 import struct
+import sys
 import time
 from pathlib import Path
 
@@ -111,6 +112,7 @@ def test_what_is_wrong_in_the_toml_is_named(tmp_path, toml, words):
 
 
 FLAT = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n"
+CUT = b"\xff" * 80 + struct.pack("<I", 3) + b"\xff" * 100
 HUGE = b"\0" * 80 + struct.pack("<I", 4_000_000_000)
 
 
@@ -121,11 +123,13 @@ HUGE = b"\0" * 80 + struct.pack("<I", 4_000_000_000)
         ("empty.obj", b"", "0 bytes"),
         ("points.obj", b"v 0 0 0\nv 1 1 1\n", "cannot be read as a mesh"),
         ("flat.obj", FLAT, "no volume"),
-        ("cut.stl", HUGE, "cannot be read as a mesh"),
+        ("cut.stl", HUGE, "84 bytes, its header of 4000000000 triangles means 200000000084"),
+        ("cut.stl", CUT, "(184 bytes, its header of 3 triangles means 234)"),
+        ("short.stl", b"\0\xff", "(2 bytes, a binary STL has 84 at least)"),
         (
             "nan.obj",
             b"v nan 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 2 3 4\n",
-            "no volume",
+            "corners that are not numbers",
         ),
     ],
 )
@@ -134,6 +138,14 @@ def test_a_broken_file_is_named(tmp_path, name, content, words):
         load_user_assets(folder(tmp_path, name, mesh=content))
     assert name in str(caught.value)
     assert words in str(caught.value)
+
+
+def test_text_in_another_encoding_is_called_so(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "charset_normalizer", None)  # as if it were not installed
+    with pytest.raises(
+        UsageError, match=r"latin\.obj: cannot be read as a mesh \(not UTF-8 text\)"
+    ):
+        load_user_assets(folder(tmp_path, "latin.obj", mesh=b"# St\xfcck\n" + FLAT))
 
 
 def test_a_large_file_is_refused_before_it_is_read(tmp_path, monkeypatch):

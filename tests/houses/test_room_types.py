@@ -98,7 +98,11 @@ def test_a_pair_stands_in_one_of_its_records():
 
 
 def test_a_new_type_of_one_record_becomes_rooms(monkeypatch, assets, oracle):
-    """One entry in the table is enough for a type: no other module knows the names."""
+    """One record is enough for a type: no other module must list it.
+
+    Programme, layouts, doors, windows and scores name hall, living room, kitchen, bedroom and
+    bathroom, which play parts of their own; a further type is known by its record alone.
+    """
     nursery = dataclasses.replace(
         ROOM_TYPES["office"],
         extra=None,
