@@ -54,19 +54,24 @@ def check_objects(
         owners.append(WALL_ID)
     within = {room: shapely.buffer(shape, DEPTH_M) for room, shape in rooms.items()}
     shapely.prepare(list(within.values()))
-    groups = {thing.object_id: thing.group for thing in house.objects}
+    groups = {scene_object.object_id: scene_object.group for scene_object in house.objects}
     own = {t.object_id: shapes.slabs(t.asset_id, t.pose) for t in house.objects}
-    for thing in house.objects:
-        name = f"object {thing.object_id} ({thing.asset_id})"
-        asset = shapes.assets[thing.asset_id]
-        report.expect(thing.type == asset.type, "object.type", f"{name}: {asset.type}", thing.type)
-        slabs += own[thing.object_id]
-        owners += [thing.object_id] * len(own[thing.object_id])
-        room = within.get(thing.room)
+    for scene_object in house.objects:
+        name = f"object {scene_object.object_id} ({scene_object.asset_id})"
+        asset = shapes.assets[scene_object.asset_id]
+        report.expect(
+            scene_object.type == asset.type,
+            "object.type",
+            f"{name}: {asset.type}",
+            scene_object.type,
+        )
+        slabs += own[scene_object.object_id]
+        owners += [scene_object.object_id] * len(own[scene_object.object_id])
+        room = within.get(scene_object.room)
         if room is not None:
-            inside = shapely.covers(room, _plans(own[thing.object_id])).all()
-            report.expect(inside, "object.room", f"{name} in room {thing.room}", "beyond it")
-        _check_support(house, thing, own, report)
+            inside = shapely.covers(room, _plans(own[scene_object.object_id])).all()
+            report.expect(inside, "object.room", f"{name} in room {scene_object.room}", "beyond it")
+        _check_support(house, scene_object, own, report)
 
     def may_interlock(a: int, b: int) -> bool:
         """Return whether two owners are of one group, as a chair under its table."""
@@ -83,25 +88,30 @@ def _plans(slabs: list[Slab]) -> NDArray[np.object_]:
 
 
 def _check_support(
-    house: House, thing: SceneObject, own: dict[int, list[Slab]], report: FindingCollector
+    house: House, scene_object: SceneObject, own: dict[int, list[Slab]], report: FindingCollector
 ) -> None:
     """Check that an object stands on the floor or its support, or hangs on a wall or ceiling."""
-    name = f"object {thing.object_id}"
-    slabs = own[thing.object_id]
+    name = f"object {scene_object.object_id}"
+    slabs = own[scene_object.object_id]
     low, high = min(slab.low for slab in slabs), max(slab.high for slab in slabs)
-    if thing.support >= 0:
+    if scene_object.support >= 0:
         held = any(
             abs(slab.high - low) < DEPTH_M and shapely.intersects(slab.plan, _plans(slabs)).any()
-            for slab in own.get(thing.support, [])
+            for slab in own.get(scene_object.support, [])
         )
         report.expect(
-            held, "object.support", f"{name} standing on object {thing.support}", "in the air"
+            held,
+            "object.support",
+            f"{name} standing on object {scene_object.support}",
+            "in the air",
         )
         return
     if abs(low) <= DEPTH_M:
         report.expect(True, "object.support", "", "")  # noqa: FBT003 - counted
         return
-    ceiling = min((r.ceiling_m for r in house.rooms if r.room_id == thing.room), default=math.inf)
+    ceiling = min(
+        (r.ceiling_m for r in house.rooms if r.room_id == scene_object.room), default=math.inf
+    )
     walls = [
         box(w.x_min, w.y_min, w.x_max, w.y_max)
         for w in house.walls

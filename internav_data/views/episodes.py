@@ -162,7 +162,7 @@ def paint_obstacle(canvas: Canvas, kind: ObstacleKind, parts: list[Silhouette]) 
         for part in parts:
             canvas.fill(part.plan, colour)
         return
-    for part in parts:  # a dark rim around the whole thing
+    for part in parts:  # a dark rim around the object
         canvas.line(part.plan, _RIM, 3.4, closed=True)
     paint(canvas, parts, line_px=0.8, colour=colour)
     if kind == "fixed":

@@ -158,7 +158,7 @@ def describe(story: Story, moment: Moment) -> str:
             text += ", fell over"
         others = len(result.moved) - 1
         if others:
-            text += f", moved {others} other thing{'s' if others > 1 else ''}"
+            text += f", moved {others} other object{'s' if others > 1 else ''}"
         return text + _opened(story, moment)
     if action.kind in INTERACTION_KINDS:
         return f"{words}{target}{_opened(story, moment)}"
