@@ -165,9 +165,8 @@ class IntentPolicy(nn.Module):
     @torch.no_grad()
     def synchronise(self, policy: IntentConditionedPolicy) -> None:
         """Copy the parameters of the policy; hidden states stay."""
-        self.embed.load_state_dict(policy.embed.state_dict())
-        self.gru.load_state_dict(policy.gru.state_dict())
-        self.actor.load_state_dict(policy.actor.state_dict())
+        for name, part in self.named_children():
+            part.load_state_dict(policy.get_submodule(name).state_dict())
 
     @torch.no_grad()
     def forward(
@@ -231,10 +230,6 @@ class EpisodeSegments:
         """First steps of the segments between episode starts, and T."""
         begun: list[int] = self.episode_starts.any(1).nonzero().flatten().tolist()
         return sorted({0, *begun, len(self.episode_starts)})
-
-    def select(self, columns: Tensor) -> EpisodeSegments:
-        """Return the segments of some environments, by number (m,)."""
-        return EpisodeSegments(self.episode_starts[:, columns])
 
     def run(self, gru: nn.GRU, inputs: Tensor, hidden: Tensor) -> tuple[Tensor, Tensor]:
         """Run a GRU, one call a segment; zero its hidden state only where an episode begins.

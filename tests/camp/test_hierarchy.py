@@ -17,6 +17,7 @@ from internav_data.camp.agents.hierarchy import (  # noqa: E402
     STOP,
     WAIT,
     AuxiliaryAgent,
+    option_inputs,
 )
 from internav_data.camp.agents.protocol import Agent  # noqa: E402
 from internav_data.camp.rollout import Collector, uniforms_of  # noqa: E402
@@ -39,7 +40,7 @@ VARIANTS = ["integrated", "policy", "recursive", "none"]
 
 def ran_of(agent, batch):
     record = batch.record
-    return agent.run(batch.observations, batch.segments, batch.state, record.open, record.used)
+    return agent.run(batch, option_inputs(record.open, record.used))
 
 
 def insist(agent, option, choice=None):

@@ -8,7 +8,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from internav_data.camp.agents import AGENTS, make_agent  # noqa: E402
-from internav_data.camp.agents.hierarchy import NAVIGATE, PICK, PUSH, option_step  # noqa: E402
+from internav_data.camp.agents.hierarchy import NAVIGATE, PICK, PUSH, option_inputs, option_step  # noqa: E402
 from internav_data.camp.agents.protocol import Agent  # noqa: E402
 from internav_data.camp.ppo import update  # noqa: E402
 from internav_data.camp.rollout import Collector, orders_of, uniforms_of  # noqa: E402
@@ -40,9 +40,7 @@ def test_defect_2_the_mixture_is_a_distribution(collected):
     """Pick's rotations are added to Navigate's, and Navigate's Done and Look keep their mass."""
     agent, _, (_, rollout) = collected("camp")
     batch = rollout.batch
-    ran = agent.run(
-        batch.observations, batch.segments, batch.state, batch.record.open, batch.record.used
-    )  # fmt: skip
+    ran = agent.run(batch, option_inputs(batch.record.open, batch.record.used))
     torch.testing.assert_close(ran.intent.sum(-1), torch.ones(8, 4))
     acts, meant = ran.action_log_probs.exp(), ran.intended_option_probs
     for look in (3, 4):
@@ -133,8 +131,6 @@ def test_defect_7_what_is_no_number_stops_and_is_named(fake, config, wrong, wher
 
 def test_defect_8_a_forced_end_is_told_to_the_networks(config):
     """The inputs of the step after the cap say that nothing is open."""
-    from internav_data.camp.agents.hierarchy import option_inputs
-
     opened = used = torch.zeros(1, dtype=torch.int64)
     told = []
     for _ in range(12):

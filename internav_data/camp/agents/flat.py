@@ -4,30 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
+from internav_data.camp import networks
 from internav_data.camp.agents.protocol import (
-    Agent,
     AgentStep,
     Batch,
     Evaluated,
+    RecurrentAgent,
     StepRecord,
-    one_step,
-    reset_where_done,
-)
-from internav_data.camp.networks import (
-    Encoder,
-    IntentConditionedPolicy,
-    IntentPolicy,
-    RecurrentActorCritic,
-    divergence,
-    drawn,
-    entropy_of,
-    log_prob_of,
-    uniform_intent,
 )
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import ACTION_COUNT, ACTIONS, Action
@@ -35,11 +23,8 @@ from internav_data.world.actions import ACTION_COUNT, ACTIONS, Action
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from torch.nn import Parameter
-
-    from internav_data.camp.agents.protocol import ObservationTensors, State
+    from internav_data.camp.agents.protocol import State, Uniforms
     from internav_data.camp.config import CampConfig
-    from internav_data.camp.networks import EpisodeSegments
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +48,7 @@ class FlatRecord(StepRecord):
         if self.done_probability is not None:
             found["done_probability"] = float(self.done_probability.mean())
         if self.action_probs is not None and self.intent is not None:
-            found["intent_kl"] = divergence(self.action_probs, self.intent)
+            found["intent_kl"] = networks.divergence(self.action_probs, self.intent)
         return found
 
 
@@ -83,7 +68,7 @@ class FlatOutput(NamedTuple):
     """(T, n, K) and (T, n, K, 8, 3): objects in sight, of `nie`."""
 
 
-class PPOAgent(Agent[FlatRecord]):
+class PPOAgent(RecurrentAgent[FlatRecord]):
     """Encoder, GRU, actor and critic.
 
     Parameters
@@ -97,79 +82,61 @@ class PPOAgent(Agent[FlatRecord]):
     def __init__(self, config: CampConfig, extra: int = 0) -> None:
         super().__init__()
         self.hidden = config.network.hidden
-        self.encoder = Encoder(config.network)
+        self.encoder = networks.Encoder(config.network)
         done = config.agent.initial_done_probability
         other = (1.0 - done) / (ACTION_COUNT - 1)
         probabilities = [done if action == Action.DONE else other for action in ACTIONS]
         self.policy = self._policy(self.encoder.size + extra, probabilities)
 
-    def _policy(self, inputs: int, probabilities: list[float]) -> RecurrentActorCritic:
-        return RecurrentActorCritic(inputs, self.hidden, probabilities)
+    def _policy(self, inputs: int, probabilities: list[float]) -> networks.RecurrentActorCritic:
+        return networks.RecurrentActorCritic(inputs, self.hidden, probabilities)
 
     def initial_state(self, count: int) -> State:
         """See `Agent`."""
         weight = self.policy.actor.weight
         return {"hidden": weight.new_zeros(count, self.hidden)}
 
-    def act(
-        self,
-        observations: ObservationTensors,
-        state: State,
-        episode_starts: Tensor,
-        uniforms: Tensor | None,
-    ) -> AgentStep[FlatRecord]:
+    def step(self, batch: Batch[Any], uniforms: Uniforms) -> AgentStep[FlatRecord]:
         """See `Agent`."""
-        ran = self.run(*one_step(observations), reset_where_done(state, episode_starts))
+        ran = self.run(batch)
         log_probs = ran.log_probs[0]
-        choice = drawn(log_probs, None if uniforms is None else uniforms[:, 1])
+        choice = networks.drawn(log_probs, uniforms[1])
         probs = log_probs.exp()
         inputs = (None if x is None else x[0] for x in (ran.intent, ran.objects, ran.corners))
         record = FlatRecord(choice, probs, probs[:, Action.DONE], *inputs)
-        return AgentStep(choice, log_prob_of(log_probs, choice), ran.value[0], record, ran.state)
+        log_prob = networks.log_prob_of(log_probs, choice)
+        return AgentStep(choice, log_prob, ran.value[0], record, ran.state)
 
     def evaluate(self, batch: Batch[FlatRecord]) -> Evaluated:
         """See `Agent`."""
-        ran = self.run(batch.observations, batch.segments, batch.state, batch.record)
-        log_prob = log_prob_of(ran.log_probs, batch.record.choice)
-        return Evaluated(log_prob, ran.value, entropy_of(ran.log_probs), ran.state, ran.intent)
+        ran = self.run(batch)
+        log_prob = networks.log_prob_of(ran.log_probs, batch.record.choice)
+        entropy = networks.entropy_of(ran.log_probs)
+        return Evaluated(log_prob, ran.value, entropy, ran.state, ran.intent)
 
     def labels(self, actions: Sequence[int]) -> tuple[list[int], FlatRecord]:
         """See `Agent`."""
         return list(actions), FlatRecord(torch.tensor(actions))
 
-    def critics(self) -> list[Parameter]:
+    def critics(self) -> list[nn.Parameter]:
         """See `Agent`."""
         return list(self.policy.critic.parameters())
 
-    def run(
-        self,
-        observations: ObservationTensors,
-        segments: EpisodeSegments,
-        state: State,
-        record: FlatRecord | None = None,  # noqa: ARG002 - for those that work out more inputs
-    ) -> FlatOutput:
-        """Run the networks over T steps of n environments.
+    def run(self, batch: Batch[Any]) -> FlatOutput:
+        """Run the networks over T steps of n environments; the record of new ones is None."""
+        return self.decide(self.encoder(batch.observations), batch)
 
-        Parameters
-        ----------
-        observations, segments, state
-            Observations (T, n, …), episode starts, and the memory (n, …) before the first step.
-        record
-            Record (T, n, …) of these steps; None for new ones.
-        """
-        return self.decide(self.encoder(observations), segments, state)
-
-    def decide(self, inputs: Tensor, segments: EpisodeSegments, state: State) -> FlatOutput:
+    def decide(self, inputs: Tensor, batch: Batch[Any]) -> FlatOutput:
         """Run GRU, actor and critic on inputs (T, n, …)."""
-        out, hidden = segments.run(self.policy.gru, inputs, state["hidden"])
+        out, hidden = batch.segments.run(self.policy.gru, inputs, batch.state["hidden"])
         log_probs = torch.log_softmax(self.policy.actor(out), -1)
-        return FlatOutput(log_probs, self.policy.value(out), {**state, "hidden": hidden})
+        return FlatOutput(log_probs, self.policy.value(out), {**batch.state, "hidden": hidden})
 
 
 class PPOIntentAgent(PPOAgent):
     """`ppo` that takes an intent: the next action of its own copy of some rollouts ago."""
 
-    policy: IntentConditionedPolicy
+    policy: networks.IntentConditionedPolicy
 
     def __init__(self, config: CampConfig) -> None:
         super().__init__(config)
@@ -180,33 +147,27 @@ class PPOIntentAgent(PPOAgent):
                 "choose 'integrated', 'recursive' or 'none'"
             )
         self.uses_intent = variant != "none"
-        self.intent = IntentPolicy(self.policy, recursive=variant == "recursive")
+        self.intent = networks.IntentPolicy(self.policy, recursive=variant == "recursive")
 
-    def _policy(self, inputs: int, probabilities: list[float]) -> RecurrentActorCritic:
-        return IntentConditionedPolicy(inputs, self.hidden, probabilities, ACTION_COUNT)
+    def _policy(self, inputs: int, probabilities: list[float]) -> networks.RecurrentActorCritic:
+        return networks.IntentConditionedPolicy(inputs, self.hidden, probabilities, ACTION_COUNT)
 
     def initial_state(self, count: int) -> State:
         """See `Agent`."""
         state = super().initial_state(count)
         return {**state, "intent_hidden": torch.zeros_like(state["hidden"])}
 
-    def run(
-        self,
-        observations: ObservationTensors,
-        segments: EpisodeSegments,
-        state: State,
-        record: FlatRecord | None = None,
-    ) -> FlatOutput:
+    def run(self, batch: Batch[Any]) -> FlatOutput:
         """See `PPOAgent`."""
-        features, hidden = self.encoder(observations), state["intent_hidden"]
-        intent = None if record is None else record.intent
+        features, hidden = self.encoder(batch.observations), batch.state["intent_hidden"]
+        intent = None if batch.record is None else batch.record.intent
         if not self.uses_intent:
-            intent = uniform_intent(features, ACTION_COUNT)
+            intent = networks.uniform_intent(features, ACTION_COUNT)
         elif intent is None:
             no_mask = features.new_zeros(ACTION_COUNT)
             # With a single policy P(i) is P(omega') itself.
-            _, intent, hidden = self.intent(features, hidden, segments, lambda p: p, no_mask)
-        ran = self.decide(self.policy.condition(features, intent), segments, state)
+            _, intent, hidden = self.intent(features, hidden, batch.segments, lambda p: p, no_mask)
+        ran = self.decide(self.policy.condition(features, intent), batch)
         recorded = intent if self.uses_intent else None
         return ran._replace(state={**ran.state, "intent_hidden": hidden}, intent=recorded)
 
@@ -215,7 +176,7 @@ class PPOIntentAgent(PPOAgent):
         self.intent.synchronise(self.policy)
 
 
-class RandomAgent(Agent[StepRecord]):
+class RandomAgent(RecurrentAgent[StepRecord]):
     """Agent that takes each action with the same probability."""
 
     def __init__(self, config: CampConfig) -> None:  # noqa: ARG002 - as all agents are made
@@ -225,19 +186,13 @@ class RandomAgent(Agent[StepRecord]):
         """See `Agent`."""
         return {}
 
-    def act(
-        self,
-        observations: ObservationTensors,
-        state: State,
-        episode_starts: Tensor,  # noqa: ARG002 - it has no memory
-        uniforms: Tensor | None,
-    ) -> AgentStep[StepRecord]:
+    def step(self, batch: Batch[Any], uniforms: Uniforms) -> AgentStep[StepRecord]:
         """See `Agent`; the most probable action is the first."""
-        goal = observations["goal"]
+        goal = batch.observations["goal"][0]
         log_probs = torch.full((len(goal), ACTION_COUNT), -math.log(ACTION_COUNT)).to(goal.device)
-        choice = drawn(log_probs, None if uniforms is None else uniforms[:, 1])
+        choice = networks.drawn(log_probs, uniforms[1])
         value = goal.new_zeros(len(goal))
-        return AgentStep(choice, log_probs[:, 0], value, StepRecord(choice), state)
+        return AgentStep(choice, log_probs[:, 0], value, StepRecord(choice), batch.state)
 
     def evaluate(self, batch: Batch[StepRecord]) -> Evaluated:
         """See `Agent`."""

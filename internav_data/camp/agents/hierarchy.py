@@ -8,43 +8,28 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import torch
 from torch import Tensor, nn
 
+from internav_data.camp import networks
 from internav_data.camp.agents.protocol import (
-    Agent,
     AgentStep,
     Batch,
     Evaluated,
+    RecurrentAgent,
     StepRecord,
-    one_step,
-    reset_where_done,
 )
 from internav_data.camp.config import INTERACTION_ACTIONS
-from internav_data.camp.networks import (
-    Encoder,
-    IntentConditionedPolicy,
-    IntentPolicy,
-    RecurrentActorCritic,
-    divergence,
-    drawn,
-    entropy_of,
-    log_prob_of,
-    uniform_intent,
-)
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import ACTION_COUNT, Action, OptionName, actions_of_option
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from torch.nn import Parameter
-
-    from internav_data.camp.agents.protocol import ObservationTensors, State
+    from internav_data.camp.agents.protocol import State, Uniforms
     from internav_data.camp.config import CampConfig
-    from internav_data.camp.networks import EpisodeSegments
 
 NAVIGATE, PUSH, PICK, STOP = range(4)
 """Options in the order of the global policy's logits. STOP executes Done. (0 in a state: no
@@ -126,7 +111,7 @@ class HierarchyRecord(OptionRecord):
             found["forced_share"] = forced / ended
         chosen, intended = self.option_probs, self.intended_option_probs
         if chosen is not None and intended is not None and decide.any():
-            found["intent_kl"] = divergence(chosen[decide], intended[decide])
+            found["intent_kl"] = networks.divergence(chosen[decide], intended[decide])
         return found
 
 
@@ -253,7 +238,7 @@ class ForwardOutput(NamedTuple):
     """(n, 5, hidden): hidden states after the last step."""
 
 
-class Hierarchy(Agent[HierarchyRecord]):
+class Hierarchy(RecurrentAgent[HierarchyRecord]):
     """Encoders, three action policies, the global policy, and the intent policy that copies it.
 
     All five GRUs are stepped at every step, each with its own hidden state, whichever policy acts.
@@ -276,22 +261,23 @@ class Hierarchy(Agent[HierarchyRecord]):
         variant = agent.intent if temporally_extended else "none"
         self.uses_intent = variant != "none"
         count = 1 if network.shared_encoder else 3
-        self.encoders = nn.ModuleList(Encoder(network) for _ in range(count))
-        size = Encoder.size_of(network)
+        self.encoders = nn.ModuleList(networks.Encoder(network) for _ in range(count))
+        size = networks.Encoder.size_of(network)
         moves, options = initial_probabilities(
             agent.initial_done_probability, agent.initial_interaction_probability
         )
         even = [1.0 / len(ACTIONS_OF[PUSH])] * len(ACTIONS_OF[PUSH])  # their Done ends no episode
-        self.navigate = RecurrentActorCritic(size, self.hidden, moves)
-        self.push = RecurrentActorCritic(size + OPTION_INPUTS, self.hidden, even)
-        self.pick = RecurrentActorCritic(size + OPTION_INPUTS, self.hidden, even)
+        self.navigate = networks.RecurrentActorCritic(size, self.hidden, moves)
+        self.push = networks.RecurrentActorCritic(size + OPTION_INPUTS, self.hidden, even)
+        self.pick = networks.RecurrentActorCritic(size + OPTION_INPUTS, self.hidden, even)
         self.intends_options = variant == "policy"
         intents = OPTIONS if self.intends_options else ACTION_COUNT
-        self.global_policy = IntentConditionedPolicy(
+        self.global_policy = networks.IntentConditionedPolicy(
             size + OPTION_INPUTS, self.hidden, options, intents
         )
         if self.uses_intent:
-            self.intent = IntentPolicy(self.global_policy, recursive=variant == "recursive")
+            recursive = variant == "recursive"
+            self.intent = networks.IntentPolicy(self.global_policy, recursive=recursive)
         mask = torch.zeros(OPTIONS)
         mask[[PUSH if name == "push" else PICK for name in agent.forbidden]] = -torch.inf
         self.register_buffer("mask", mask, persistent=False)
@@ -300,7 +286,7 @@ class Hierarchy(Agent[HierarchyRecord]):
         self.register_buffer("done", done, persistent=False)
 
     @property
-    def policies(self) -> tuple[RecurrentActorCritic, RecurrentActorCritic, RecurrentActorCritic]:
+    def policies(self) -> tuple[networks.RecurrentActorCritic, ...]:
         """Action policies, numbered as options are."""
         return self.navigate, self.push, self.pick
 
@@ -311,21 +297,14 @@ class Hierarchy(Agent[HierarchyRecord]):
         hidden = weight.new_zeros(count, GRUS, self.hidden)
         return {"hidden": hidden, "open": idle, "used": idle.clone()}
 
-    def act(
-        self,
-        observations: ObservationTensors,
-        state: State,
-        episode_starts: Tensor,
-        uniforms: Tensor | None,
-    ) -> AgentStep[HierarchyRecord]:
+    def step(self, batch: Batch[Any], uniforms: Uniforms) -> AgentStep[HierarchyRecord]:
         """See `Agent`."""
-        state = reset_where_done(state, episode_starts)
-        ran = self.run(*one_step(observations), state, state["open"][None], state["used"][None])
+        state = batch.state
+        ran = self.run(batch, option_inputs(state["open"], state["used"])[None])
         option_log_probs, action_log_probs = ran.option_log_probs[0], ran.action_log_probs[0]
-        first, second = (None, None) if uniforms is None else uniforms.unbind(1)
         decide = state["open"] == 0
-        option = torch.where(decide, drawn(option_log_probs, first), state["open"])
-        choice = drawn(_of_option(action_log_probs, option), second)
+        option = torch.where(decide, networks.drawn(option_log_probs, uniforms[0]), state["open"])
+        choice = networks.drawn(_of_option(action_log_probs, option), uniforms[1])
         opened, used, handed_back, forced = option_step(option, choice, state["used"])
         if not self.temporally_extended:
             opened, used, forced = opened * 0, used * 0, forced & False
@@ -346,47 +325,42 @@ class Hierarchy(Agent[HierarchyRecord]):
     def evaluate(self, batch: Batch[HierarchyRecord]) -> Evaluated:
         """See `Agent`."""
         record = batch.record
-        ran = self.run(
-            batch.observations, batch.segments, batch.state, record.open, record.used, record.intent
-        )
+        ran = self.run(batch, option_inputs(record.open, record.used), record.intent)
         log_prob = _log_prob(ran.option_log_probs, ran.action_log_probs, record)
-        acting = _of_option(ran.action_log_probs, record.option)
-        entropy = record.decide * entropy_of(ran.option_log_probs) + entropy_of(acting)
+        decided = record.decide * networks.entropy_of(ran.option_log_probs)
+        acted = networks.entropy_of(_of_option(ran.action_log_probs, record.option))
         state = {**batch.state, "hidden": ran.hidden}
-        return Evaluated(log_prob, ran.value, entropy, state, ran.intent)
+        return Evaluated(log_prob, ran.value, decided + acted, state, ran.intent)
 
     def run(
-        self,
-        observations: ObservationTensors,
-        segments: EpisodeSegments,
-        state: State,
-        opened: Tensor,
-        used: Tensor,
-        intent: Tensor | None = None,
+        self, batch: Batch[Any], option_features: Tensor, intent: Tensor | None = None
     ) -> ForwardOutput:
         """Run all networks over T steps of n environments.
 
         Parameters
         ----------
-        observations, segments, state
-            Observations (T, n, …), episode starts, and the memory (n, …) before the first step.
-        opened, used : (T, n)
-            Open interaction before each step, and the actions it has used.
+        batch
+            Steps; their record is not read.
+        option_features : (T, n, 3)
+            `option_inputs` before each step.
         intent : (T, n, 12 or 4)
             P(i) as it was recorded; None to compute it.
         """
-        views = [encoder(observations) for encoder in self.encoders]  # (T, n, size) each
-        told = option_inputs(opened, used)
-        inputs = [views[0], *(torch.cat([views[k % len(views)], told], -1) for k in (PUSH, PICK))]
-        hidden, log_probs = list(state["hidden"].unbind(1)), []
+        segments = batch.segments
+        views = [encoder(batch.observations) for encoder in self.encoders]  # (T, n, size) each
+        inputs = [
+            views[0],
+            *(torch.cat([views[k % len(views)], option_features], -1) for k in (PUSH, PICK)),
+        ]
+        hidden, log_probs = list(batch.state["hidden"].unbind(1)), []
         for k, policy in enumerate(self.policies):
             out, hidden[k] = segments.run(policy.gru, inputs[k], hidden[k])
             may_end = k == NAVIGATE or self.temporally_extended
             log_probs.append(action_log_probs_of(k, policy.actor(out), may_end=may_end))
         acts = torch.stack([*log_probs, self.done.expand_as(log_probs[0])], -2)  # (T, n, 4, 12)
-        features, intended = torch.cat([views[0], told], -1), None
+        features, intended = torch.cat([views[0], option_features], -1), None
         if not self.uses_intent:
-            intent = uniform_intent(features, self.global_policy.embed.in_features)
+            intent = networks.uniform_intent(features, self.global_policy.embed.in_features)
         elif intent is None:
             intended, intent, hidden[INTENT] = self.intent(
                 features, hidden[INTENT], segments, lambda p: self.mixed(p, acts), self.mask
@@ -411,7 +385,7 @@ class Hierarchy(Agent[HierarchyRecord]):
         """See `Agent`."""
         return option_labels(actions, temporally_extended=self.temporally_extended)
 
-    def optimised(self) -> list[Parameter]:
+    def optimised(self) -> list[nn.Parameter]:
         """See `Agent`: neither the intent policy nor the critics of the policies' pretraining."""
         parts = (
             self.encoders,
@@ -420,7 +394,7 @@ class Hierarchy(Agent[HierarchyRecord]):
         )
         return [parameter for part in parts for parameter in part.parameters()]
 
-    def critics(self) -> list[Parameter]:
+    def critics(self) -> list[nn.Parameter]:
         """See `Agent`."""
         return list(self.global_policy.critic.parameters())
 
@@ -430,7 +404,7 @@ class Hierarchy(Agent[HierarchyRecord]):
             self.intent.synchronise(self.global_policy)
 
 
-class AuxiliaryAgent(Agent[OptionRecord]):
+class AuxiliaryAgent(RecurrentAgent[OptionRecord]):
     """Action policies of a hierarchy, one in each environment, with critics of their own.
 
     Done ends the task. The policies' inputs on the open option are those of the whole model: none
@@ -460,47 +434,41 @@ class AuxiliaryAgent(Agent[OptionRecord]):
         state = self.hierarchy.initial_state(count)
         return {**state, "hidden": state["hidden"][:, 0]}
 
-    def act(
-        self,
-        observations: ObservationTensors,
-        state: State,
-        episode_starts: Tensor,
-        uniforms: Tensor | None,
-    ) -> AgentStep[OptionRecord]:
+    def step(self, batch: Batch[Any], uniforms: Uniforms) -> AgentStep[OptionRecord]:
         """See `Agent`."""
-        state = reset_where_done(state, episode_starts)
-        option, opened, used = self._option, state["open"], state["used"]
-        log_probs, value, hidden = self.run(
-            *one_step(observations), state, opened[None], used[None]
-        )
-        choice = drawn(log_probs[0], None if uniforms is None else uniforms[:, 1])
+        option, opened, used = self._option, batch.state["open"], batch.state["used"]
+        log_probs, value, hidden = self.run(batch, option_inputs(opened, used)[None], option)
+        choice = networks.drawn(log_probs[0], uniforms[1])
         record = OptionRecord(choice, option, opened, used)
         opened, used, _, _ = option_step(option, choice, used)
         if not self.hierarchy.temporally_extended:  # `hrl` has no such inputs later either
             opened, used = opened * 0, used * 0
         after = {"hidden": hidden, "open": opened, "used": used}
-        return AgentStep(choice, log_prob_of(log_probs[0], choice), value[0], record, after)
+        log_prob = networks.log_prob_of(log_probs[0], choice)
+        return AgentStep(choice, log_prob, value[0], record, after)
 
     def evaluate(self, batch: Batch[OptionRecord]) -> Evaluated:
         """See `Agent`."""
         record = batch.record
-        log_probs, value, hidden = self.run(
-            batch.observations, batch.segments, batch.state, record.open, record.used,
-            record.option[0],
-        )  # fmt: skip
-        log_prob, state = log_prob_of(log_probs, record.choice), {**batch.state, "hidden": hidden}
-        return Evaluated(log_prob, value, entropy_of(log_probs), state)
+        option_features = option_inputs(record.open, record.used)
+        log_probs, value, hidden = self.run(batch, option_features, record.option[0])
+        log_prob = networks.log_prob_of(log_probs, record.choice)
+        state = {**batch.state, "hidden": hidden}
+        return Evaluated(log_prob, value, networks.entropy_of(log_probs), state)
 
     def run(
-        self,
-        observations: ObservationTensors,
-        segments: EpisodeSegments,
-        state: State,
-        opened: Tensor,
-        used: Tensor,
-        option: Tensor | None = None,
+        self, batch: Batch[Any], option_features: Tensor, option: Tensor
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """Run each policy over its own environments, `option` (n,), all of them by default.
+        """Run each policy over its own environments.
+
+        Parameters
+        ----------
+        batch
+            Steps; their record is not read.
+        option_features : (T, n, 3)
+            `option_inputs` before each step.
+        option : (n,)
+            Policy that acts in each environment.
 
         Returns
         -------
@@ -511,33 +479,33 @@ class AuxiliaryAgent(Agent[OptionRecord]):
         hidden : (n, hidden)
             Hidden states after the last step.
         """
-        option = self._option if option is None else option
-        log_probs = state["hidden"].new_full((*opened.shape, ACTION_COUNT), -torch.inf)
-        value, hidden = state["hidden"].new_zeros(opened.shape), torch.zeros_like(state["hidden"])
+        before, (steps, count, _) = batch.state["hidden"], option_features.shape
+        log_probs = before.new_full((steps, count, ACTION_COUNT), -torch.inf)
+        value, hidden = before.new_zeros(steps, count), torch.zeros_like(before)
         for task, policy in enumerate(self.hierarchy.policies):
             columns = (option == task).nonzero().flatten()
             if not len(columns):
                 continue
             encoder = self.hierarchy.encoders[task % len(self.hierarchy.encoders)]
-            inputs = encoder({name: values[:, columns] for name, values in observations.items()})
+            own = batch.select(columns)
+            inputs = encoder(own.observations)
             if task != NAVIGATE:
-                inputs = torch.cat([inputs, option_inputs(opened, used)[:, columns]], -1)
-            own = segments.select(columns)
-            out, after = own.run(policy.gru, inputs, state["hidden"][columns])
+                inputs = torch.cat([inputs, option_features[:, columns]], -1)
+            out, after = own.segments.run(policy.gru, inputs, own.state["hidden"])
             own_log_probs = action_log_probs_of(task, policy.actor(out))
             log_probs = log_probs.index_copy(1, columns, own_log_probs)
             value = value.index_copy(1, columns, policy.value(out))
             hidden = hidden.index_copy(0, columns, after)
         return log_probs, value, hidden
 
-    def optimised(self) -> list[Parameter]:
+    def optimised(self) -> list[nn.Parameter]:
         """See `Agent`: encoders and policies that have environments, critics too."""
         encoders = self.hierarchy.encoders
         used = [encoders[k] for k in sorted({task % len(encoders) for task in self._trained})]
         parts = [*used, *(self.hierarchy.policies[task] for task in self._trained)]
         return [parameter for part in parts for parameter in part.parameters()]
 
-    def critics(self) -> list[Parameter]:
+    def critics(self) -> list[nn.Parameter]:
         """See `Agent`."""
         return [p for k in self._trained for p in self.hierarchy.policies[k].critic.parameters()]
 
@@ -551,6 +519,6 @@ def _log_prob(
     option_log_probs: Tensor, action_log_probs: Tensor, record: HierarchyRecord
 ) -> Tensor:
     """Return decide * log pi_Omega(omega) + log pi_omega(a); the second is 0 for omega = Done."""
-    decided = log_prob_of(option_log_probs, record.option)
-    acted = log_prob_of(_of_option(action_log_probs, record.option), record.choice)
+    decided = networks.log_prob_of(option_log_probs, record.option)
+    acted = networks.log_prob_of(_of_option(action_log_probs, record.option), record.choice)
     return torch.where(record.decide, decided, 0.0) + acted

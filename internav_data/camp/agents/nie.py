@@ -11,7 +11,7 @@ metres from the eye; the object's type is no input.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import torch
 from torch import Tensor, nn
@@ -23,9 +23,8 @@ from internav_data.records.errors import UsageError
 from internav_data.world.actions import ACTION_COUNT, HORIZONS_DEG
 
 if TYPE_CHECKING:
-    from internav_data.camp.agents.protocol import Batch, Evaluated, ObservationTensors, State
+    from internav_data.camp.agents.protocol import Batch, Evaluated, ObservationTensors
     from internav_data.camp.config import CampConfig
-    from internav_data.camp.networks import EpisodeSegments
 
 SUMMARY: Final = 64
 _CORNERS: Final = 8
@@ -47,24 +46,17 @@ class NIEAgent(PPOAgent):
         self.query = nn.Linear(self.encoder.size, SUMMARY)
         self.content = nn.Linear(SUMMARY + 3 * _CORNERS * ACTION_COUNT, SUMMARY)
 
-    def run(
-        self,
-        observations: ObservationTensors,
-        segments: EpisodeSegments,
-        state: State,
-        record: FlatRecord | None = None,
-    ) -> FlatOutput:
+    def run(self, batch: Batch[Any]) -> FlatOutput:
         """See `PPOAgent`: features, and a summary of the predicted motion of objects in sight."""
-        objects, corners = self.sight(observations, record)
-        inputs = self.summarised(self.encoder(observations), objects, corners)
-        return self.decide(inputs, segments, state)._replace(objects=objects, corners=corners)
+        objects, corners = self.sight(batch)
+        inputs = self.summarised(self.encoder(batch.observations), objects, corners)
+        return self.decide(inputs, batch)._replace(objects=objects, corners=corners)
 
-    def sight(
-        self, observations: ObservationTensors, record: FlatRecord | None
-    ) -> tuple[Tensor, Tensor]:
+    def sight(self, batch: Batch[Any]) -> tuple[Tensor, Tensor]:
         """Return objects (T, n, K) and corners (T, n, K, 8, 3), recorded or found anew."""
+        record = batch.record
         if record is None or record.objects is None or record.corners is None:
-            return self.sighted(observations)
+            return self.sighted(batch.observations)
         return record.objects, record.corners
 
     def summarised(self, features: Tensor, objects: Tensor, corners: Tensor) -> Tensor:
@@ -86,7 +78,7 @@ class NIEAgent(PPOAgent):
 
     def evaluate(self, batch: Batch[FlatRecord]) -> Evaluated:
         """See `Agent`; the loss is the L1 error of the predicted keypoints."""
-        objects, corners = self.sight(batch.observations, batch.record)
+        objects, corners = self.sight(batch)
         record = replace(batch.record, objects=objects, corners=corners)
         found = super().evaluate(replace(batch, record=record))
         index = record.choice[..., None, None, None, None]

@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from typing import Self
 
-    from torch.nn import Parameter
-
 ObservationTensors = dict[str, Tensor]
 """Observations by sensor: tensors (n, …), or (T, n, …) of several steps."""
 State = dict[str, Tensor]
 """Memory of each environment's episode: tensors (n, …) by name; zeros at its start."""
+Uniforms = tuple[Tensor | None, Tensor | None]
+"""Random numbers (n,) that options and actions are drawn by; None for the most probable."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +101,7 @@ class Batch(Generic[R]):
             {name: values[:, columns] for name, values in self.observations.items()},
             self.episode_starts[:, columns],
             {name: values[columns] for name, values in self.state.items()},
-            self.record.map(lambda values: values[:, columns]),
+            self.record and self.record.map(lambda values: values[:, columns]),
         )
 
 
@@ -190,11 +190,11 @@ class Agent(nn.Module, ABC, Generic[R]):
         record: Any = StepRecord(torch.tensor(actions))
         return list(actions), record
 
-    def optimised(self) -> list[Parameter]:
+    def optimised(self) -> list[nn.Parameter]:
         """Return the parameters that are trained."""
         return [parameter for parameter in self.parameters() if parameter.requires_grad]
 
-    def critics(self) -> list[Parameter]:
+    def critics(self) -> list[nn.Parameter]:
         """Return the critics' parameters, which are trained alone while they are new."""
         return []
 
@@ -214,6 +214,28 @@ class Agent(nn.Module, ABC, Generic[R]):
         other = copy.copy(self)
         other.uses_intent = False
         return other
+
+
+class RecurrentAgent(Agent[R]):
+    """Agent whose networks run over a batch, whether its steps are new or recorded."""
+
+    def act(
+        self,
+        observations: ObservationTensors,
+        state: State,
+        episode_starts: Tensor,
+        uniforms: Tensor | None,
+    ) -> AgentStep[R]:
+        """See `Agent`."""
+        seen, segments = one_step(observations)
+        state = reset_where_done(state, episode_starts)
+        batch: Batch[Any] = Batch(seen, segments.episode_starts, state, None)
+        draws = (None, None) if uniforms is None else (uniforms[:, 0], uniforms[:, 1])
+        return self.step(batch, draws)
+
+    @abstractmethod
+    def step(self, batch: Batch[Any], uniforms: Uniforms) -> AgentStep[R]:
+        """Choose actions (n,) in a batch of one new step, (1, n, …), whose record is None."""
 
 
 def reset_where_done(state: State, episode_starts: Tensor) -> State:
