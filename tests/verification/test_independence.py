@@ -301,6 +301,18 @@ def test_plans_that_touch_do_not_overlap():
     assert plans_overlap(box(0, 0, 1, 1), box(0.99, 0, 2, 1))
 
 
+def test_plans_that_differ_in_the_last_digits_overlap():
+    """GEOS's overlay without a grid finds nothing shared by these two."""
+    corners = np.array([
+        (-0.4725, -0.175), (-0.483333333, -0.171666667), (-0.485238095, -0.162619048),
+        (0.20047619, 0.180238095), (0.423333333, 0.111666667), (0.425238095, 0.102619048),
+        (0.119090909, -0.050454545), (-0.098505747, -0.096264368),
+    ])  # fmt: skip
+    moved = (corners - 0.01) + 0.01
+    assert 0.0 < abs(moved - corners).max() < 1e-16
+    assert plans_overlap(shapely.Polygon(corners), shapely.Polygon(moved))
+
+
 # findings
 
 
