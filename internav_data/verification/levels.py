@@ -41,6 +41,10 @@ class ShardRef:
     episodes: tuple[str, int] | None
 
 
+WITHOUT_SOLID = {"schema.assets.parts", "schema.assets.corners"}
+"""Findings of assets of which some part is no solid: no geometry can be checked with them."""
+
+
 @dataclass(frozen=True, slots=True)
 class Unit:
     """Scenes that one worker checks."""
@@ -113,6 +117,8 @@ def validate(
         whole.absorb(tables)
         progress_callback("schema", 1, 1)
         damaged |= {f.file for f in tables.found if f.predicate == "schema.columns"}
+        if WITHOUT_SOLID & set(tables.by_predicate):
+            damaged |= {file.path for file in manifest.of("assets")}
     if level in {"geometry", "physics"}:
         physics = checked_config(manifest.config) if level == "physics" else None
         if physics is not None and tables.by_predicate:

@@ -23,6 +23,13 @@ TURNS = 6
 """Decimals of quaternions."""
 MAX_PUSH_S = 5.5
 """Maximum duration of a push: half a second of force, five until at rest."""
+PATTERNS = ("plain", "planks", "tiles", "stripes", "carpet", "bricks")
+"""Patterns of floors and walls."""
+PART_MATERIALS = (
+    "wood", "fabric", "metal", "plastic", "ceramic", "glass", "leather", "leaf", "food", "paper",
+    "screen", "stone",
+)  # fmt: skip
+"""Materials of the parts of assets."""
 UNIT = 3e-6
 """Tolerance of the length of a rounded quaternion."""
 
@@ -107,12 +114,14 @@ SCENE_RULES: Mapping[str, Rule] = {
     "scene": Rule(0),
     "seed": Rule(0),
     "split": SPLIT,
+    "preset": WORDS,
     **{f"outline.element.{axis}": COORDINATE for axis in "xy"},
     "rooms.element.room_id": ID,
     "rooms.element.type": NAME,
     **{f"rooms.element.polygon.element.{axis}": COORDINATE for axis in "xy"},
     "rooms.element.area_m2": Rule(1e-4, 1e6),
     "rooms.element.ceiling_m": Rule(1.8, 20.0),
+    **{f"rooms.element.{surface}_material": WORDS for surface in ("floor", "wall")},
     "doors.element.door_id": ID,
     "doors.element.rooms.element": ID_OR_NONE,
     **{f"doors.element.{axis}": COORDINATE for axis in "xy"},
@@ -135,6 +144,8 @@ SCENE_RULES: Mapping[str, Rule] = {
     "objects.element.quaternion.w": Rule(0.0, 1.0, digits=TURNS),
     "objects.element.group": ID_OR_NONE,
     "objects.element.support": ID_OR_NONE,
+    "materials.element.name": WORDS,
+    "materials.element.pattern": Rule(choices=PATTERNS),
     "room_graph.element.element": ID,
     "area_m2": Rule(1e-4, 1e6),
 }
@@ -146,6 +157,8 @@ ASSET_RULES: Mapping[str, Rule] = {
     "friction": FRICTION,
     "parts.element.shape": Rule(choices=("box", "cylinder", "sphere", "hull")),
     **{f"parts.element.size.{axis}": Rule(0.0, 100.0) for axis in "xyz"},
+    **{f"parts.element.rotation.{axis}": TURN for axis in "xyzw"},
+    "parts.element.material": Rule(choices=PART_MATERIALS),
 }
 RULES = {"episodes": EPISODE_RULES, "scenes": SCENE_RULES, "assets": ASSET_RULES}
 

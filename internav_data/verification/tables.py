@@ -97,6 +97,12 @@ def _check_assets(table: pa.Table, keys: DatasetKeys, report: FindingCollector) 
     keys.assets = frozenset(ids)
     for asset in from_table(table, ASSETS):
         report.expect(asset.parts, "schema.assets.parts", f"{asset.asset_id}: parts", "none")
+        report.expect(
+            all((part.shape == "hull") == bool(part.corners) for part in asset.parts),
+            "schema.assets.corners",
+            f"{asset.asset_id}: corners of hulls and of no other part",
+            [(part.shape, len(part.corners)) for part in asset.parts],
+        )
 
 
 def _check_scenes(

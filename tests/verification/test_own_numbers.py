@@ -1,9 +1,13 @@
 """The validator's own numbers are those of the generator, name by name."""
 
+import re
+
 import pytest
 
+from internav_data.core.field_docs import descriptions
 from internav_data.houses import standards
-from internav_data.verification import houses, interactions, objects
+from internav_data.records import Material, Part
+from internav_data.verification import houses, interactions, objects, ranges
 from internav_data.verification.ranges import EPISODE_RULES
 from internav_data.verification.replay.expert_replay import TURNS
 from internav_data.world.actions import ACTION_COUNT, ACTIONS, PUSHES, Action
@@ -50,3 +54,13 @@ def test_the_validator_accepts_every_action_and_no_other():
 def test_the_validators_lengths_are_those_of_houses():
     assert houses.HALF_WALL_M == objects.HALF_WALL_M == standards.HALF_WALL_CM / 100
     assert objects.DOOR_CLEAR_M == standards.DOOR_CLEAR_CM / 100
+
+
+def test_the_validators_surfaces_are_those_of_the_records():
+    """The records' docstrings list them: "plain, planks … or bricks"."""
+    for record, name, own in (
+        (Material, "pattern", ranges.PATTERNS),
+        (Part, "material", ranges.PART_MATERIALS),
+    ):
+        note = descriptions(record)[name]
+        assert tuple(re.findall(r"\w+", note.replace(" or ", " "))) == own
