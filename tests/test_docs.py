@@ -131,6 +131,34 @@ def test_tests_named_in_the_architecture_exist():
         assert f"def {name}(" in (ROOT / path).read_text(), name
 
 
+@pytest.mark.parametrize(
+    ("pattern", "number"),
+    [
+        (r"the (\w+) obstacles$", "spawnable assets"),
+        (r"of the (\w+) types that can be pushed", "types of obstacles"),
+        (r"(?:the|of|over) (\w+)(?: discrete)? actions\b", "actions"),
+    ],
+)
+def test_numbers_in_the_docs_are_those_of_the_code(pattern, number):
+    from internav_data.catalog import OBSTACLES, catalogue
+    from internav_data.world import ACTION_COUNT
+
+    words = {12: "twelve"}
+    true = {
+        "spawnable assets": str(len(catalogue().spawnable)),
+        "types of obstacles": str(len(OBSTACLES)),
+        "actions": words.get(ACTION_COUNT, str(ACTION_COUNT)),
+    }[number]
+    counted = 0
+    for page in (page for page in PAGES if page.name != "CHANGELOG.md"):
+        for line in page.read_text().splitlines():
+            for said in re.findall(pattern, line):
+                if said.isdecimal() or said in words.values():
+                    counted += 1
+                    assert said == true, f"{page.name}: {line}"
+    assert counted
+
+
 def table_rows(page):
     """Cells of every row of the page's tables, without heads and lines below them."""
     lines = [line for line in (ROOT / page).read_text().splitlines() if line.startswith("| ")]

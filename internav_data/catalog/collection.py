@@ -31,7 +31,7 @@ class Catalogue:
     assets: Mapping[str, Asset]
     """Assets by asset_id, sorted."""
     spawnable: tuple[Asset, ...]
-    """Assets that episodes may spawn: 655 and a user's own, sorted by asset_id."""
+    """Assets that episodes may spawn, a user's own among them, sorted by asset_id."""
     types: Mapping[str, tuple[Asset, ...]]
     """Assets by type, both sorted."""
 
