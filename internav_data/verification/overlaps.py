@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 DEPTH_M = 0.001
 """Overlaps below this depth count as contact: poses are rounded to 0.1 mm."""
 GRID_M = 1e-9
-"""Grid of overlays. Without one, GEOS 3.14 finds two copies of a polygon disjoint where their corners
-differ in the last digits."""
+"""Grid of overlays. Without one, GEOS 3.14 finds two copies of a polygon disjoint where their
+corners differ in the last digits."""
 
 
 def plans_overlap(first: Geometry, second: Geometry, depth_m: float = DEPTH_M) -> bool:
