@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -180,15 +181,9 @@ def _train(request: Request, given: dict[str, Any]) -> int:
 
     teller = ProgressReporter(sys.stderr)
     with Interrupts() as interrupts:
-
-        def interrupted() -> int:
-            return interrupts.signum
-
+        request = replace(request, callback=teller, interrupted=lambda: interrupts.signum)
         try:
-            if given["resume"]:
-                trainer = resume(request, _asked(given, request), teller, interrupted)
-            else:
-                trainer = begin(request, teller, interrupted)
+            trainer = resume(request, _asked(given, request)) if given["resume"] else begin(request)
         finally:
             teller.end()
     if not trainer.ranks.first:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import platform
 import shutil
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from importlib.metadata import version
 from pathlib import Path
@@ -22,27 +23,18 @@ from typing import TYPE_CHECKING, Any, Final
 import safetensors
 import torch
 from safetensors.torch import load_file, save_file
+from torch import Tensor
+from torch.optim import Optimizer
 
 from internav_data.camp.agents import make_agent
-from internav_data.camp.config import from_mapping, preset
+from internav_data.camp.agents.protocol import Agent, State
+from internav_data.camp.config import CampConfig, from_mapping, preset
 from internav_data.camp.stages import check_parts
 from internav_data.core import config as values
-from internav_data.core.storage import (
-    file_sha256,
-    sync,
-    write_atomically,
-    write_folder_atomically,
-)
+from internav_data.core.storage import file_sha256, sync, write_atomically, write_folder_atomically
 from internav_data.records.errors import CorruptDataError, InternavError, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from torch import Tensor
-    from torch.optim import Optimizer
-
-    from internav_data.camp.agents.protocol import Agent, State
-    from internav_data.camp.config import CampConfig
     from internav_data.envs.slot import EpisodeSnapshot
 
 FORMAT: Final = 2
@@ -70,7 +62,7 @@ class Checkpoint:
     """Tensors of `pack`; empty for an agent alone."""
 
 
-def save(run: Path, checkpoint: Checkpoint, *, best: float | None = None) -> Path:
+def save(run: Path, checkpoint: Checkpoint, *, score: float | None = None) -> Path:
     """Write a checkpoint and make it the run's last one; return its folder.
 
     Parameters
@@ -79,8 +71,8 @@ def save(run: Path, checkpoint: Checkpoint, *, best: float | None = None) -> Pat
         The run's folder.
     checkpoint
         Checkpoint to write.
-    best
-        Validation score, if it becomes the best one too.
+    score
+        Validation score, if there is one; the checkpoint becomes the best unless another is better.
     """
     known = _pointer(run)
     serial = int(known.get("serial", 0)) + 1
@@ -88,8 +80,9 @@ def save(run: Path, checkpoint: Checkpoint, *, best: float | None = None) -> Pat
     shutil.rmtree(folder, ignore_errors=True)  # left by a run that was killed
     _write_folder(folder, checkpoint)
     pointer = {**known, "format": FORMAT, "serial": serial, "last": folder.name}
-    if best is not None:
-        pointer |= {"best": folder.name, "best_score": best}
+    best = best_score(run)
+    if score is not None and (best is None or score >= best):
+        pointer |= {"best": folder.name, "best_score": score}
     write_atomically(run / POINTER, (json.dumps(pointer, indent=1) + "\n").encode())
     for other in (run / FOLDER).iterdir():
         if other.name not in {pointer["last"], pointer.get("best")}:

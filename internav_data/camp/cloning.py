@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import torch
+from torch import Tensor
 
-from internav_data.camp.agents.protocol import Batch
-from internav_data.camp.ppo import alone, check_finite, step
+from internav_data.camp.agents.protocol import Agent, Batch, StepRecord
+from internav_data.camp.ppo import Reduce, alone, check_finite, step
 from internav_data.camp.rollout import ObservationRows
-from internav_data.envs.loop import EnvironmentLoop
+from internav_data.envs.loop import EnvironmentLoop, Environments
+from internav_data.records import Episode
 from internav_data.records.errors import CorruptDataError, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from torch import Tensor
-    from torch.optim import Optimizer
-
-    from internav_data.camp.agents.protocol import Agent, StepRecord
-    from internav_data.camp.ppo import Reduce
     from internav_data.core.typing import Bools
     from internav_data.dataset import Dataset
-    from internav_data.envs.loop import Environments
     from internav_data.envs.slot import EpisodeSnapshot
     from internav_data.envs.types import Actions, Observations
-    from internav_data.records import Episode
 
-    Experts = Callable[[str], Sequence[int]]
-    """Function of an episode's id that returns its expert's actions."""
+Experts = Callable[[str], Sequence[int]]
+"""Function of an episode's id that returns its expert's actions."""
 
 
 MAX_GRAD_NORM: Final = 0.5
@@ -131,7 +125,7 @@ def _row(record: StepRecord, t: int) -> StepRecord:
 
 def update(
     agent: Agent[Any],
-    optimiser: Optimizer,
+    optimiser: torch.optim.Optimizer,
     demonstrations: Demonstrations,
     steps: int,
     reduce: Reduce = alone,

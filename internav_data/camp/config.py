@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 from internav_data.core import config as values
 from internav_data.core.config import MAX_SEED, Bounds, check_bounds
 from internav_data.records.errors import UsageError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-    from pathlib import Path
 
 Intent = Literal["integrated", "policy", "recursive", "none"]
 TrainPreset = Literal["paper", "small"]
@@ -262,7 +260,7 @@ def preset(name: str) -> CampConfig:
     """
     if name not in _PRESETS:
         raise UsageError(f"preset {name!r}: expected one of {', '.join(_PRESETS)}")
-    return _PRESETS[name]()
+    return _PRESETS[name]
 
 
 def from_mapping(config: CampConfig, changes: Mapping[str, Any], where: str) -> CampConfig:
@@ -287,18 +285,18 @@ def from_mapping(config: CampConfig, changes: Mapping[str, Any], where: str) -> 
     return changed
 
 
-def _paper() -> CampConfig:
-    return CampConfig(
+_PRESETS: Final = {
+    "paper": CampConfig(
         network=NetworkConfig(300, "paper", hidden=512, shared_encoder=False),
         ppo=PPOConfig(
             num_envs=12, num_steps=30, update_epochs=1, num_minibatches=1, clip_coef=0.1,
             clip_vloss=True,
         ),
         stages=StagesConfig(total_timesteps=10_000_000, side_by_side=False, decay_over="all"),
-    )  # fmt: skip
-
-
-_PRESETS: Final[dict[str, Callable[[], CampConfig]]] = {"paper": _paper, "small": CampConfig}
+    ),
+    "small": CampConfig(),
+}  # fmt: skip
+"""Configs by name."""
 
 
 def config_of(

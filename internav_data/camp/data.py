@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from internav_data.camp.agents.protocol import Agent
+from internav_data.camp.config import CampConfig
 from internav_data.camp.policy import AgentPolicy
-from internav_data.dataset import load_dataset
+from internav_data.camp.stages import TrainingStage
+from internav_data.dataset import Dataset, load_dataset
 from internav_data.dataset.select import condition
 from internav_data.evaluation.evaluator import EvaluationConfig, evaluate
+from internav_data.records import Episode
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from internav_data.camp.agents.protocol import Agent
-    from internav_data.camp.config import CampConfig
-    from internav_data.camp.stages import TrainingStage
-    from internav_data.dataset import Dataset
     from internav_data.envs.loop import Environments
-    from internav_data.records import Episode
 
 _SINGLE = ("room_count", "==", 1)
 _MEANS = ("success", "spl", "sts", "distance_m", "steps")

@@ -8,19 +8,13 @@ from __future__ import annotations
 
 import os
 from datetime import timedelta
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import torch
-from torch import distributed
+from torch import Tensor, distributed
 
-from internav_data.camp.ppo import alone
+from internav_data.camp.ppo import Reduce, alone
 from internav_data.records.errors import UsageError
-
-if TYPE_CHECKING:
-    from torch import Tensor
-
-    from internav_data.camp.ppo import Reduce
-
 
 _TIMEOUT_H = 6
 """Hours that ranks wait for each other: the first one alone validates."""

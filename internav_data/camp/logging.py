@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import json
 from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any, Final, Self
+from pathlib import Path
+from typing import Any, Final, Self, TextIO
 
 from internav_data.core.progress import ProgressLine, clock
 from internav_data.envs.tasks import STEP, SUCCESS
 from internav_data.records.errors import CorruptDataError
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-    from pathlib import Path
-    from typing import TextIO
-
-    Row = dict[str, Any]
-    """Plain JSON: numbers by name, one level of groups."""
+Row = dict[str, Any]
+"""Plain JSON: numbers by name, one level of groups."""
 
 LOG: Final = "log.jsonl"
 BOARD: Final = "tensorboard"

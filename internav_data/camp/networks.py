@@ -8,20 +8,17 @@ from __future__ import annotations
 
 import copy
 import itertools
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Final
+from typing import Final, TypeVar
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from internav_data.camp.config import NetworkConfig
 from internav_data.world.actions import HORIZONS_DEG
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from internav_data.camp.config import NetworkConfig
 
 _LAYERS: Final = {
     "paper": ((32, 8, 4, 0), (64, 4, 2, 0), (32, 3, 1, 0)),
@@ -33,6 +30,7 @@ _ACTOR_GAIN: Final = 0.01
 EMBEDDED: Final = 12
 """Length of an embedded intent (section 5.2)."""
 _RGB, _DEPTH = 3, 1
+L = TypeVar("L", nn.Linear, nn.Conv2d)
 _TINY: Final = 1e-12
 
 
@@ -313,17 +311,18 @@ def _convolutions(channels: int, config: NetworkConfig) -> nn.Sequential:
     size = config.image_size
     for out, kernel, stride, padding in _LAYERS[config.encoder]:
         layer = nn.Conv2d(channels, out, kernel, stride, padding)
-        nn.init.orthogonal_(layer.weight, nn.init.calculate_gain("relu"))
-        if layer.bias is not None:
-            nn.init.zeros_(layer.bias)
-        layers += [layer, nn.ReLU()]
+        layers += [_initialised(layer, nn.init.calculate_gain("relu")), nn.ReLU()]
         channels, size = out, (size + 2 * padding - kernel) // stride + 1
     full = _linear(channels * size * size, config.hidden, nn.init.calculate_gain("relu"))
     return nn.Sequential(*layers, nn.Flatten(), full, nn.ReLU())
 
 
 def _linear(inputs: int, outputs: int, gain: float = 2**0.5) -> nn.Linear:
-    layer = nn.Linear(inputs, outputs)
+    return _initialised(nn.Linear(inputs, outputs), gain)
+
+
+def _initialised(layer: L, gain: float) -> L:
     nn.init.orthogonal_(layer.weight, gain)
-    nn.init.zeros_(layer.bias)
+    if layer.bias is not None:
+        nn.init.zeros_(layer.bias)
     return layer

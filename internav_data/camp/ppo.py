@@ -8,25 +8,19 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
+from internav_data.camp.agents.protocol import Agent
+from internav_data.camp.config import PPOConfig
+from internav_data.camp.rollout import Rollout
 from internav_data.records.errors import NotFiniteError
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from torch.nn import Parameter
-    from torch.optim import Optimizer
-
-    from internav_data.camp.agents.protocol import Agent
-    from internav_data.camp.config import PPOConfig
-    from internav_data.camp.rollout import Rollout
-
-    Reduce = Callable[[Tensor], Tensor]
-    """All-reduce sum of a tensor across ranks."""
+Reduce = Callable[[Tensor], Tensor]
+"""All-reduce sum of a tensor across ranks."""
 
 _EPSILON = 1e-8
 
@@ -36,7 +30,7 @@ def alone(tensor: Tensor) -> Tensor:
     return tensor
 
 
-def set_rate(optimiser: Optimizer, rate: float, progress: float) -> float:
+def set_rate(optimiser: torch.optim.Optimizer, rate: float, progress: float) -> float:
     """Decay a learning rate linearly, progress from 0 to 1; return the rate that was set."""
     decayed = rate * max(0.0, 1.0 - progress)
     for group in optimiser.param_groups:
@@ -46,7 +40,7 @@ def set_rate(optimiser: Optimizer, rate: float, progress: float) -> float:
 
 def update(
     agent: Agent[Any],
-    optimiser: Optimizer,
+    optimiser: torch.optim.Optimizer,
     rollout: Rollout,
     config: PPOConfig,
     orders: Sequence[Sequence[int]],
@@ -140,9 +134,9 @@ def explained_variance(values: Tensor, returns: Tensor, reduce: Reduce = alone) 
 
 
 def step(
-    optimiser: Optimizer,
+    optimiser: torch.optim.Optimizer,
     loss: Tensor,
-    parameters: Sequence[Parameter],
+    parameters: Sequence[nn.Parameter],
     max_grad_norm: float,
     reduce: Reduce = alone,
 ) -> float:

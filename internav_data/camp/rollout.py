@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -9,18 +10,14 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from internav_data.camp.agents.protocol import Batch
-from internav_data.envs.loop import EnvironmentLoop
+from internav_data.camp.agents.protocol import Agent, AgentStep, Batch
+from internav_data.camp.config import PPOConfig
+from internav_data.envs.loop import EnvironmentLoop, Environments, LoopStep
 from internav_data.records import Purpose, TrainingStream, generator
 from internav_data.records.errors import NotFiniteError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from internav_data.camp.agents.protocol import Agent, AgentStep
-    from internav_data.camp.config import PPOConfig
     from internav_data.core.typing import Bools
-    from internav_data.envs.loop import Environments, LoopStep
     from internav_data.envs.slot import EpisodeSnapshot
     from internav_data.envs.types import Actions, Observations
 

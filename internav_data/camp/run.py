@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, Final
+from pathlib import Path
+from typing import Any, Final
 
 from internav_data.camp.checkpoint import TrainState, has_checkpoint, read
+from internav_data.camp.config import CampConfig
 from internav_data.camp.logging import LOG
-from internav_data.camp.train import Trainer
+from internav_data.camp.train import Request, Trainer
 from internav_data.core.config import config_toml, known_keys, plain
 from internav_data.core.storage import write_atomically
 from internav_data.records.errors import UsageError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping
-    from pathlib import Path
-
-    from internav_data.camp.config import CampConfig
-    from internav_data.camp.train import Request, RowCallback
 
 CONFIG: Final = "config.toml"
 """File of a run's resolved settings, for people and for `--config`."""
@@ -27,12 +23,8 @@ _MEASURED: Final = 2
 """Updates that a forecast is made of, after one that warms up."""
 
 
-def begin(
-    request: Request,
-    callback: RowCallback | None = None,
-    interrupted: Callable[[], int] = lambda: 0,
-) -> Trainer:
-    """Train a new run to its end; see `Trainer` for the last two arguments.
+def begin(request: Request) -> Trainer:
+    """Train a new run to its end.
 
     Raises
     ------
@@ -46,8 +38,7 @@ def begin(
         )
     if out.exists() and not out.is_dir():
         raise UsageError(f"{out}: --out: expected a folder, this is a file")
-    state = TrainState(request.parts, request.clones)
-    trainer = Trainer(request, state, None, callback, interrupted)
+    trainer = Trainer(request, TrainState(request.parts, request.clones))
     if trainer.ranks.first:
         out.mkdir(parents=True, exist_ok=True)
         write_atomically(out / CONFIG, config_toml(request.config, "camp-train").encode())
@@ -55,12 +46,7 @@ def begin(
     return trainer
 
 
-def resume(
-    request: Request,
-    asked: Mapping[str, Any],
-    callback: RowCallback | None = None,
-    interrupted: Callable[[], int] = lambda: 0,
-) -> Trainer:
+def resume(request: Request, asked: Mapping[str, Any]) -> Trainer:
     """Train a run to its end from its last checkpoint.
 
     Parameters
@@ -70,8 +56,6 @@ def resume(
     asked
         Arguments that must agree with the checkpoint: `method`, `clones`, and `config` (those of
         its settings that `keys` names, else all); `parts` replace those of the run.
-    callback, interrupted
-        See `Trainer`.
 
     Raises
     ------
@@ -102,7 +86,7 @@ def resume(
     if asked.get("parts") is not None:
         state.parts = tuple(asked["parts"])
     request = replace(request, method=checkpoint.method, config=checkpoint.config)
-    trainer = Trainer(request, state, checkpoint, callback, interrupted)
+    trainer = Trainer(request, state, checkpoint)
     known = checkpoint.progress.get("dataset")
     if known != trainer.data.fingerprint:
         raise UsageError(

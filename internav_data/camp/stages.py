@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from internav_data.camp.config import CampConfig
 from internav_data.records import Purpose, TrainingStream, generator
 from internav_data.records.errors import UsageError
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from internav_data.camp.config import CampConfig
 
 CLONING: Final = "cloning"
 """Name of the stage that comes first with `--pretrain bc`."""

@@ -3,48 +3,29 @@
 from __future__ import annotations
 
 import time
-from contextlib import ExitStack
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any, Final
+from pathlib import Path
+from typing import Any, Final
 
 import torch
 
 from internav_data.camp import cloning, ppo
 from internav_data.camp.agents import agent_names, make_agent
 from internav_data.camp.agents.hierarchy import AuxiliaryAgent, Hierarchy
-from internav_data.camp.checkpoint import (
-    Checkpoint,
-    best_score,
-    pack,
-    save,
-    snapshots_of,
-    unpack,
-)
+from internav_data.camp.agents.protocol import Agent
+from internav_data.camp.checkpoint import Checkpoint, TrainState, pack, save, snapshots_of, unpack
 from internav_data.camp.cloning import Demonstrations, experts_of
 from internav_data.camp.config import CampConfig
 from internav_data.camp.data import TrainingData
 from internav_data.camp.distributed import device_of, distributed_context
-from internav_data.camp.logging import EpisodeWindow, MetricsLogger, rates
-from internav_data.camp.rollout import Collector, orders_of, uniforms_of
-from internav_data.camp.stages import PARTS, cloning_stage, order_seed, schedule
+from internav_data.camp.logging import EpisodeWindow, MetricsLogger, Row, rates
+from internav_data.camp.rollout import Collector, Rollout, orders_of, uniforms_of
+from internav_data.camp.stages import PARTS, TrainingStage, cloning_stage, order_seed, schedule
 from internav_data.core.interrupts import InterruptedRunError
 from internav_data.records import Purpose, TrainingStream, generator
 from internav_data.records.errors import NotFiniteError, UsageError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from torch.optim import Optimizer
-
-    from internav_data.camp.agents.protocol import Agent
-    from internav_data.camp.checkpoint import TrainState
-    from internav_data.camp.logging import Row
-    from internav_data.camp.rollout import Rollout
-    from internav_data.camp.stages import TrainingStage
-
-    RowCallback = Callable[[Row], object]
-    """Function that is called with every row of the log."""
 
 INTERRUPTED: Final = "saved; go on with --resume"
 _CLONING_SAVES: Final = 4
@@ -65,6 +46,10 @@ class Request:
     clones: bool = False
     """Whether the dataset's experts are cloned first."""
     device: str = "auto"
+    callback: Callable[[Row], object] = lambda _: None
+    """Function that the first rank calls with every row of the log."""
+    interrupted: Callable[[], int] = lambda: 0
+    """Function that returns the signal that asked the run to stop; 0 for none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +59,7 @@ class StageRun:
     stage: TrainingStage
     learner: Agent[Any]
     """Agent that the stage trains."""
-    optimiser: Optimizer
+    optimiser: torch.optim.Optimizer
     source: Collector | Demonstrations
     """Environments in which it acts, or in which experts act for it."""
     local: range
@@ -94,10 +79,6 @@ class Trainer:
         Counters to resume from.
     checkpoint
         Checkpoint to resume from, if any.
-    callback
-        Function that is called with every row of the log.
-    interrupted
-        Function that returns the signal that asked the run to stop; 0 for none.
 
     Raises
     ------
@@ -106,16 +87,10 @@ class Trainer:
     """
 
     def __init__(
-        self,
-        request: Request,
-        state: TrainState,
-        checkpoint: Checkpoint | None = None,
-        callback: RowCallback | None = None,
-        interrupted: Callable[[], int] = lambda: 0,
+        self, request: Request, state: TrainState, checkpoint: Checkpoint | None = None
     ) -> None:
         self.run, self.method, self.config = request.out, request.method, request.config
-        self.state, self._checkpoint = state, checkpoint
-        self._callback, self._interrupted = callback, interrupted
+        self._request, self.state, self._checkpoint = request, state, checkpoint
         config, seed = request.config, request.config.seed
         torch.set_num_threads(config.run.threads)
         # Nothing here draws from torch's own generator, but a user's agent may.
@@ -196,10 +171,10 @@ class Trainer:
             for stage in self.stages
             if not stage.clones
         )
-        with ExitStack() as stack:
-            if self.ranks.first:
-                log = MetricsLogger(self.run, self._log_position, board=every.tensorboard)
-                self._log = stack.enter_context(log)
+        log: AbstractContextManager[MetricsLogger | None] = nullcontext()
+        if self.ranks.first:
+            log = MetricsLogger(self.run, self._log_position, board=every.tensorboard)
+        with log as self._log:
             self._lap = time.perf_counter()
             for stage in self.stages:
                 if stage.name != state.stage:
@@ -221,7 +196,7 @@ class Trainer:
                 last = state.done == stage.updates
                 validated = validates and (last or state.done % every.validate_every == 0)
                 score = self.validate() if validated else None
-                signum = max(self.ranks.all_gather_items([self._interrupted()]))
+                signum = max(self.ranks.all_gather_items([self._request.interrupted()]))
                 if last or signum or validated or state.done % save_every == 0:
                     self.save(now, score)
                 if signum:
@@ -363,18 +338,15 @@ class Trainer:
         }
         if not ranks.first:
             return
-        best = best_score(self.run)
-        better = score if score is not None and (best is None or score >= best) else None
         tensors, weights = pack(now.optimiser, memory, episode_starts), self.agent.state_dict()
         checkpoint = Checkpoint(self.method, self.config, weights, progress, tensors)
-        save(self.run, checkpoint, best=better)
+        save(self.run, checkpoint, score=score)
 
     def write(self, row: Row) -> None:
         """Log a row, and pass it to the callback."""
         if self._log is not None:
             self._log.write(row)
-        if self._callback is not None and self.ranks.first:
-            self._callback(row)
+            self._request.callback(row)
 
     def lap(self) -> float:
         """Return the seconds since the last call."""

@@ -78,7 +78,7 @@ def test_an_agent_comes_back_knowing_what_it_is(tmp_path, made, method):
 
 def test_last_and_best_are_kept_and_no_other(tmp_path, made):
     for number, score in ((1, 0.2), (2, 0.5), (3, None), (4, None)):
-        save(tmp_path, made(number=number), best=score)
+        save(tmp_path, made(number=number), score=score)
     assert read(tmp_path).progress["updates"] == 4
     assert read(tmp_path, "best").progress["updates"] == 2
     assert checkpoints.best_score(tmp_path) == 0.5

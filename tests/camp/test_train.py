@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
@@ -87,10 +88,10 @@ def test_resumed_runs_are_unbroken_ones_to_the_last_byte(request_for, method, st
     begin(request_for("whole", method))
     broken = request_for("broken", method)
     with pytest.raises(InterruptedRunError):
-        begin(broken, interrupted=after(stops[0]))
+        begin(replace(broken, interrupted=after(stops[0])))
     for stop in stops[1:]:
         with pytest.raises(InterruptedRunError):
-            resume(broken, {}, interrupted=after(stop))
+            resume(replace(broken, interrupted=after(stop)), {})
     resume(broken, {})
     whole, again = written(request_for("whole").out), written(broken.out)
     assert whole[0] == again[0]
@@ -173,7 +174,7 @@ def test_what_is_not_finite_stops_and_leaves_the_last_checkpoint(request_for, mo
 def test_resume_refuses_another_run(request_for, asked, words):
     given = request_for("other")
     with pytest.raises(InterruptedRunError):
-        begin(given, interrupted=after(6))
+        begin(replace(given, interrupted=after(6)))
     if "config" in asked:
         asked = {"config": from_mapping(given.config, asked["config"], "test")}
     with pytest.raises(UsageError, match=words):
@@ -183,7 +184,7 @@ def test_resume_refuses_another_run(request_for, asked, words):
 def test_resume_refuses_another_dataset_and_damage(request_for, scenes, houses):
     given = request_for("moved", "ppo")
     with pytest.raises(InterruptedRunError):
-        begin(given, interrupted=after(6))
+        begin(replace(given, interrupted=after(6)))
     with pytest.raises(UsageError, match="no training episodes"):
         resume(Request(houses, given.out, "ppo", given.config), {})
     log = given.out / "log.jsonl"

@@ -6,24 +6,21 @@ adds another.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import entry_points
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import torch
 
 from internav_data.camp.agents.flat import PPOAgent, PPOIntentAgent, RandomAgent
 from internav_data.camp.agents.hierarchy import Hierarchy
 from internav_data.camp.agents.nie import NIEAgent
+from internav_data.camp.agents.protocol import Agent
+from internav_data.camp.config import CampConfig
 from internav_data.records import Purpose, TrainingStream, generator
 from internav_data.records.errors import UsageError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from internav_data.camp.agents.protocol import Agent
-    from internav_data.camp.config import CampConfig
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -15,16 +16,13 @@ from internav_data.camp.agents.protocol import (
     Batch,
     Evaluated,
     RecurrentAgent,
+    State,
     StepRecord,
+    Uniforms,
 )
+from internav_data.camp.config import CampConfig
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import ACTION_COUNT, ACTIONS, Action
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from internav_data.camp.agents.protocol import State, Uniforms
-    from internav_data.camp.config import CampConfig
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,11 +59,8 @@ class FlatOutput(NamedTuple):
     """(T, n): the critic's values."""
     state: State
     """(n, …): memory after the last step."""
-    intent: Tensor | None = None
-    """(T, n, 12): P(i), where there is an intent."""
-    objects: Tensor | None = None
-    corners: Tensor | None = None
-    """(T, n, K) and (T, n, K, 8, 3): objects in sight, of `nie`."""
+    inputs: dict[str, Tensor]
+    """(T, n, …): fields of `FlatRecord` that the networks worked out besides the observation."""
 
 
 class PPOAgent(RecurrentAgent[FlatRecord]):
@@ -102,8 +97,8 @@ class PPOAgent(RecurrentAgent[FlatRecord]):
         log_probs = ran.log_probs[0]
         choice = networks.drawn(log_probs, uniforms[1])
         probs = log_probs.exp()
-        inputs = (None if x is None else x[0] for x in (ran.intent, ran.objects, ran.corners))
-        record = FlatRecord(choice, probs, probs[:, Action.DONE], *inputs)
+        inputs = {name: values[0] for name, values in ran.inputs.items()}
+        record = FlatRecord(choice, probs, probs[:, Action.DONE], **inputs)
         log_prob = networks.log_prob_of(log_probs, choice)
         return AgentStep(choice, log_prob, ran.value[0], record, ran.state)
 
@@ -112,7 +107,7 @@ class PPOAgent(RecurrentAgent[FlatRecord]):
         ran = self.run(batch)
         log_prob = networks.log_prob_of(ran.log_probs, batch.record.choice)
         entropy = networks.entropy_of(ran.log_probs)
-        return Evaluated(log_prob, ran.value, entropy, ran.state, ran.intent)
+        return Evaluated(log_prob, ran.value, entropy, ran.state, ran.inputs.get("intent"))
 
     def labels(self, actions: Sequence[int]) -> tuple[list[int], FlatRecord]:
         """See `Agent`."""
@@ -126,11 +121,12 @@ class PPOAgent(RecurrentAgent[FlatRecord]):
         """Run the networks over T steps of n environments; the record of new ones is None."""
         return self.decide(self.encoder(batch.observations), batch)
 
-    def decide(self, inputs: Tensor, batch: Batch[Any]) -> FlatOutput:
-        """Run GRU, actor and critic on inputs (T, n, …)."""
-        out, hidden = batch.segments.run(self.policy.gru, inputs, batch.state["hidden"])
+    def decide(self, features: Tensor, batch: Batch[Any], **inputs: Tensor) -> FlatOutput:
+        """Run GRU, actor and critic on features (T, n, …); `inputs` are those to be recorded."""
+        out, hidden = batch.segments.run(self.policy.gru, features, batch.state["hidden"])
         log_probs = torch.log_softmax(self.policy.actor(out), -1)
-        return FlatOutput(log_probs, self.policy.value(out), {**batch.state, "hidden": hidden})
+        state = {**batch.state, "hidden": hidden}
+        return FlatOutput(log_probs, self.policy.value(out), state, inputs)
 
 
 class PPOIntentAgent(PPOAgent):
@@ -167,9 +163,9 @@ class PPOIntentAgent(PPOAgent):
             no_mask = features.new_zeros(ACTION_COUNT)
             # With a single policy P(i) is P(omega') itself.
             _, intent, hidden = self.intent(features, hidden, batch.segments, lambda p: p, no_mask)
-        ran = self.decide(self.policy.condition(features, intent), batch)
-        recorded = intent if self.uses_intent else None
-        return ran._replace(state={**ran.state, "intent_hidden": hidden}, intent=recorded)
+        inputs = {"intent": intent} if self.uses_intent else {}
+        ran = self.decide(self.policy.condition(features, intent), batch, **inputs)
+        return ran._replace(state={**ran.state, "intent_hidden": hidden})
 
     def synchronise(self) -> None:
         """See `Agent`."""

@@ -7,8 +7,9 @@ auxiliary tasks (section 5.2). Shapes: T steps, n environments.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -19,17 +20,13 @@ from internav_data.camp.agents.protocol import (
     Batch,
     Evaluated,
     RecurrentAgent,
+    State,
     StepRecord,
+    Uniforms,
 )
-from internav_data.camp.config import INTERACTION_ACTIONS
+from internav_data.camp.config import INTERACTION_ACTIONS, CampConfig
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import ACTION_COUNT, Action, OptionName, actions_of_option
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from internav_data.camp.agents.protocol import State, Uniforms
-    from internav_data.camp.config import CampConfig
 
 NAVIGATE, PUSH, PICK, STOP = range(4)
 """Options in the order of the global policy's logits. STOP executes Done. (0 in a state: no

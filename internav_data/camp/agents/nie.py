@@ -11,20 +11,18 @@ metres from the eye; the object's type is no input.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
 from internav_data.camp.agents.flat import FlatOutput, FlatRecord, PPOAgent
+from internav_data.camp.agents.protocol import Batch, Evaluated, ObservationTensors
+from internav_data.camp.config import CampConfig
 from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import ACTION_COUNT, HORIZONS_DEG
-
-if TYPE_CHECKING:
-    from internav_data.camp.agents.protocol import Batch, Evaluated, ObservationTensors
-    from internav_data.camp.config import CampConfig
 
 SUMMARY: Final = 64
 _CORNERS: Final = 8
@@ -49,8 +47,8 @@ class NIEAgent(PPOAgent):
     def run(self, batch: Batch[Any]) -> FlatOutput:
         """See `PPOAgent`: features, and a summary of the predicted motion of objects in sight."""
         objects, corners = self.sight(batch)
-        inputs = self.summarised(self.encoder(batch.observations), objects, corners)
-        return self.decide(inputs, batch)._replace(objects=objects, corners=corners)
+        features = self.summarised(self.encoder(batch.observations), objects, corners)
+        return self.decide(features, batch, objects=objects, corners=corners)
 
     def sight(self, batch: Batch[Any]) -> tuple[Tensor, Tensor]:
         """Return objects (T, n, K) and corners (T, n, K, 8, 3), recorded or found anew."""

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import torch
 from torch import Tensor, nn
@@ -18,10 +19,6 @@ from torch import Tensor, nn
 from internav_data.camp.networks import EpisodeSegments
 from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.records.errors import UsageError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from typing import Self
 
 ObservationTensors = dict[str, Tensor]
 """Observations by sensor: tensors (n, …), or (T, n, …) of several steps."""
