@@ -22,46 +22,6 @@ if TYPE_CHECKING:
     from internav_data.envs.types import Actions, Observations
 
 
-def advantages_of(
-    rewards: Tensor,
-    values: Tensor,
-    last_value: Tensor,
-    terminated: Tensor,
-    truncated: Tensor,
-    final_values: Tensor,
-    *,
-    gamma: float,
-    gae_lambda: float,
-) -> Tensor:
-    """Return generalised advantages (Schulman et al. 2016), (T, n) float32.
-
-    Added to `values` they are the returns.
-
-    Parameters
-    ----------
-    rewards, values : (T, n)
-        Reward of action t, and the critic's value before it.
-    last_value : (n,)
-        Value after the last step; not used where an episode ended there.
-    terminated, truncated : (T, n) bool
-        The episode ended, or was cut off, by action t. Where both are true it ended.
-    final_values : (T, n)
-        Value of the observation after a cut, before the reset.
-    gamma, gae_lambda
-        Discount, and decay of the advantages.
-    """
-    over = truncated | terminated
-    following = torch.cat([values[1:], last_value.unsqueeze(0)])
-    following = torch.where(truncated, final_values, following).masked_fill(terminated, 0.0)
-    td_errors = rewards + gamma * following - values
-    carries = (gamma * gae_lambda) * (~over).to(values.dtype)
-    advantages, ahead = torch.empty_like(values), torch.zeros_like(last_value)
-    for t in range(len(values) - 1, -1, -1):
-        ahead = td_errors[t] + carries[t] * ahead
-        advantages[t] = ahead
-    return advantages
-
-
 @dataclass(frozen=True, slots=True)
 class Finished:
     """Episode that ended during a rollout."""
@@ -81,6 +41,7 @@ class Rollout:
     rewards: Tensor
     terminated: Tensor
     truncated: Tensor
+    """Whether the episode ended, or was cut off, by the step. Where both are true it ended."""
     values: Tensor
     """Values before each step."""
     log_probs: Tensor
@@ -88,16 +49,26 @@ class Rollout:
     final_values: Tensor
     """Values of the observations after a cut, before the reset; 0 elsewhere."""
     last_value: Tensor
-    """(n,): values after the last step."""
+    """(n,): values after the last step; not used where an episode ended there."""
     finished: list[Finished] = field(default_factory=list)
     """Episodes that ended, in the order of their ends."""
 
     def advantages(self, config: PPOConfig) -> Tensor:
-        """Return the generalised advantages, (T, n)."""
-        return advantages_of(
-            self.rewards, self.values, self.last_value, self.terminated, self.truncated,
-            self.final_values, gamma=config.gamma, gae_lambda=config.gae_lambda,
-        )  # fmt: skip
+        """Return the generalised advantages (Schulman et al. 2016), (T, n) float32.
+
+        Added to `values` they are the returns.
+        """
+        over = self.truncated | self.terminated
+        following = torch.cat([self.values[1:], self.last_value.unsqueeze(0)])
+        following = torch.where(self.truncated, self.final_values, following)
+        following = following.masked_fill(self.terminated, 0.0)
+        td_errors = self.rewards + config.gamma * following - self.values
+        carries = (config.gamma * config.gae_lambda) * (~over).to(self.values.dtype)
+        advantages, ahead = torch.empty_like(self.values), torch.zeros_like(self.last_value)
+        for t in range(len(advantages) - 1, -1, -1):
+            ahead = td_errors[t] + carries[t] * ahead
+            advantages[t] = ahead
+        return advantages
 
 
 def uniforms_of(seed: int, rollout: int, environments: Sequence[int], steps: int) -> Tensor:

@@ -5,7 +5,14 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from internav_data.camp.rollout import advantages_of  # noqa: E402
+from internav_data.camp.config import PPOConfig  # noqa: E402
+from internav_data.camp.rollout import Rollout  # noqa: E402
+
+
+def advantages_of(rewards, values, last, terminated, truncated, final, **config):
+    """Return the advantages of a rollout without observations."""
+    rollout = Rollout(None, rewards, terminated, truncated, values, None, final, last)
+    return rollout.advantages(PPOConfig(**config))
 
 
 def _one(rewards, values, last, terminated, truncated, final, gamma=0.99, gae_lambda=0.95):
