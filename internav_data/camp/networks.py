@@ -11,13 +11,14 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, TypeVar
+from typing import ClassVar, Final, TypeVar
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
 from internav_data.camp.config import NetworkConfig
+from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.world.actions import HORIZONS_DEG
 
 _LAYERS: Final = {
@@ -34,38 +35,36 @@ L = TypeVar("L", nn.Linear, nn.Conv2d)
 _TINY: Final = 1e-12
 
 
-class Encoder(nn.Module):
-    """Features of an observation: camera, point goal, hand and horizon.
+class SensorEncoder(nn.Module):
+    """Features (T, n, size) float32 of the observations (T, n, …) of some sensors."""
 
-    Parameters
-    ----------
-    config
-        Sizes of the networks.
-    """
+    sensors: ClassVar[tuple[str, ...]]
+    """Names of the sensors, in the order of `forward`'s arguments."""
+    size: int
+    """Number of features."""
+
+    def __init__(self, config: NetworkConfig) -> None:  # noqa: ARG002 - sizes, for those that have any
+        super().__init__()
+
+
+class CameraEncoder(SensorEncoder):
+    """Convolutional features of colours and depth: one network each, or one for both."""
+
+    sensors = ("rgb", "depth")
 
     def __init__(self, config: NetworkConfig) -> None:
-        super().__init__()
-        self._depth_limit_m, self._goal_scale_m = config.depth_limit_m, config.goal_scale_m
-        self._bf16 = config.bf16
+        super().__init__(config)
+        self.size = config.hidden
+        self._depth_limit_m, self._bf16 = config.depth_limit_m, config.bf16
         separate = config.encoder == "paper"
         self._channels = (_RGB, _DEPTH) if separate else (_RGB + _DEPTH,)
         self.eyes = nn.ModuleList(_convolutions(count, config) for count in self._channels)
         self.fuse = _linear(2 * config.hidden, config.hidden) if separate else nn.Identity()
-        self.goal = _linear(3, config.goal_embedding)
-        self.size = self.size_of(config)
 
-    @staticmethod
-    def size_of(config: NetworkConfig) -> int:
-        """Return the number of features."""
-        return config.hidden + config.goal_embedding + 1 + len(HORIZONS_DEG)
-
-    def forward(self, observations: Mapping[str, Tensor]) -> Tensor:
-        """Return features (T, n, size) float32.
-
-        Observations are `rgb` (T, n, S, S, 3) uint8, `depth` (T, n, S, S, 1) metres, `goal`
-        (T, n, 2) metres and radians, `held` and `horizon` (T, n).
-        """
-        rgb, depth = observations["rgb"].flatten(0, 1), observations["depth"].flatten(0, 1)
+    def forward(self, rgb: Tensor, depth: Tensor) -> Tensor:
+        """Return features of `rgb` (T, n, S, S, 3) uint8 and `depth` (T, n, S, S, 1) metres."""
+        steps = depth.shape[:2]
+        rgb, depth = rgb.flatten(0, 1), depth.flatten(0, 1)
         # Channels stay last in memory, as environments have them: so the first convolution learns
         # in a third of the time.
         pictures = [depth.new_empty(*depth.shape[:-1], channels) for channels in self._channels]
@@ -76,14 +75,80 @@ class Encoder(nn.Module):
         with torch.autocast("cuda", torch.bfloat16, enabled=self._bf16 and depth.is_cuda):
             views = [eye(view) for eye, view in zip(self.eyes, views, strict=True)]
             fused = views[0] if len(views) == 1 else self.fuse(torch.cat(views, 1)).relu()
-        features = fused.float()  # (T n, hidden)
-        distance = observations["goal"][..., 0] / self._goal_scale_m
-        bearing = observations["goal"][..., 1]
-        goal = self.goal(torch.stack([distance, bearing.cos(), bearing.sin()], -1))
-        held = observations["held"].unsqueeze(-1).to(goal.dtype)
-        horizon = functional.one_hot(observations["horizon"].long(), len(HORIZONS_DEG))
-        features = features.view(*held.shape[:2], -1)
-        return torch.cat([features, goal, held, horizon.to(goal.dtype)], -1)
+        return fused.float().view(*steps, -1)
+
+
+class GoalEncoder(SensorEncoder):
+    """Linear embedding of the point goal's distance, and of its bearing's cosine and sine."""
+
+    sensors = ("goal",)
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__(config)
+        self._scale_m, self.size = config.goal_scale_m, config.goal_embedding
+        self.linear = _linear(3, config.goal_embedding)
+
+    def forward(self, goal: Tensor) -> Tensor:
+        """Return the embedding of `goal` (T, n, 2) metres and radians."""
+        distance, bearing = goal[..., 0] / self._scale_m, goal[..., 1]
+        out: Tensor = self.linear(torch.stack([distance, bearing.cos(), bearing.sin()], -1))
+        return out
+
+
+class HeldEncoder(SensorEncoder):
+    """0 or 1: an object is held."""
+
+    sensors, size = ("held",), 1
+
+    def forward(self, held: Tensor) -> Tensor:
+        """Return `held` (T, n) as float32."""
+        return held.unsqueeze(-1).float()
+
+
+class HorizonEncoder(SensorEncoder):
+    """One-hot code of the camera's horizon."""
+
+    sensors, size = ("horizon",), len(HORIZONS_DEG)
+
+    def forward(self, horizon: Tensor) -> Tensor:
+        """Return the one-hot code of `horizon` (T, n), an index of `HORIZONS_DEG`."""
+        return functional.one_hot(horizon.long(), self.size).float()
+
+
+ENCODERS: Final[dict[str, type[SensorEncoder]]] = {
+    "camera": CameraEncoder,
+    "goal": GoalEncoder,
+    "held": HeldEncoder,
+    "horizon": HorizonEncoder,
+}
+"""Encoders of sensors by name."""
+
+
+class Encoder(nn.Module):
+    """Features of an agent's sensors: those of each of `ENCODERS` whose sensors it has, joined.
+
+    Parameters
+    ----------
+    config
+        Sizes of the networks.
+    sensors
+        Names of the agent's sensors. Those of no encoder are left to the agent.
+    """
+
+    def __init__(self, config: NetworkConfig, sensors: Sequence[str] = DEFAULT_SENSORS) -> None:
+        super().__init__()
+        found = {name: kind for name, kind in ENCODERS.items() if {*kind.sensors} <= {*sensors}}
+        parts = {name: kind(config) for name, kind in found.items()}
+        self.parts, self.size = nn.ModuleDict(parts), sum(part.size for part in parts.values())
+        self._taken = {name: part.sensors for name, part in parts.items()}
+
+    def forward(self, observations: Mapping[str, Tensor]) -> Tensor:
+        """Return features (T, n, size) float32 of observations by the names of their sensors."""
+        features = [
+            self.parts[name](*(observations[sensor] for sensor in sensors))
+            for name, sensors in self._taken.items()
+        ]
+        return torch.cat(features, -1)
 
 
 class RecurrentActorCritic(nn.Module):

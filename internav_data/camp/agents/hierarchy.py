@@ -258,8 +258,8 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
         variant = agent.intent if temporally_extended else "none"
         self.uses_intent = variant != "none"
         count = 1 if network.shared_encoder else 3
-        self.encoders = nn.ModuleList(networks.Encoder(network) for _ in range(count))
-        size = networks.Encoder.size_of(network)
+        encoders = [networks.Encoder(network, self.sensors) for _ in range(count)]
+        self.encoders, size = nn.ModuleList(encoders), encoders[0].size
         moves, options = initial_probabilities(
             agent.initial_done_probability, agent.initial_interaction_probability
         )
