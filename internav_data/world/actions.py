@@ -121,12 +121,14 @@ PUSHES: Final = tuple(action for action in ACTIONS if action.kind == "push")
 
 
 def actions_of_option(option: OptionName) -> tuple[Action, ...]:
-    """Return the actions that an option may take: its own, then borrowed ones, each ascending.
+    """Return the actions that an option may take: its own, borrowed ones, Done; each ascending.
 
-    The order is that of the logits of the option's policy.
+    The order is that of the logits of the option's policy, whose last one is Done.
     """
     taken = [action for action in ACTIONS if option in action.options]
-    return tuple(sorted(taken, key=lambda action: action.options[0] != option))
+    return tuple(
+        sorted(taken, key=lambda action: (action == Action.DONE, action.options[0] != option))
+    )
 
 
 HORIZONS_DEG: Final = AGENT.horizons_deg

@@ -118,7 +118,10 @@ def test_every_value_but_paths_is_identity(key):
     value = base
     for name in key.split("."):
         value = getattr(value, name)
-    other = {bool: "false" if value else "true", int: "3", float: "0.77", str: WORDS.get(value)}
-    text = "[1, 1, 1]" if isinstance(value, tuple) else other[type(value)]
+    if isinstance(value, str):
+        text = WORDS[value]
+    else:
+        other = {bool: "false" if value else "true", int: "3", float: "0.77", tuple: "[1, 1, 1]"}
+        text = other[type(value)]
     changed = load_config(overrides=[f"{key}={text}"])
     assert base.identity("c") != changed.identity("c")

@@ -9,6 +9,7 @@ from scenery import write_dataset
 from internav_data.verification import validate
 from internav_data.verification.findings import FindingCollector
 from internav_data.verification.interactions import check_interactions
+from internav_data.world.actions import ACTION_COUNT
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +102,10 @@ def test_outcomes_of_some_obstacles_only(scenes):
 
 
 EXPERTS = {
-    "unknown action": (lambda e: {"actions": (12, *e.actions), "steps": e.steps + 1}, "actions"),
+    "unknown action": (
+        lambda e: {"actions": (ACTION_COUNT, *e.actions), "steps": e.steps + 1},
+        "actions",
+    ),
     "nothing done": (lambda _: {"actions": (), "steps": 0, "pushes": 0, "path_m": 0.0}, "actions"),
     "too much done": (
         lambda e: {"actions": (1, 1) * 250 + e.actions, "steps": e.steps + 500},

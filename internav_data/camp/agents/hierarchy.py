@@ -263,10 +263,12 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
         moves, options = initial_probabilities(
             agent.initial_done_probability, agent.initial_interaction_probability
         )
-        even = [1.0 / len(ACTIONS_OF[PUSH])] * len(ACTIONS_OF[PUSH])  # their Done ends no episode
+        # Done of Push and Pick ends no episode: it is as probable as any other action.
+        counts = [len(ACTIONS_OF[option]) for option in (PUSH, PICK)]
+        push, pick = ([1.0 / count] * count for count in counts)
         self.navigate = networks.RecurrentActorCritic(size, self.hidden, moves)
-        self.push = networks.RecurrentActorCritic(size + OPTION_INPUTS, self.hidden, even)
-        self.pick = networks.RecurrentActorCritic(size + OPTION_INPUTS, self.hidden, even)
+        self.push = networks.RecurrentActorCritic(size + OPTION_INPUTS, self.hidden, push)
+        self.pick = networks.RecurrentActorCritic(size + OPTION_INPUTS, self.hidden, pick)
         self.intends_options = variant == "policy"
         intents = OPTIONS if self.intends_options else ACTION_COUNT
         self.global_policy = networks.IntentConditionedPolicy(
