@@ -5,6 +5,7 @@ import json
 
 import pytest
 
+from internav_data.camp.agents import AGENTS, make_agent
 from internav_data.camp.config import CampConfig, from_mapping, preset
 from internav_data.core.config import plain
 from internav_data.core.field_docs import descriptions
@@ -91,3 +92,10 @@ def test_every_field_is_documented():
 def test_the_released_penalty_of_a_wrong_done_can_be_set():
     config = from_mapping(preset("small"), {"data": {"failed_done_reward": -1.0}}, "file")
     assert config.data.failed_done_reward == -1.0
+
+
+@pytest.mark.parametrize("name", AGENTS)
+def test_a_method_with_an_intent_says_so_in_its_row(name):
+    """`--intent none` changes the agent of such a method, and of no other."""
+    agent = make_agent(name, preset("small"))
+    assert agent.uses_intent == AGENTS[name].intent

@@ -36,6 +36,15 @@ def test_generate_episodes_equals_the_dataset(dataset):
     assert generate_episodes(house, 1, first=1, config=CONFIG) == (held[1],)
 
 
+def test_every_column_of_episodes_has_values(dataset):
+    """A column that nothing fills is null in every row, which readers and rules allow."""
+    from internav_data.dataset import load_dataset
+
+    table = load_dataset(dataset).to_table()
+    empty = [name for name in table.column_names if table[name].null_count == len(table)]
+    assert empty == []
+
+
 def test_redraws_of_all_scenes_are_in_manifest_and_report(dataset, tmp_path):
     from internav_data.dataset import compute_stats, read_manifest
 
