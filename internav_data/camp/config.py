@@ -310,7 +310,7 @@ def config_of(
     Raises
     ------
     UsageError
-        Something in them cannot be meant; the place is named.
+        A setting is unknown or out of its bounds; the message names its place.
     """
     config = preset(name)
     if file is not None:

@@ -29,7 +29,7 @@ def begin(request: Request) -> Trainer:
     Raises
     ------
     UsageError
-        There is a run already, or a setting cannot be meant.
+        There is a run already, or a setting is out of its bounds.
     """
     out = request.out
     if has_checkpoint(out) or ((out / LOG).exists() and not (out / CONFIG).exists()):

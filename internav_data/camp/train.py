@@ -83,7 +83,7 @@ class Trainer:
     Raises
     ------
     UsageError
-        A setting cannot be meant, or the dataset has no such episodes.
+        Settings contradict each other, or the dataset has no such episodes.
     """
 
     def __init__(
@@ -124,7 +124,7 @@ class Trainer:
         Raises
         ------
         UsageError
-            There is nothing to learn, or the stages cannot be meant.
+            There is nothing to learn, or the stages cannot be run in this order.
         """
         state, config = self.state, self.config
         if not self.agent.optimised():

@@ -127,7 +127,7 @@ def evaluate(
     Raises
     ------
     UsageError
-        Nothing is selected, or a setting cannot be meant.
+        Nothing is selected, or a setting is out of its bounds.
     """
     from internav_data.envs.make import make_vector  # noqa: PLC0415 - the camera's kernels
 

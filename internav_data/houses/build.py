@@ -193,7 +193,7 @@ def build_house(
     Raises
     ------
     UsageError
-        For a configuration that cannot be meant.
+        The configuration is out of its bounds, or its parts contradict each other.
     QuarantineError
         When no floor plan keeps the standards.
     """

@@ -10,6 +10,7 @@ import shapely
 from shapely import LineString, Polygon, box
 
 from internav_data.records import OUTSIDE
+from internav_data.verification.overlaps import GRID_M
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -77,7 +78,7 @@ def check_rooms(house: House, report: FindingCollector) -> dict[int, Polygon]:
     tiles = shapely.union_all(shapes)
     shared = sum(shape.area for shape in shapes) - tiles.area
     report.expect(shared < AREA_M2, "house.rooms-overlap", "no overlap", f"{shared:.6f} m²")
-    missed = shapely.area(shapely.symmetric_difference(tiles, outline))
+    missed = shapely.area(shapely.symmetric_difference(tiles, outline, grid_size=GRID_M))
     report.expect(
         missed < AREA_M2, "house.rooms-tile", "rooms fill the outline", f"{missed:.6f} m²"
     )

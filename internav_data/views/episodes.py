@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from internav_data.records.agent import AgentSpec
+from internav_data.records.agent import AGENT
 from internav_data.records.errors import UsageError
 from internav_data.views.captions import with_caption
 from internav_data.views.plan import INK, PAPER, TINT, house_canvas, paint_house, paint_labels
@@ -32,7 +32,7 @@ START: RGB = (40, 148, 84)
 GOAL: RGB = (36, 104, 214)
 _PATH: RGB = (150, 70, 150)
 _SHORTEST_PATH: RGB = (36, 104, 214)
-_RADIUS_M = AgentSpec().radius_m
+_RADIUS_M = AGENT.radius_m
 _SMALL_M = 0.3
 """Obstacles smaller than this are ringed: an apple is three pixels wide."""
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 import cv2
 import numpy as np
 
-from internav_data.records.agent import AgentSpec
+from internav_data.records.agent import AGENT
 from internav_data.render.camera import Camera, CameraView, StaticScene
 from internav_data.views.asset_sheet import draw_assets
 from internav_data.views.canvas import Canvas
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from internav_data.views.replay_story import Shot, Story
     from internav_data.world import StepResult
 
-AGENT: Final[RGB] = (196, 36, 112)
+AGENT_COLOUR: Final[RGB] = (196, 36, 112)
 """Colour of the agent and its trail."""
 _EDGE: Final[RGB] = (206, 204, 198)
 GHOST: Final[RGB] = (120, 84, 10)
@@ -55,8 +55,8 @@ _ROOM_M: Final = 1.8
 """Margin around all action, on a map of a part of the house."""
 _WHOLE_SHARE: Final = 0.55
 """A map shows the entire house if it would show more than this share of it."""
-_RADIUS_M: Final = AgentSpec().radius_m
-_HALF_VIEW_DEG: Final = AgentSpec().field_of_view_deg / 2.0
+_RADIUS_M: Final = AGENT.radius_m
+_HALF_VIEW_DEG: Final = AGENT.field_of_view_deg / 2.0
 _MIN_ASPECT, _MAX_ASPECT = 0.75, 1.6
 """Bounds of a map's width as a share of its height."""
 _MIN_RADIUS_PX: Final = 7.0
@@ -178,7 +178,7 @@ class MapPainter:
                 paint_obstacle(canvas, obstacle_kind(obstacle), parts)
             else:
                 for part in parts:
-                    canvas.line(part.plan, shaded(AGENT, 0.8), 2.6, closed=True)
+                    canvas.line(part.plan, shaded(AGENT_COLOUR, 0.8), 2.6, closed=True)
                 paint(canvas, parts, line_px=0.8, colour=None)
         for item, pose in shot.poses.items():
             if item >= first and pose is not None:
@@ -213,7 +213,7 @@ class MapPainter:
     def _paint_trail(self, shot: Shot) -> None:
         if len(shot.trail) > 1:
             self.canvas.line(shot.trail, PAPER, 5.0)
-            self.canvas.line(shot.trail, AGENT, 2.6)
+            self.canvas.line(shot.trail, AGENT_COLOUR, 2.6)
 
     def _paint_cone(self, shot: Shot) -> None:
         """Tint the camera's field of view up to the agent's reach."""
@@ -226,7 +226,7 @@ class MapPainter:
             (float(cone[:, 0].max()), float(cone[:, 1].max())),
         )
         part = self.canvas.image[window].copy()
-        self.canvas.fill(cone, AGENT)
+        self.canvas.fill(cone, AGENT_COLOUR)
         tinted = self.canvas.image[window]
         tinted[:] = cv2.addWeighted(part, 0.74, tinted, 0.26, 0.0)
 
@@ -237,7 +237,7 @@ class MapPainter:
         ahead = np.array([math.cos(turn), math.sin(turn)]) * radius
         left = np.array([-ahead[1], ahead[0]])
         centre = (shot.x, shot.y)
-        canvas.disc(centre, radius, AGENT)
+        canvas.disc(centre, radius, AGENT_COLOUR)
         canvas.disc(centre, radius, PAPER, 1.6)
         arrow = [at + 0.8 * ahead, at - 0.5 * ahead + 0.55 * left, at - 0.2 * ahead]
         canvas.fill(np.array([*arrow, at - 0.5 * ahead - 0.55 * left]), PAPER)
@@ -499,7 +499,7 @@ def _title_rows(story: Story, title: str) -> list[tuple[RGB | None, int, str]]:
         (None, 0, _summary(story, title)),
         (START, 0, "start"),
         (GOAL, 0, "goal"),
-        (AGENT, 0, "agent, its way, its view as far as it reaches"),
+        (AGENT_COLOUR, 0, "agent, its path, its view as far as it reaches"),
     ]
     for k, obstacle in enumerate(episode.obstacles, 1):
         kind = obstacle_kind(obstacle)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import cv2
 import numpy as np
 
-from internav_data.records.agent import AgentSpec
+from internav_data.records.agent import AGENT
 from internav_data.views.captions import with_caption
 from internav_data.views.episodes import (
     COLOURS,
@@ -23,6 +23,7 @@ from internav_data.views.episodes import (
     paint_start,
 )
 from internav_data.views.plan import PAPER, house_canvas, paint_house, paint_labels
+from internav_data.views.replay_painters import GHOST
 from internav_data.views.replay_story import play
 from internav_data.views.silhouettes import shaded, silhouettes
 from internav_data.world import Action, HouseModel
@@ -41,8 +42,7 @@ LATE: Final[RGB] = (160, 16, 92)
 """The path fades from `EARLY` to `LATE` over time."""
 WORKED: Final[RGB] = (24, 150, 80)
 FAILED: Final[RGB] = (214, 40, 28)
-_GHOST: Final[RGB] = (120, 84, 10)
-_AGENT_M: Final = AgentSpec().radius_m
+_AGENT_M: Final = AGENT.radius_m
 _MARK_M: Final = 0.11
 
 
@@ -177,7 +177,7 @@ def _paint_moved(canvas: Canvas, story: Story) -> None:
         if begin is None or end is None or begin == end:
             continue
         ring = _ring(before.asset, end)
-        canvas.dashes(np.vstack([ring, ring[:1]]), _GHOST, 1.8, 0.07)
+        canvas.dashes(np.vstack([ring, ring[:1]]), GHOST, 1.8, 0.07)
         _paint_arrow(canvas, (begin.x, begin.y), (end.x, end.y))
 
 
@@ -194,5 +194,5 @@ def _paint_arrow(canvas: Canvas, begin: Vec2, end: Vec2) -> None:
     ahead = (tip - tail) / length
     aside = np.array((-ahead[1], ahead[0])) * 0.07
     back = tip - 0.16 * ahead
-    canvas.line(np.array([tail, back]), _GHOST, 1.6)
-    canvas.fill(np.array([tip, back + aside, back - aside]), shaded(_GHOST, 0.8))
+    canvas.line(np.array([tail, back]), GHOST, 1.6)
+    canvas.fill(np.array([tip, back + aside, back - aside]), shaded(GHOST, 0.8))

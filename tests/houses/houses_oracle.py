@@ -65,9 +65,9 @@ def check_rooms(house):
         for (ax, ay), (bx, by) in itertools.pairwise([*room.polygon, room.polygon[0]]):
             assert ax == bx or ay == by, room
     for a, b in itertools.combinations(polygons, 2):
-        assert a.intersection(b).area < 1e-9
+        assert shapely.intersection(a, b, grid_size=1e-9).area < 1e-9
     union = shapely.union_all(polygons)
-    assert union.symmetric_difference(outline).area < 1e-9
+    assert shapely.symmetric_difference(union, outline, grid_size=1e-9).area < 1e-9
     assert abs(house.area_m2 - outline.area) < 1e-3
     x0, y0, _, _ = outline.buffer(-HALF_WALL_M, join_style="mitre").bounds
     assert abs(x0) < 1e-9
@@ -129,7 +129,7 @@ def check_walls(house):
         if d.open
     ]
     got = shapely.union_all([*low, *gaps])
-    assert got.symmetric_difference(expected).area < 1e-6
+    assert shapely.symmetric_difference(got, expected, grid_size=1e-9).area < 1e-6
     volume = sum(
         (w.x_max - w.x_min) * (w.y_max - w.y_min) * (w.z_max - w.z_min) for w in house.walls
     )

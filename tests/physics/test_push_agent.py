@@ -9,7 +9,6 @@ from internav_data.catalog import catalogue
 from internav_data.geometry import footprint, yaw_quaternion
 from internav_data.houses import HouseConfig, build_house
 from internav_data.physics import Body, push, wall_body
-from internav_data.physics.engines.bullet import Bullet
 from internav_data.physics.kdop import overlap
 from internav_data.physics.pushing import count_movers
 from internav_data.physics.sweep import extent_of
@@ -41,20 +40,6 @@ def scene(heading):
     other = Pose(3.0 + 0.7 * dx - 0.05 * dy, 4.0 + 0.7 * dy + 0.05 * dx, 0.001, UPRIGHT)
     wall = wall_body(Wall(5.5, 0.0, 5.6, 8.0, 0.0, 2.6))
     return Pose(3.0, 4.0, 0.001, yaw_quaternion(20)), among(Body.of(SMALL, other), wall)
-
-
-@pytest.fixture
-def solved(monkeypatch):
-    """Settings that Bullet was asked about."""
-    asked = []
-    solve = Bullet.push
-
-    def watched(self, scene, spec):
-        asked.append(scene)
-        return solve(self, scene, spec)
-
-    monkeypatch.setattr(Bullet, "push", watched)
-    return asked
 
 
 @pytest.mark.parametrize("heading", range(4))

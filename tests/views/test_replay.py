@@ -149,7 +149,7 @@ def _alone(model, obstacles):
 
 
 def test_the_map_shows_the_agent_where_it_stands(tried, frames):
-    from internav_data.views.replay_painters import AGENT, MapPainter
+    from internav_data.views.replay_painters import AGENT_COLOUR, MapPainter
 
     painter = MapPainter(tried.story, SIZE)
     canvas = painter.canvas
@@ -158,11 +158,11 @@ def test_the_map_shows_the_agent_where_it_stands(tried, frames):
     assert picture.shape == (SIZE, painter.size[0], 3)
     rows, columns = canvas.window((4.0 - 0.16, 2.0 - 0.16), (4.0 + 0.16, 2.0 + 0.16))
     near = picture[rows.start // 2 : rows.stop // 2, columns.start // 2 : columns.stop // 2]
-    close = np.abs(near.astype(int) - np.array(AGENT)).max(axis=-1) < 30
+    close = np.abs(near.astype(int) - np.array(AGENT_COLOUR)).max(axis=-1) < 30
     assert close.mean() > 0.3, "the arrow on it is white"
     first = painter.draw(next(iter(shots(tried.story, 12.0))))
     near = first[rows.start // 2 : rows.stop // 2, columns.start // 2 : columns.stop // 2]
-    assert (np.abs(near.astype(int) - np.array(AGENT)).max(axis=-1) < 30).mean() < 0.1
+    assert (np.abs(near.astype(int) - np.array(AGENT_COLOUR)).max(axis=-1) < 30).mean() < 0.1
     assert np.array_equal(painter.draw(shot), picture), "nothing of one picture is left in the next"
 
 
@@ -174,14 +174,14 @@ def share_of(picture, canvas, low, high, colour):
 
 
 def test_the_map_shows_the_trail_and_where_things_stood(tried):
-    from internav_data.views.replay_painters import AGENT, GHOST, MapPainter
+    from internav_data.views.replay_painters import AGENT_COLOUR, GHOST, MapPainter
 
     painter = MapPainter(tried.story, 400)
     all_shots = list(shots(tried.story, 12.0))
     first, last = painter.draw(all_shots[0]), painter.draw(all_shots[-1])
     trail = ((2.95, 1.5), (3.05, 1.7))
-    assert share_of(last, painter.canvas, *trail, AGENT) > 0.3
-    assert share_of(first, painter.canvas, *trail, AGENT) == 0.0
+    assert share_of(last, painter.canvas, *trail, AGENT_COLOUR) > 0.3
+    assert share_of(first, painter.canvas, *trail, AGENT_COLOUR) == 0.0
     stood = ((4.75, 2.18), (5.25, 2.27))  # the chair's back
     assert share_of(last, painter.canvas, *stood, GHOST) > 0.1
     for shot in all_shots[2::4]:
