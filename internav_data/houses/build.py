@@ -1,4 +1,4 @@
-"""Houses by stages over a draft: rooms, floor plan, doors, windows, furniture.
+"""Houses by stages over a draft: rooms, floor plan, doors, windows, furniture, materials.
 
 `build_house(seed, scene, config, catalogue)` runs `STAGES` over a `HouseDraft` and writes the
 record: each stage is one function of the draft, with random numbers of its own.
