@@ -104,7 +104,7 @@ def episode_lines(episode: Episode) -> list[str]:
     first = [
         episode.episode_id,
         mode,
-        f"clear {episode.shortest_path_steps} steps, {episode.shortest_path_m:.2f} m",
+        f"shortest path {episode.shortest_path_steps} steps, {episode.shortest_path_m:.2f} m",
         f"with obstacles {_with_obstacles(episode)}",
     ]
     objects = [

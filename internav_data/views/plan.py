@@ -66,7 +66,7 @@ def house_line(house: House) -> str:
     """Return the caption of a house's picture, one line."""
     count = len(house.rooms)
     rooms = "1 room" if count == 1 else f"{count} rooms"
-    parts = [house.scene_id, rooms, f"{house.area_m2:.0f} m2", f"{len(house.objects)} things"]
+    parts = [house.scene_id, rooms, f"{house.area_m2:.0f} m2", f"{len(house.objects)} objects"]
     return "   ".join([*parts, house.split, house.preset])
 
 

@@ -113,7 +113,7 @@ def test_captions_say_what_the_episode_says(hand_episode):
     first, second = episode_lines(hand_episode)
     assert "scene-000003/0001" in first
     assert "blocked, sealed" in first
-    assert "clear 22 steps, 5.10 m" in first
+    assert "shortest path 22 steps, 5.10 m" in first
     assert second == "1 Chair 10.0 kg (push)   2 Apple 0.2 kg (pick)"
     assert first.endswith("with obstacles cut off")
     off_grid = replace(hand_episode, sealed=False, obstructed_path_m=6.5)
@@ -126,7 +126,7 @@ def test_captions_say_what_the_episode_says(hand_episode):
         sealed=False,
     )
     assert (
-        "lengthened   clear 22 steps, 5.10 m   with obstacles 40 steps, 8.25 m"
+        "lengthened   shortest path 22 steps, 5.10 m   with obstacles 40 steps, 8.25 m"
         in (episode_lines(open_one)[0])
     )
 
