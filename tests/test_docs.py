@@ -124,6 +124,17 @@ def test_the_agent_that_ships_plays(small_dataset):
     assert len(evaluate(found.policy, dataset, settings)) == 2
 
 
+def test_tests_named_in_durability_exist():
+    """A row ends in `file.py::test_name`, below tests/; there may be several, with commas."""
+    page = (ROOT / "docs" / "durability.md").read_text()
+    rows = [line for line in page.splitlines() if line.startswith("| ") and "promise" not in line]
+    for row in rows:
+        named = re.findall(r"`([\w/]+\.py)::(\w+)`", row.split("|")[-2])
+        assert named, f"no test: {row}"
+        for file, name in named:
+            assert f"def {name}(" in (ROOT / "tests" / file).read_text(), (file, name)
+
+
 def test_tests_named_in_the_architecture_exist():
     named = re.findall(r"`(test_\w+)` \((tests/[\w/.]+)\)", (ROOT / "ARCHITECTURE.md").read_text())
     assert len(named) > 20
