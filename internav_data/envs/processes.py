@@ -5,11 +5,13 @@ from __future__ import annotations
 import itertools
 import math
 import multiprocessing
+import weakref
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium.vector import VectorEnv
 
+from internav_data.core.processes import become_child
 from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.envs.slot import EpisodeSnapshot, check_options, task_names
 from internav_data.envs.spaces import buffer_shapes
@@ -25,6 +27,7 @@ from internav_data.records.errors import InternavError, UsageError
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from multiprocessing.connection import Connection
+    from multiprocessing.process import BaseProcess
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -57,6 +60,7 @@ def _serve(
     A request is (method, (arguments, keyword arguments)); an answer is (True, result) or
     (False, error).
     """
+    become_child()
     try:
         whole = _arrays(memory, count, arguments["image_size"], arguments["sensors"])
         own = {name: array[rows[0] : rows[1]] for name, array in whole.items()}
@@ -73,10 +77,15 @@ def _serve(
                 continue
             # Observations lie in the shared memory already: only the rest goes through the pipe.
             pipe.send((True, answer if name == "state" else answer[1:]))
-    except (EOFError, KeyboardInterrupt):
+    except EOFError:
         return
     except Exception as error:  # noqa: BLE001 - the parent raises it
         pipe.send((False, error))
+
+
+def _kill(processes: Sequence[BaseProcess]) -> None:
+    for process in processes:
+        process.kill()
 
 
 def concatenate_infos(parts: Sequence[dict[str, Any]], counts: Sequence[int]) -> dict[str, Any]:
@@ -167,6 +176,8 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
             there.close()
             self._pipes.append(here)
             self._processes.append(process)
+        # Environments that nobody closes: multiprocessing would send them SIGTERM, and wait.
+        weakref.finalize(self, _kill, self._processes)
         self._answers()
 
     def reset(

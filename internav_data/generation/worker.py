@@ -5,13 +5,13 @@ from __future__ import annotations
 import atexit
 import faulthandler
 import os
-import signal
 import time
 import traceback
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from internav_data.core.processes import become_child
 from internav_data.generation.messages import Done, Failed, Fatal, Ready
 from internav_data.generation.scenes import ATTEMPTS
 from internav_data.records.errors import InternavError, QuarantineError
@@ -22,10 +22,9 @@ if TYPE_CHECKING:
     from internav_data.generation.messages import Recipe
 
 
-def main(fd: int) -> None:
-    """Serve the socket `fd` until its other end closes."""
-    # The terminal's signals are for the parent. Once it is gone, so is the socket.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def main(fd: int, parent: int) -> None:
+    """Serve the socket `fd` of a process until its other end closes."""
+    become_child(parent)
     faulthandler.enable()  # a crash in native code leaves its name on stderr
     with Connection(fd) as pipe:
         try:

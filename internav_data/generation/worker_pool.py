@@ -62,7 +62,7 @@ class _Worker:
         self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
         with theirs:
             fd = theirs.fileno()
-            entry = f"from internav_data.generation.worker import main; main({fd})"
+            entry = f"from internav_data.generation.worker import main; main({fd}, {os.getpid()})"
             self.process = subprocess.Popen(  # noqa: S603 - our own interpreter and words
                 [sys.executable, "-c", entry],
                 env=_environment(),

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any
 
+from internav_data.core.processes import become_child
 from internav_data.dataset import ASSETS, EPISODES, SCENES, from_table, read_table
 from internav_data.dataset.parquet import open_parquet, read_group
 from internav_data.records import LoaderStream, Purpose, generator
@@ -172,7 +174,8 @@ def _check_units(units: Sequence[Unit], workers: int) -> Iterator[FindingCollect
     if workers == 1 or len(units) == 1:
         yield from map(check_unit, units)
         return
-    with ProcessPoolExecutor(min(workers, len(units)), mp_context=get_context("spawn")) as pool:
+    spawn, count = get_context("spawn"), min(workers, len(units))
+    with ProcessPoolExecutor(count, spawn, become_child, (os.getpid(),)) as pool:
         yield from pool.map(check_unit, units)
 
 
