@@ -184,7 +184,7 @@ def assemble(out: StoreLike, identity: Identity, assets: Sequence[Asset], scenes
     files = put_shards(store, source, assets)
     manifest = _manifest(identity, scenes, old, states, source, files)
     write_metadata(store, manifest)
-    write_manifest(store, manifest)
+    manifest = write_manifest(store, manifest)
     _remove_stale(store, manifest)
     store.remove(STAGING)
     return manifest

@@ -8,6 +8,7 @@ seed give the same bytes.
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 from collections.abc import Mapping  # noqa: TC003 - read at run time for the JSON Schema
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from internav_data.core.storage import OutsideError, Store, StoreLike, exists, store_of
+from internav_data.dataset.consistency import inconsistencies
 from internav_data.dataset.location import making_command
 from internav_data.dataset.parquet import footer_sha256, open_parquet
 from internav_data.dataset.staging import STAGING
@@ -36,6 +38,15 @@ _MAX_FILES = 100_000
 _MAX_FILE_BYTES = 1 << 40
 _MAX_ROWS = 1 << 40
 _AGAIN = "restore it from where the dataset came, or generate the dataset anew"
+_DIGEST = "sha256"
+_KEYS_WITHOUT_DIGEST = frozenset(
+    (
+        *("format_version", "generator", "generator_version", "seed", "catalogue_version"),
+        *("catalogue_digest", "config", "counts", "scenes", "redraws", "quarantined", "files"),
+        "requires",
+    )
+)
+"""Keys of a manifest that may lack its digest: those of the releases before it was written."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +110,9 @@ class Manifest:
     files: tuple[DataFile, ...]
     requires: tuple[str, ...] = ()
     """Keys and columns that a reader must know; it ignores any other that it does not know."""
+    sha256: str = ""
+    """SHA-256 of the canonical text of all other keys (docs/dataset.md), 64 hexadecimal digits;
+    filled in when the manifest is written."""
 
     def of(self, table: str, split: str | None = None) -> tuple[DataFile, ...]:
         """Return the files of one table (of one split, if given) in order."""
@@ -111,9 +125,32 @@ class Manifest:
         return json.dumps(dataclasses.asdict(self), indent=1, ensure_ascii=False) + "\n"
 
 
-def write_manifest(root: StoreLike, manifest: Manifest) -> None:
-    """Put a manifest in place: from then on readers see its dataset."""
-    store_of(root).put(MANIFEST, manifest.to_json().encode())
+def manifest_sha256(raw: Mapping[str, Any]) -> str:
+    """Return the digest of a manifest's keys and values, its own key `sha256` left out.
+
+    It is the SHA-256 of them as JSON in ASCII, keys sorted, without spaces: damage to any letter
+    changes it, another indentation does not.
+    """
+    others = {key: value for key, value in raw.items() if key != _DIGEST}
+    text = json.dumps(others, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def write_manifest(root: StoreLike, manifest: Manifest) -> Manifest:
+    """Put a manifest in place and return it with its digest: from then on readers see its dataset.
+
+    Raises
+    ------
+    CorruptDataError
+        Its counts contradict its files; what is in place stays.
+
+    """
+    store = store_of(root)
+    _check_consistency(store.at(MANIFEST), manifest)
+    digest = manifest_sha256(dataclasses.asdict(manifest))
+    whole = dataclasses.replace(manifest, sha256=digest)
+    store.put(MANIFEST, whole.to_json().encode())
+    return whole
 
 
 def has_manifest(root: StoreLike) -> bool:
@@ -122,12 +159,13 @@ def has_manifest(root: StoreLike) -> bool:
 
 
 def read_manifest(root: StoreLike) -> Manifest:
-    """Return a dataset's manifest, checked: types, bounds, and paths inside the dataset.
+    """Return a dataset's manifest, checked: its digest, types, bounds, counts and paths.
 
     Raises
     ------
     CorruptDataError
-        Missing, damaged, of another format, or naming files outside the dataset.
+        Missing, damaged, of another format, naming files outside the dataset, or with counts that
+        contradict its files.
 
     """
     store = store_of(root)
@@ -145,11 +183,13 @@ def read_manifest(root: StoreLike) -> Manifest:
     except (ValueError, RecursionError) as error:
         raise CorruptDataError(f"{path}: no valid JSON ({error}): {_AGAIN}") from error
     _check_version(path, raw)
+    _check_digest(path, raw)
     manifest = _parse(path, raw)
     if len(manifest.files) > _MAX_FILES:
         raise CorruptDataError(f"{path}: names more than {_MAX_FILES} files: {_AGAIN}")
     for file in manifest.files:
         _check_entry(path, file)
+    _check_consistency(path, manifest)
     return manifest
 
 
@@ -180,6 +220,25 @@ def _check_version(path: str, raw: Any) -> None:  # noqa: ANN401 - JSON
             f"{path}: written in format version {version}, this release reads up to "
             f"{FORMAT_VERSION}: upgrade with `pip install --upgrade internav-data`"
         )
+
+
+def _check_digest(path: str, raw: dict[str, Any]) -> None:
+    if _DIGEST in raw:
+        if raw[_DIGEST] != manifest_sha256(raw):
+            raise CorruptDataError(
+                f"{path}: damaged or edited (its {_DIGEST} is that of another manifest): {_AGAIN}"
+            )
+    # Damage to the digest's own name must not make a manifest pass for one of before digests.
+    elif later := sorted(raw.keys() - _KEYS_WITHOUT_DIGEST):
+        raise CorruptDataError(
+            f"{path}: damaged or edited (it has a key {later[0]!r} but no {_DIGEST}, which every "
+            f"release writes that knows such a key): {_AGAIN}"
+        )
+
+
+def _check_consistency(path: str, manifest: Manifest) -> None:
+    if found := next(inconsistencies(manifest), None):
+        raise CorruptDataError(f"{path}: {found}: {_AGAIN}")
 
 
 def _parse(path: str, raw: dict[str, Any]) -> Manifest:
@@ -252,7 +311,13 @@ def open_file(root: StoreLike, file: DataFile, spec: TableSpec[Any]) -> pq.Parqu
         raise CorruptDataError(
             f"{store.at(file.path)}: the file's footer was damaged or edited: {_AGAIN}"
         )
-    return open_parquet(store.at(file.path), spec, store.source(file.path))
+    opened = open_parquet(store.at(file.path), spec, store.source(file.path))
+    if opened.metadata.num_rows != file.rows:
+        raise CorruptDataError(
+            f"{store.at(file.path)}: expected {file.rows} rows, got {opened.metadata.num_rows}: "
+            f"{_AGAIN}"
+        )
+    return opened
 
 
 def locate(root: Path, file: DataFile) -> Path:

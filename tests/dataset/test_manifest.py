@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
+from manifests import edit_manifest as edit
+from memory_store import MemoryStore
 
 from internav_data.dataset import load_dataset, read_manifest, write_manifest
 from internav_data.records.errors import CorruptDataError
 
-
-def edit(folder, change):
-    path = folder / "manifest.json"
-    raw = json.loads(path.read_text())
-    change(raw)
-    path.write_text(json.dumps(raw))
+BEFORE_DIGESTS = Path(__file__).parents[1] / "data" / "dataset-10" / "manifest.json"
+"""Manifest of the last release that wrote no digest."""
 
 
 def test_manifest_returns_as_written(dataset_folder, tmp_path):
@@ -47,7 +47,7 @@ def test_unknown_keys_are_ignored_unless_required(damaged_folder):
         raw["counts"]["train"].update(news=3)
 
     edit(damaged_folder, add)
-    assert read_manifest(damaged_folder) == before
+    assert replace(read_manifest(damaged_folder), sha256=before.sha256) == before
     edit(damaged_folder, lambda raw: raw.update(requires=["counts", "episodes.sealed"]))
     assert read_manifest(damaged_folder).requires == ("counts", "episodes.sealed")
     edit(damaged_folder, lambda raw: raw.update(requires=["news"]))
@@ -58,7 +58,7 @@ def test_unknown_keys_are_ignored_unless_required(damaged_folder):
 def test_keys_with_a_default_may_be_absent(damaged_folder):
     before = read_manifest(damaged_folder)
     edit(damaged_folder, lambda raw: raw.pop("requires"))
-    assert read_manifest(damaged_folder) == before
+    assert replace(read_manifest(damaged_folder), sha256=before.sha256) == before
 
 
 @pytest.mark.parametrize("version", [None, "1", 0, True, 1.5])
@@ -97,6 +97,133 @@ def test_link_out_of_the_dataset_is_refused(damaged_folder, tmp_path):
     path.symlink_to(outside)
     with pytest.raises(CorruptDataError, match="link out of the dataset"):
         load_dataset(damaged_folder)
+
+
+def flipped(text, bits):
+    """Yield a text with one bit flipped, for each of some numbers of bits."""
+    for bit in bits:
+        at, mask = bit // 8, 1 << bit % 8
+        yield text[:at] + bytes([text[at] ^ mask]) + text[at + 1 :]
+
+
+def unnoticed(text, bits):
+    """Return the damaged texts that are read, though they say something else."""
+    whole = json.loads(text)
+    found = []
+    for damaged in flipped(text, bits):
+        try:
+            read_manifest(MemoryStore({"manifest.json": damaged}))
+        except CorruptDataError:
+            continue
+        if json.loads(damaged) != whole:
+            found.append(damaged)
+    return found
+
+
+def test_a_flipped_bit_of_the_manifest_is_noticed(dataset_folder):
+    text = (dataset_folder / "manifest.json").read_bytes()
+    assert not unnoticed(text, [8 * at + (at + at // 8) % 8 for at in range(len(text))])
+    digest = text.index(b'"sha256": "', text.rindex(b"requires"))
+    assert not unnoticed(text, range(8 * (digest - 4), 8 * len(text)))
+
+
+@pytest.mark.slow
+def test_every_flipped_bit_of_the_manifest_is_noticed(dataset_folder):
+    text = (dataset_folder / "manifest.json").read_bytes()
+    assert not unnoticed(text, range(8 * len(text)))
+
+
+def test_an_edited_manifest_is_refused(damaged_folder):
+    path = damaged_folder / "manifest.json"
+    path.write_text(path.read_text().replace('"seed": 0', '"seed": 1'))
+    with pytest.raises(CorruptDataError, match="damaged or edited"):
+        read_manifest(damaged_folder)
+
+
+def test_another_indentation_is_the_same_manifest(damaged_folder):
+    before = read_manifest(damaged_folder)
+    path = damaged_folder / "manifest.json"
+    path.write_text(json.dumps(json.loads(path.read_text())))
+    assert read_manifest(damaged_folder) == before
+
+
+def test_a_manifest_from_before_digests_is_read_and_one_that_lost_it_is_not(damaged_folder):
+    before = json.loads(BEFORE_DIGESTS.read_text())
+    assert "sha256" not in before
+    assert read_manifest(BEFORE_DIGESTS.parent).scenes == before["scenes"]
+    path = damaged_folder / "manifest.json"
+    path.write_text(path.read_text().replace('\n "sha256"', '\n "sha356"'))
+    with pytest.raises(CorruptDataError, match="'sha356' but no sha256"):
+        read_manifest(damaged_folder)
+
+
+def counted(**values):
+    return lambda raw: raw["counts"]["val"].update(values)
+
+
+def of_file(number, **values):
+    return lambda raw: raw["files"][number].update(values)
+
+
+def given_up(**values):
+    entry = {"scene": 3, "scene_id": "scene-000003", "attempts": 1, "reason": "x"} | values
+    return lambda raw: raw.update(quarantined=[entry], scenes=raw["scenes"] + 1)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (of_file(0, table="dpisodes"), "table: expected"),
+        (of_file(0, table=["episodes"]), "table: expected"),
+        (of_file(0, table="assets"), "split: expected null"),
+        (of_file(0, split="vbl"), "split: expected one of"),
+        (of_file(-1, split="val"), "split: expected null"),
+        (of_file(0, split="val"), "counts: train"),
+        (of_file(0, sha256="0"), "sha256: expected 64"),
+        (of_file(0, rows=1), "counts: train"),
+        (lambda raw: raw["files"].append(raw["files"][0]), "named 2 times"),
+        (lambda raw: raw["files"].pop(0), "counts: train"),
+        (lambda raw: raw["files"].pop(), "expected 1 of assets, got 0"),
+        (lambda raw: raw.update(scenes=0), "scenes: 130 in its files"),
+        (lambda raw: raw.update(scenes="130"), "scenes: 130 in its files"),
+        (lambda raw: raw["counts"].pop("test"), "counts: expected"),
+        (counted(scenes=3), "counts: val: 2 scenes"),
+        (counted(episodes=True), "counts: val: 12 episodes"),
+        (lambda raw: raw.update(seed="0"), "seed: expected"),
+        (lambda raw: raw.update(config=[]), "config: expected"),
+        (lambda raw: raw.update(generator=1), "generator: expected"),
+        (lambda raw: raw.update(redraws=[]), "redraws: expected"),
+        (lambda raw: raw.update(redraws={"x": -1}), "redraws: 'x'"),
+        (given_up(scene=300, scene_id="scene-000300"), "expected a scene below 131"),
+        (given_up(scene_id="scene-000004"), "quarantined: 'scene-.*expected its scene"),
+        (given_up(scene="3"), "quarantined: 'scene-.*expected its scene"),
+        (lambda raw: raw.update(quarantined=[{**Q}, {**Q}], scenes=132), "named 2 times"),
+    ],
+)
+def test_a_manifest_that_contradicts_itself_is_refused(damaged_folder, change, words):
+    edit(damaged_folder, change)
+    with pytest.raises(CorruptDataError, match=words):
+        load_dataset(damaged_folder)
+
+
+Q = {"scene": 3, "scene_id": "scene-000003", "attempts": 1, "reason": "x"}
+
+
+def test_a_manifest_that_contradicts_itself_is_not_written(damaged_folder):
+    before = read_manifest(damaged_folder)
+    with pytest.raises(CorruptDataError, match="scenes: 130 in its files"):
+        write_manifest(damaged_folder, replace(before, scenes=131))
+    assert read_manifest(damaged_folder) == before
+
+
+def test_a_file_of_other_rows_than_stated_is_refused(damaged_folder):
+    def change(raw):
+        raw["files"][0]["rows"] += 1
+        raw["counts"]["train"]["episodes"] += 1
+
+    edit(damaged_folder, change)
+    with pytest.raises(CorruptDataError, match=r"expected \d+ rows"):
+        load_dataset(damaged_folder)[0]
 
 
 @pytest.mark.parametrize("name", ["rows", "bytes"])

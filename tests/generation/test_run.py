@@ -15,7 +15,12 @@ from internav_data.core.storage import FolderStore, LockedError
 from internav_data.dataset import read_manifest
 from internav_data.generation.config import GenerationConfig, load_config
 from internav_data.generation.run import generate
-from internav_data.records.errors import InternavError, QuarantineError, UsageError
+from internav_data.records.errors import (
+    CorruptDataError,
+    InternavError,
+    QuarantineError,
+    UsageError,
+)
 
 CONFIG = load_config(overrides=["episodes_per_scene=3"])
 
@@ -119,6 +124,21 @@ def test_finished_scenes_stay_after_a_kill(tmp_path, signum, whole):
     assert set(journal(out)) == set(range(60)) - finished
     assert report.new_scenes == 60 - len(finished)
     assert contents(out) == whole(60)
+
+
+def test_a_damaged_manifest_is_not_extended(tmp_path):
+    out = tmp_path / "d"
+    made(out, 3)
+    text = (out / "manifest.json").read_text()
+    for old, new in (
+        ('"table": "episodes"', '"table": "dpisodes"'),
+        ('"scenes": 3', '"scenes": 0'),
+    ):
+        (out / "manifest.json").write_text(text.replace(old, new))
+        before = contents(out)
+        with pytest.raises(CorruptDataError, match="damaged or edited"):
+            made(out, 5)
+        assert contents(out) == before
 
 
 def test_more_scenes_extend(tmp_path, whole):

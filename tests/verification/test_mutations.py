@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 from builders import crate, scene_object
+from manifests import edit_manifest
 from scenery import ASSETS, obstacle, small_scenes, write_dataset
 
-from internav_data.dataset import read_manifest, write_manifest
 from internav_data.records import Pose
 from internav_data.records.errors import CorruptDataError, UsageError
 from internav_data.verification import validate
@@ -130,20 +130,37 @@ def test_link_out_of_the_dataset(dataset, tmp_path):
     ],
 )
 def test_manifest_says_another(dataset, name, predicate):
-    path = dataset / "manifest.json"
-    manifest = json.loads(path.read_text())
-    old = manifest["files"][0][name]
-    manifest["files"][0][name] = old + 1 if isinstance(old, int) else "0" * 64
-    path.write_text(json.dumps(manifest))
+    def change(raw):
+        old = raw["files"][0][name]
+        raw["files"][0][name] = old + 1 if isinstance(old, int) else "0" * 64
+        if name == "rows":
+            raw["counts"][raw["files"][0]["split"]]["episodes"] += 1
+
+    edit_manifest(dataset, change)
     assert predicate in predicates(validate(dataset))
 
 
-def test_manifest_counts(dataset):
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda raw: raw["counts"]["val"].update(episodes=99),
+        lambda raw: raw["files"][0].update(table="dpisodes"),
+        lambda raw: raw["files"].append(raw["files"][0]),
+        lambda raw: raw["files"].pop(),
+        lambda raw: raw.update(scenes=0),
+    ],
+)
+def test_manifest_that_contradicts_itself(dataset, change):
+    edit_manifest(dataset, change)
+    assert predicates(validate(dataset)) == {"files.manifest"}
+
+
+def test_manifest_of_which_a_bit_was_flipped(dataset):
     path = dataset / "manifest.json"
-    manifest = json.loads(path.read_text())
-    manifest["counts"]["val"]["episodes"] += 1
-    path.write_text(json.dumps(manifest))
-    assert predicates(validate(dataset)) == {"files.counts"}
+    text = path.read_bytes()
+    for at in range(5, len(text), len(text) // 40):
+        path.write_bytes(text[:at] + bytes([text[at] ^ 1]) + text[at + 1 :])
+        assert predicates(validate(dataset)) == {"files.manifest"}
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{", '{"format_version": 1}', '{"format_version": 99}'])
@@ -153,10 +170,7 @@ def test_manifest_unreadable(dataset, text):
 
 
 def test_path_out_of_the_dataset(dataset):
-    path = dataset / "manifest.json"
-    manifest = json.loads(path.read_text())
-    manifest["files"][0]["path"] = "data/../../secret.parquet"
-    path.write_text(json.dumps(manifest))
+    edit_manifest(dataset, lambda raw: raw["files"][0].update(path="data/../../secret.parquet"))
     assert predicates(validate(dataset)) == {"files.manifest"}
 
 
@@ -329,10 +343,13 @@ def test_asset_of_another_shape(tmp_path, scenes):
     assert "episode.obstructed-path-m" in predicates(judged(tmp_path, scenes, assets))
 
 
-def test_scene_missing(dataset):
-    manifest = read_manifest(dataset)
-    write_manifest(dataset, replace(manifest, scenes=4))
-    assert predicates(validate(dataset)) == {"schema.scenes.all"}
+def test_scene_missing(tmp_path, scenes):
+    numbered = [replace(house, scene=2 * house.scene) for house, _ in scenes]
+    others = [
+        (replace(house, scene_id=f"scene-{house.scene:06d}"), episodes)
+        for house, (_, episodes) in zip(numbered, scenes, strict=True)
+    ]
+    assert "schema.scenes.all" in predicates(judged(tmp_path, others))
 
 
 # houses
