@@ -289,18 +289,19 @@ def steps_of(env, seed, count, options=None):
 
 
 def test_many_are_the_same_as_each_alone(small):
-    alone = gymnasium.vector.SyncVectorEnv([lambda: make(small)] * 3)
-    together = many(small, 3)
+    alone = gymnasium.vector.SyncVectorEnv([lambda: make(small, max_steps=40)] * 3)
+    together = many(small, 3, max_steps=40)
     assert together.single_observation_space == alone.single_observation_space
     assert together.observation_space == alone.observation_space
     assert together.action_space == alone.action_space
     assert together.metadata["autoreset_mode"] == alone.metadata["autoreset_mode"]
+    # Episodes end by Done or are cut off, the latter however the actions are drawn.
     ended = 0
     for one, other in zip(steps_of(alone, 8, 150), steps_of(together, 8, 150), strict=True):
         for a, b in zip(one, other, strict=True):
             same(a, b)
         ended += "metrics" in other[-1]
-    assert ended > 3, "episodes ended and began again"
+    assert ended >= 3, "episodes ended and began again"
 
 
 def test_instance_ids_are_seen_by_who_asks_for_them(small):
