@@ -3,7 +3,7 @@
     python benchmarks/envs.py DATASET [--image-size 64] [--num-envs 16] [--seconds 6] [--out FILE]
 
 `navigation`: MoveAhead, rotations and looks as an agent walks (in the shares 12:3:3:1:1);
-`uniform`: all twelve, so that an episode lasts a dozen steps; `uniform_no_done`: eleven;
+`uniform`: all actions, so that Done ends an episode soon; `uniform_no_done`: all but Done;
 `uniform_again`: the same steps once more, as in a later epoch. Models and houses are loaded before
 the clock starts, distance fields of new goals are not, and the result cache is cold. Targets:
 3,000 navigation steps/s with 64x64 RGB-D, 1,500 under uniform actions.
@@ -25,17 +25,20 @@ import numpy as np
 from internav_data.envs import InterNavEnv, InterNavVectorEnv
 from internav_data.physics.result_cache import FOLDER_VARIABLE
 from internav_data.render.asset_mesh import LIBRARY
+from internav_data.world.actions import ACTIONS
 
 TARGETS = {"navigation_steps_per_s": 3000, "uniform_steps_per_s": 1500}
+KINDS = {action.kind for action in ACTIONS}
 SHARES = {
-    "navigation": [12, 3, 3, 1, 1, 0, 0, 0, 0, 0, 0, 0],
-    "uniform": [1] * 12,
-    "uniform_no_done": [1] * 11 + [0],
+    "navigation": {"move": 12, "turn": 3, "look": 1},
+    "uniform": dict.fromkeys(KINDS, 1),
+    "uniform_no_done": dict.fromkeys(KINDS - {"done"}, 1),
 }
+"""Shares of the actions by kind."""
 
 
 def weights(name: str) -> np.ndarray[Any, np.dtype[np.float64]]:
-    shares = np.array(SHARES[name], np.float64)
+    shares = np.array([SHARES[name].get(action.kind, 0) for action in ACTIONS], np.float64)
     return shares / shares.sum()
 
 
@@ -57,7 +60,7 @@ def rate(
 ) -> dict[str, float]:
     """Count steps a second of processor time, `max_steps` of them, episodes begun included."""
     rng = np.random.default_rng(0)
-    plan = rng.choice(12, size=(4096, env.num_envs), p=weights(name))
+    plan = rng.choice(len(ACTIONS), size=(4096, env.num_envs), p=weights(name))
     env.reset(seed=0)
     for row in plan[:8]:
         env.step(row)

@@ -2,7 +2,7 @@
 
     python benchmarks/memory.py DATASET [--resets 10000] [--steps 1000000] [--out FILE]
 
-One environment of 16x16 pixels, all twelve actions but Done in a walker's shares. Caches fill up
+One environment of 16x16 pixels, all actions but Done in a walker's shares. Caches fill up
 first: `grown_mib` is the growth in the second half. Target: 64 MiB at most, whatever the counts.
 `--clear` empties the caches of physics and visibility at the end and prints their sizes.
 """
@@ -57,7 +57,7 @@ def campaign(dataset: Path, resets: int, steps: int) -> list[dict[str, float]]:
     each, rows = max(1, steps // resets), []
     for k in range(resets):
         env.reset(seed=0 if k == 0 else None)
-        for action in rng.choice(12, size=each, p=SHARES / SHARES.sum()).tolist():
+        for action in rng.choice(len(SHARES), size=each, p=SHARES / SHARES.sum()).tolist():
             env.step(action)
         if (k + 1) % max(1, resets // REPORTS) == 0:
             row = {"resets": k + 1, "steps": (k + 1) * each, "mib": round(resident(), 1)}

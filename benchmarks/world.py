@@ -32,7 +32,7 @@ from internav_data.physics.pushing import _push_alone, _push_in
 from internav_data.physics.result_cache import FOLDER_VARIABLE, ResultCache
 from internav_data.physics.scene import UPRIGHT, Body, PhysicsScene
 from internav_data.records import PUSH_SPECS, Pose
-from internav_data.world import Action, HouseModel, World
+from internav_data.world import ACTION_COUNT, Action, HouseModel, World
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -139,7 +139,7 @@ def steps(worlds: list[World], count: int) -> dict[str, dict[str, float]]:
     total = 0.0
     for start in worlds:
         world = start.copy()
-        for action in rng.integers(0, 12, size=count).tolist():
+        for action in rng.integers(0, ACTION_COUNT, size=count).tolist():
             ms = timed(lambda a=action, w=world: w.step(a))
             times.setdefault(Action(action).name, []).append(ms)
             total += ms

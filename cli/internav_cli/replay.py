@@ -26,7 +26,7 @@ Examples:
   internav-gen replay data/demo 17/3 --actions mine.json --out mine.gif
 
 \b
-FILE is a JSON list of the twelve actions' names or numbers, ["MoveAhead", "PushAhead", 11],
+FILE is a JSON list of actions' names or numbers, ["MoveAhead", "PushAhead", 11],
 or {"episode_id": "scene-000017/0003", "actions": [...]}; -1 waits.
 MP4 (MPEG-4 Part 2) plays in VLC, mpv, ffplay and most desktop players, not in browsers;
 GIF plays anywhere.""",

@@ -95,7 +95,7 @@ class ScriptedPolicy:
 
 
 class RandomPolicy:
-    """Policy that takes each of the twelve actions with the same probability, Done included."""
+    """Policy that takes each action with the same probability, Done included."""
 
     name = "random"
     image_size = 1

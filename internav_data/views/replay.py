@@ -126,7 +126,7 @@ def replay_frames(
     episode, assets
         The episode, and the assets of its obstacles by asset_id.
     actions
-        Numbers of the twelve actions; -1 waits. The stored expert's by default.
+        Numbers of actions; -1 waits. The stored expert's by default.
     size
         Pixels a side of the camera's picture.
     fps

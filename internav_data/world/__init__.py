@@ -1,4 +1,4 @@
-"""A house being acted in: its movable objects, the twelve actions, what the agent can see."""
+"""A house being acted in: its movable objects, the actions, what the agent can see."""
 
 from __future__ import annotations
 

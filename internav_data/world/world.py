@@ -236,8 +236,8 @@ class World:
     engine : str
         Name of the physics engine.
     interaction : Interaction or None
-        Interaction in progress, begun by an earlier step and not yet ended. Each of the twelve
-        actions ends in the step that begins it.
+        Interaction in progress, begun by an earlier step and not yet ended. All of today's
+        actions end in the step that begins them.
     """
 
     __slots__ = (

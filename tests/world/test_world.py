@@ -1,4 +1,4 @@
-"""The world of twelve actions: what each does, that failures change nothing, that all repeats."""
+"""The world of actions: what each does, that failures change nothing, that all repeats."""
 
 import hashlib
 import itertools

@@ -48,7 +48,7 @@ AGENTS: Final = {
         "the same policies and the same pretraining; global decides at every step, Push and Pick "
         "have no Done, no intent",
     ),
-    "ppo": Method(PPOAgent, "one policy over the twelve actions"),
+    "ppo": Method(PPOAgent, "one policy over all actions"),
     "ppo-intent": Method(
         PPOIntentAgent,
         "`ppo`, conditioned on what its own copy of some rollouts ago is about to do (figure 2c)",

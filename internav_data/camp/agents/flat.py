@@ -1,4 +1,7 @@
-"""Flat agents, one policy over the twelve actions: `ppo`, `ppo-intent` (figure 2c), `random`."""
+"""Flat agents, one policy over all actions: `ppo`, `ppo-intent` (figure 2c), `random`.
+
+Shapes: T steps, n environments, A actions (`ACTION_COUNT`).
+"""
 
 from __future__ import annotations
 
@@ -30,11 +33,11 @@ class FlatRecord(StepRecord):
     """Action of a flat policy, and inputs that it worked out besides the observation."""
 
     action_probs: Tensor | None = None
-    """P(a), (…, 12)."""
+    """P(a), (…, A)."""
     done_probability: Tensor | None = None
     """Probability that the step ends the episode."""
     intent: Tensor | None = None
-    """P(i), (…, 12), of `ppo-intent`."""
+    """P(i), (…, A), of `ppo-intent`."""
     objects: Tensor | None = None
     """Ids of the nearest objects in sight, (…, K), of `nie`; -1 for none."""
     corners: Tensor | None = None
@@ -54,7 +57,7 @@ class FlatOutput(NamedTuple):
     """Outputs of the networks over T steps."""
 
     log_probs: Tensor
-    """(T, n, 12): log P(a)."""
+    """(T, n, A): log P(a)."""
     value: Tensor
     """(T, n): the critic's values."""
     state: State

@@ -1,7 +1,7 @@
 """`camp` and `hrl`: a global policy chooses the options Navigate, Push and Pick (section 4).
 
 `Hierarchy` is the model itself; `AuxiliaryAgent` trains its action policies one by one in the
-auxiliary tasks (section 5.2). Shapes: T steps, n environments.
+auxiliary tasks (section 5.2). Shapes: T steps, n environments, A actions (`ACTION_COUNT`).
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ class HierarchyRecord(OptionRecord):
     decide: Tensor
     """Whether the global policy decided, bool."""
     intent: Tensor | None = None
-    """P(i), (…, 12 or 4): equation 7."""
+    """P(i), (…, A or 4): equation 7."""
     forced: Tensor | None = None
     """Whether the interaction was closed by its 11th action, bool."""
     option_probs: Tensor | None = None
@@ -127,7 +127,7 @@ def initial_probabilities(end: float, interact: float) -> tuple[list[float], lis
 
 
 def action_log_probs_of(option: int, logits: Tensor, *, may_end: bool = True) -> Tensor:
-    """Return log-probabilities (T, n, 12) of all actions from an option's logits (T, n, k).
+    """Return log-probabilities (T, n, A) of all actions from an option's logits (T, n, k).
 
     The last of its k actions is Done; if it may not end, Done has no probability.
     """
@@ -224,13 +224,13 @@ class ForwardOutput(NamedTuple):
     option_log_probs: Tensor
     """(T, n, 4): log P(omega), equation 5."""
     action_log_probs: Tensor
-    """(T, n, 4, 12): log-probabilities of the actions of each option; STOP's is Done."""
+    """(T, n, 4, A): log-probabilities of the actions of each option; STOP's is Done."""
     value: Tensor
     """(T, n): the global policy's values."""
     intended_option_probs: Tensor | None
     """(T, n, 4): P(omega'), equation 6; None where the intent was given."""
     intent: Tensor
-    """(T, n, 12 or 4): P(i), equation 7."""
+    """(T, n, A or 4): P(i), equation 7."""
     hidden: Tensor
     """(n, 5, hidden): hidden states after the last step."""
 
@@ -342,7 +342,7 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
             Steps; their record is not read.
         option_features : (T, n, 3)
             `option_inputs` before each step.
-        intent : (T, n, 12 or 4)
+        intent : (T, n, A or 4)
             P(i) as it was recorded; None to compute it.
         """
         segments = batch.segments
@@ -356,7 +356,7 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
             out, hidden[k] = segments.run(policy.gru, inputs[k], hidden[k])
             may_end = k == NAVIGATE or self.temporally_extended
             log_probs.append(action_log_probs_of(k, policy.actor(out), may_end=may_end))
-        acts = torch.stack([*log_probs, self.done.expand_as(log_probs[0])], -2)  # (T, n, 4, 12)
+        acts = torch.stack([*log_probs, self.done.expand_as(log_probs[0])], -2)  # (T, n, 4, A)
         features, intended = torch.cat([views[0], option_features], -1), None
         if not self.uses_intent:
             intent = networks.uniform_intent(features, self.global_policy.embed.in_features)
@@ -371,7 +371,7 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
         return ForwardOutput(option_log_probs, acts, value, intended, intent, after)
 
     def mixed(self, intended: Tensor, action_log_probs: Tensor) -> Tensor:
-        """Return P(i), (T, n, 12), equation 7: the policies' actions, weighted by P(omega').
+        """Return P(i), (T, n, A), equation 7: the policies' actions, weighted by P(omega').
 
         Rotations of Navigate and Pick add; so do the four Dones. Of `--intent policy` it is
         P(omega') itself, (T, n, 4).
@@ -471,7 +471,7 @@ class AuxiliaryAgent(RecurrentAgent[OptionRecord]):
 
         Returns
         -------
-        log_probs : (T, n, 12)
+        log_probs : (T, n, A)
             Log-probabilities of the actions.
         value : (T, n)
             Values by the policies' own critics.
@@ -510,7 +510,7 @@ class AuxiliaryAgent(RecurrentAgent[OptionRecord]):
 
 
 def _of_option(action_log_probs: Tensor, option: Tensor) -> Tensor:
-    """Return the log-probabilities (…, 12) of the option that acts, of (…, 4, 12)."""
+    """Return the log-probabilities (…, A) of the option that acts, of (…, 4, A)."""
     return action_log_probs.take_along_dim(option[..., None, None], -2).squeeze(-2)
 
 

@@ -68,7 +68,7 @@ class NIEAgent(PPOAgent):
         return torch.cat([features, (weights.unsqueeze(-1) * content).sum(-2)], -1)
 
     def predicted(self, each: Tensor, corners: Tensor) -> Tensor:
-        """Return the keypoints (…, K, 8, 3) after each action, (…, K, 12, 8, 3)."""
+        """Return the keypoints (…, K, 8, 3) after each action, (…, K, A, 8, 3)."""
         affine: Tensor = self.affine(each).view(*each.shape[:-1], ACTION_COUNT, 3, 4)
         padded = functional.pad(corners, (0, 1), value=1.0).unsqueeze(-3)
         ahead: Tensor = padded @ affine.transpose(-1, -2)

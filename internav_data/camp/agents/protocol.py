@@ -63,7 +63,7 @@ class AgentStep(Generic[R]):
     """Actions of an agent in n environments, and their reasons."""
 
     action: Tensor
-    """(n,) int64: 0 … 11, or -1 to wait."""
+    """(n,) int64: numbers of `ACTIONS`, or -1 to wait."""
     log_prob: Tensor
     """(n,): log-probability of everything that was drawn."""
     value: Tensor
