@@ -13,14 +13,14 @@ from internav_data.core.lru import LRUCache
 from internav_data.core.storage import Store, StoreLike, store_of
 from internav_data.dataset.decode import from_table
 from internav_data.dataset.location import dataset_folder
-from internav_data.dataset.manifest import MANIFEST, Manifest, check_file, open_file, read_manifest
-from internav_data.dataset.parquet import read_all
+from internav_data.dataset.manifest import Manifest, check_file
 from internav_data.dataset.row_group_cache import RowGroupCache
 from internav_data.dataset.select import Filters, check_columns, matching_rows, read_columns
+from internav_data.dataset.snapshot import read_shard, with_manifest
 from internav_data.dataset.stream import EpisodeStream
 from internav_data.dataset.tables import ASSETS, EPISODES, SCENES
 from internav_data.records import Asset, Episode, House
-from internav_data.records.errors import CorruptDataError, UsageError
+from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -72,7 +72,9 @@ def load_dataset(
 class Dataset(Generic[E]):
     """Episodes by number: `len(ds)`, `ds[i]`, `ds[a:b]`, iteration; houses by scene.
 
-    Pickled by its path and opened again where it is unpickled, so it goes into DataLoader workers.
+    Pickled by its path and manifest and opened again where it is unpickled, so it goes into
+    DataLoader workers. While a generator extends the dataset, an open one keeps the episodes that
+    it began with; load it again for the new ones.
     """
 
     def __init__(
@@ -82,40 +84,44 @@ class Dataset(Generic[E]):
         filters: Filters | None = None,
         columns: Sequence[str] | None = None,
     ) -> None:
-        self.store = store = store_of(path)
-        self.manifest: Manifest = read_manifest(store)
+        self.store = store_of(path)
         self.split, self.filters = split, filters
         self.columns = None if columns is None else tuple(columns)
-        if split is not None and split not in self.manifest.counts:
+        with_manifest(self.store, self._open_checked)
+
+    def _open_checked(self, manifest: Manifest, digest: str) -> None:
+        """Open the manifest in place, whose files are all there."""
+        if self.split is not None and self.split not in manifest.counts:
             raise UsageError(
-                f"split: expected one of {sorted(self.manifest.counts)}, got {split!r}"
+                f"split: expected one of {sorted(manifest.counts)}, got {self.split!r}"
             )
-        if columns is not None:
-            check_columns(columns, EPISODES)
-        self._digest = hashlib.sha256(store.read(MANIFEST)).hexdigest()
-        self._files = self.manifest.of("episodes", split)
-        self.row_group_cache = RowGroupCache(store, self._files, EPISODES, self.columns)
+        if self.columns is not None:
+            check_columns(self.columns, EPISODES)
+        for table in ("episodes", "scenes", "assets"):
+            for file in manifest.of(table, self.split if table == "episodes" else None):
+                check_file(self.store, file)
+        self._open(manifest, digest)
+
+    def _open(self, manifest: Manifest, digest: str) -> None:
+        self.manifest = manifest
+        self.digest = digest
+        """SHA-256 of the manifest's file."""
+        self._files = manifest.of("episodes", self.split)
+        self.row_group_cache = RowGroupCache(self.store, self._files, EPISODES, self.columns)
         self._houses: LRUCache[str, House] = LRUCache(MAX_CACHED_HOUSES)
-        for file in (*self.manifest.of("scenes"), *self.manifest.of("assets")):
-            check_file(store, file)
         self._index: NDArray[np.int64] | None = None
-        if filters is not None:
-            self._index = matching_rows(store, self._files, filters)
+        if self.filters is not None:
+            self._index = matching_rows(self.store, self._files, self.filters)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {
-            "path": self.store,
-            "split": self.split,
-            "filters": self.filters,
-            "columns": self.columns,
-            "digest": self._digest,
-        }
+        names = ("store", "split", "filters", "columns", "manifest", "digest")
+        return {name: getattr(self, name) for name in names}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        digest = state.pop("digest")
-        self.__init__(**state)  # type: ignore[misc] # opened again, by path
-        if self._digest != digest:
-            raise CorruptDataError(f"{self.path}: the dataset changed meanwhile: load it again")
+        for name in ("store", "split", "filters", "columns"):
+            setattr(self, name, state[name])
+        # Not the manifest in place, which may hold more episodes by now than samplers know of.
+        self._open(state["manifest"], state["digest"])
 
     def __repr__(self) -> str:
         chosen = f", split={self.split!r}" if self.split else ""
@@ -129,7 +135,7 @@ class Dataset(Generic[E]):
     @property
     def fingerprint(self) -> str:
         """Digest of the selection of episodes, for states; it changes whenever the order would."""
-        selection = repr((self._digest, self.split, self.filters, self.columns))
+        selection = repr((self.digest, self.split, self.filters, self.columns))
         return hashlib.sha256(selection.encode()).hexdigest()[:16]
 
     def __len__(self) -> int:
@@ -210,8 +216,7 @@ class Dataset(Generic[E]):
     def assets(self) -> Mapping[str, Asset]:
         """Every asset of the dataset by its id."""
         (file,) = self.manifest.of("assets")
-        with open_file(self.store, file, ASSETS) as opened:
-            table = read_all(self.store.at(file.path), opened, ASSETS)
+        table = read_shard(self.store, file, ASSETS)
         return {asset.asset_id: asset for asset in from_table(table, ASSETS)}
 
     @functools.cached_property

@@ -168,6 +168,18 @@ def read_manifest(root: StoreLike) -> Manifest:
         contradict its files.
 
     """
+    return read_manifest_and_digest(root)[0]
+
+
+def read_manifest_and_digest(root: StoreLike) -> tuple[Manifest, str]:
+    """Return a dataset's manifest as `read_manifest`, and the SHA-256 of the bytes that were read.
+
+    Raises
+    ------
+    CorruptDataError
+        As `read_manifest`.
+
+    """
     store = store_of(root)
     path = store.at(MANIFEST)
     try:
@@ -190,7 +202,7 @@ def read_manifest(root: StoreLike) -> Manifest:
     for file in manifest.files:
         _check_entry(path, file)
     _check_consistency(path, manifest)
-    return manifest
+    return manifest, hashlib.sha256(text).hexdigest()
 
 
 def _absence(store: Store) -> str:

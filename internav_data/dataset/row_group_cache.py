@@ -9,16 +9,19 @@ import numpy as np
 
 from internav_data.core.lru import LRUCache
 from internav_data.dataset.decode import ColumnReader, RecordReader
-from internav_data.dataset.manifest import DataFile, check_file, open_file
 from internav_data.dataset.parquet import read_group
+from internav_data.dataset.snapshot import open_shard
+from internav_data.records.errors import CorruptDataError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    import pyarrow as pa
     import pyarrow.parquet as pq
     from numpy.typing import NDArray
 
     from internav_data.core.storage import Store
+    from internav_data.dataset.manifest import DataFile
     from internav_data.dataset.tables import TableSpec
 
 V = TypeVar("V")
@@ -49,11 +52,6 @@ class RowGroupCache:
     extra
         Values of a record's fields that the table does not hold, read with the first row group.
 
-    Raises
-    ------
-    CorruptDataError
-        A file is missing, truncated or edited.
-
     """
 
     def __init__(
@@ -64,8 +62,6 @@ class RowGroupCache:
         columns: Sequence[str] | None = None,
         extra: Callable[[], Mapping[str, Any]] | None = None,
     ) -> None:
-        for file in files:
-            check_file(store, file)
         self._store, self._files, self._spec = store, tuple(files), spec
         self._columns, self._extra = columns, extra
         self.starts: NDArray[np.int64] = np.cumsum([0, *[file.rows for file in files]])
@@ -96,11 +92,18 @@ class RowGroupCache:
         self._groups.clear()
 
     def file(self, number: int) -> pq.ParquetFile:
-        """Return an open file."""
+        """Return an open file.
+
+        Raises
+        ------
+        CorruptDataError
+            It is missing, truncated or edited.
+
+        """
         if self._process != os.getpid():
             self._open_anew()
         return self._open.get(
-            number, lambda: open_file(self._store, self._files[number], self._spec)
+            number, lambda: open_shard(self._store, self._files[number], self._spec)
         )
 
     def bounds(self, number: int) -> NDArray[np.int64]:
@@ -108,7 +111,9 @@ class RowGroupCache:
         if number not in self._bounds:
             metadata = self.file(number).metadata
             rows = [metadata.row_group(k).num_rows for k in range(metadata.num_row_groups)]
-            self._bounds[number] = self.starts[number] + np.cumsum([0, *rows])
+            # A file that took another's place ends later: its first groups are the other's.
+            starts, total = np.cumsum([0, *rows]), self._files[number].rows
+            self._bounds[number] = self.starts[number] + np.append(starts[starts < total], total)
         return self._bounds[number]
 
     def all_bounds(self) -> NDArray[np.int64]:
@@ -129,12 +134,20 @@ class RowGroupCache:
 
     def _read(self, number: int, group: int) -> tuple[int, Reader]:
         """Return the bytes of a row group in memory, and its reader."""
-        path = self._store.at(self._files[number].path)
-        table = read_group(path, self.file(number), group, self._spec, self._columns)
+        try:
+            table = self._group_table(number, group)
+        except CorruptDataError:
+            # A network file system takes a removed file away from those who hold it open.
+            self._open.clear()
+            table = self._group_table(number, group)
         if self._columns is not None:
             return table.nbytes, ColumnReader(table.select(list(self._columns)), self._spec)
         extra = self._extra() if self._extra else None
         return table.nbytes, RecordReader(table, self._spec, extra)
+
+    def _group_table(self, number: int, group: int) -> pa.Table:
+        path = self._store.at(self._files[number].path)
+        return read_group(path, self.file(number), group, self._spec, self._columns)
 
     def row(self, row: int) -> Any:  # noqa: ANN401 - a record, or a dictionary of columns
         """Return one row."""

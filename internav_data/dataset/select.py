@@ -11,9 +11,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from internav_data.dataset.manifest import DataFile, open_file
 from internav_data.dataset.nodes import Leaf
-from internav_data.dataset.parquet import read_all
+from internav_data.dataset.snapshot import read_shard
 from internav_data.dataset.tables import EPISODES, TableSpec
 from internav_data.records.errors import UsageError
 
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.core.storage import Store
+    from internav_data.dataset.manifest import DataFile
 
 Condition = tuple[str, str, Any]
 Filters = Sequence[Condition] | Sequence[Sequence[Condition]]
@@ -78,10 +78,7 @@ def read_columns(
         A file is missing, truncated or damaged.
 
     """
-    tables = []
-    for file in files:
-        with open_file(store, file, spec) as opened:
-            tables.append(read_all(store.at(file.path), opened, spec, names))
+    tables = [read_shard(store, file, spec, names) for file in files]
     schema = pa.schema([spec.schema.field(name) for name in names])
     return pa.concat_tables(
         [schema.empty_table(), *(table.select(list(names)) for table in tables)]

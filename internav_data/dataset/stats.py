@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from internav_data.core.storage import Store, StoreLike, store_of
-from internav_data.dataset.manifest import Manifest, open_file, read_manifest
+from internav_data.dataset.manifest import Manifest, read_manifest
 from internav_data.dataset.outcome_stats import (
     EXPERT_COLUMNS,
     OUTCOME_COLUMNS,
@@ -20,7 +20,7 @@ from internav_data.dataset.outcome_stats import (
     OutcomeRow,
     expert_row,
 )
-from internav_data.dataset.parquet import read_all
+from internav_data.dataset.snapshot import read_shard
 from internav_data.dataset.summary_statistics import Spread, counts, mean, share, spread
 from internav_data.dataset.tables import EPISODES
 from internav_data.records.agent import SPACING_M
@@ -131,10 +131,10 @@ def compute_stats(dataset: Any, split: str | None = None) -> dict[str, Any]:  # 
         A file is missing or damaged.
 
     """
-    opened = not isinstance(dataset, str | Path | Store)  # a str has a method `split`
-    store = dataset.store if opened else store_of(dataset)
-    chosen = split or (dataset.split if opened else None)
-    return asdict(stats_of(store, read_manifest(store), chosen))
+    if isinstance(dataset, str | Path | Store):  # a str has a method `split`
+        store = store_of(dataset)
+        return asdict(stats_of(store, read_manifest(store), split))
+    return asdict(stats_of(dataset.store, dataset.manifest, split or dataset.split))
 
 
 def stats_of(root: StoreLike, manifest: Manifest, split: str | None = None) -> Stats:
@@ -143,8 +143,7 @@ def stats_of(root: StoreLike, manifest: Manifest, split: str | None = None) -> S
     store = store_of(root)
     tables, kinds, outcomes = [_no_rows()], [_no_obstacles()], OutcomeCounts()
     for file in manifest.of("episodes", split):
-        with open_file(store, file, EPISODES) as opened:
-            table = read_all(store.at(file.path), opened, EPISODES, names)
+        table = read_shard(store, file, EPISODES, names)
         tables.append(_flat_rows(table))
         for chunk in table.column("obstacles").chunks:
             kinds.append(_flat_obstacles(chunk))

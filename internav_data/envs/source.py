@@ -110,8 +110,6 @@ class Source:
     ----------
     dataset
         Dataset, or a selection of one.
-    digest
-        SHA-256 of its manifest: the key of its houses.
 
     Raises
     ------
@@ -119,8 +117,8 @@ class Source:
         Nothing is selected.
     """
 
-    def __init__(self, dataset: Dataset[Episode], digest: str) -> None:
-        self.dataset, self._digest = dataset, digest
+    def __init__(self, dataset: Dataset[Episode]) -> None:
+        self.dataset = dataset
         self.auxiliary_starts = lru_cache(STARTS_KEPT)(self._auxiliary_starts)
         if len(dataset) == 0:
             raise UsageError(
@@ -176,7 +174,9 @@ class Source:
     def loaded_house(self, episode: Episode) -> LoadedHouse:
         """Return the house of an episode, ready for the environment."""
         house = self.dataset.scene(episode.scene_id)
-        return LOADED_HOUSES.get((self._digest, house.scene_id), lambda: LoadedHouse.of(house))
+        return LOADED_HOUSES.get(
+            (self.dataset.digest, house.scene_id), lambda: LoadedHouse.of(house)
+        )
 
     def _auxiliary_starts(self, number: int, kind: InteractionKind) -> tuple[AuxiliaryStart, ...]:
         """Return the starts of an episode; `auxiliary_starts` keeps the latest ones."""
@@ -203,14 +203,10 @@ def open_source(
         An unknown split, column or operator, or nothing selected.
     """
     if not isinstance(dataset, str | Path):
-        return Source(dataset, _digest(dataset.path))
+        return Source(dataset)
     path = Path(dataset)
     if not (path / MANIFEST).exists():
         load_dataset(path)  # raises with what is wrong there
-    digest = _digest(path)
+    digest = hashlib.sha256((path / MANIFEST).read_bytes()).hexdigest()
     key = repr((str(path.resolve()), digest, split, filters))
-    return _SOURCES.get(key, lambda: Source(load_dataset(path, split, filters), digest))
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256((path / MANIFEST).read_bytes()).hexdigest()
+    return _SOURCES.get(key, lambda: Source(load_dataset(path, split, filters)))

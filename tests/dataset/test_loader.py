@@ -146,11 +146,11 @@ def test_scene_comes_with_its_assets(ds):
     assert len(ds.scene_ids) == 130
 
 
-def test_pickled_by_path(ds):
+def test_pickled_by_path_and_manifest(ds):
     some = load_dataset(ds.path, "train", filters=[("room_count", ">", 2)])
     some[0]
     data = pickle.dumps(some)
-    assert len(data) < 1000
+    assert len(data) < 4000, "no rows"
     again = pickle.loads(data)  # noqa: S301 - our own
     assert list(again) == list(some)
     assert again.fingerprint == some.fingerprint
