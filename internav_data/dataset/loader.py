@@ -197,10 +197,32 @@ class Dataset(Generic[E]):
         shuffle: bool = True,
         rank: int = 0,
         world_size: int = 1,
+        drop_last: bool | None = False,
         worker_id: int | None = None,
         num_workers: int | None = None,
     ) -> EpisodeStream:
-        """Return a stream over one rank's share of the episodes (see `EpisodeStream`)."""
+        """Return a stream over one rank's share of the episodes (see `EpisodeStream`).
+
+        Parameters
+        ----------
+        seed, epoch
+            Seed and number of the epoch, on which alone the order depends.
+        shuffle
+            Whether to shuffle; False keeps the order on disk.
+        rank, world_size
+            Rank of this process and number of ranks, each of which reads equally many episodes.
+        drop_last
+            False repeats up to `world_size` - 1 episodes for that, True leaves as many out; None
+            reads each once, and ranks' lengths differ by one at most.
+        worker_id, num_workers
+            Share of the rank's share; as torch's DataLoader says where not given.
+
+        Raises
+        ------
+        UsageError
+            A rank or worker is out of its range.
+
+        """
         return EpisodeStream(
             self,
             seed=seed,
@@ -208,6 +230,7 @@ class Dataset(Generic[E]):
             shuffle=shuffle,
             rank=rank,
             world_size=world_size,
+            drop_last=drop_last,
             worker_id=worker_id,
             num_workers=num_workers,
         )

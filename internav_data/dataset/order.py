@@ -40,11 +40,3 @@ def epoch_order(
     parts = [np.arange(blocks[k], blocks[k + 1]) for k in rng.permutation(len(blocks) - 1)]
     windows = [np.concatenate(parts[k : k + WINDOW]) for k in range(0, len(parts), WINDOW)]
     return np.concatenate([rng.permutation(w) for w in windows] or [np.arange(0)])
-
-
-def share(count: int, member: int, members: int) -> tuple[int, int]:
-    """Return the range [start, stop) of `count` positions that belongs to one of several members.
-
-    Shares are disjoint, cover everything and differ in size by one at most.
-    """
-    return count * member // members, count * (member + 1) // members

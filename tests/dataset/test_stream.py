@@ -13,7 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from internav_data.dataset import load_dataset
-from internav_data.dataset.order import WINDOW, epoch_order, share
+from internav_data.dataset.order import WINDOW, epoch_order
+from internav_data.dataset.spans import share
 from internav_data.records.errors import UsageError
 
 
@@ -76,6 +77,7 @@ def test_ranks_and_workers_part_the_epoch(ds, world, workers):
                 epoch=2,
                 rank=rank,
                 world_size=world,
+                drop_last=None,
                 worker_id=worker,
                 num_workers=workers,
             )
@@ -139,12 +141,123 @@ def test_stream_is_pickled_with_its_place(ds):
     assert ids(pickle.loads(pickle.dumps(stream))) == ids(stream)  # noqa: S301 - our own
 
 
+def streams(ds, world, workers, **arguments):
+    return [
+        ds.iterable(rank=r, world_size=world, worker_id=w, num_workers=workers, **arguments)
+        for r in range(world)
+        for w in range(workers)
+    ]
+
+
+@pytest.mark.parametrize("world", [1, 2, 3, 4, 7, 8, 11])
+@pytest.mark.parametrize("drop_last", [False, True])
+def test_ranks_read_equally_many(ds, world, drop_last):
+    parts = [ids(ds.iterable(rank=r, world_size=world, drop_last=drop_last)) for r in range(world)]
+    assert len({len(part) for part in parts}) == 1
+    counts = Counter(episode for part in parts for episode in part)
+    missing, twice = len(ds) - len(counts), sum(counts.values()) - len(counts)
+    assert missing == (len(ds) % world if drop_last else 0)
+    assert twice == (0 if drop_last else -len(ds) % world)
+
+
+def test_more_ranks_than_episodes_read_one_each(dataset_folder):
+    few = load_dataset(dataset_folder, columns=["episode_id"], filters=[("room_count", ">", 99)])
+    assert ids(few.iterable(world_size=3)) == []
+    few = load_dataset(dataset_folder, columns=["episode_id"], filters=[("index", "<", 4)])
+    world = 2 * len(few) + 5
+    parts = [ids(few.iterable(rank=r, world_size=world)) for r in range(world)]
+    assert {len(part) for part in parts} == {1}
+    assert {part[0] for part in parts} == set(ids(few))
+
+
+PAIRS = [(1, 1), (2, 1), (1, 3), (2, 2), (3, 2), (5, 1), (4, 3)]
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.lists(st.sampled_from(PAIRS), min_size=2, max_size=4),
+    st.sampled_from([False, True, None]),
+    st.booleans(),
+    st.data(),
+)
+def test_a_run_resumes_with_other_ranks_and_workers(dataset_folder, runs, drop_last, shuffle, data):
+    ds = load_dataset(dataset_folder, columns=["episode_id"])
+    read, states, spare = Counter(), [], 0
+    for number, (world, workers) in enumerate(runs):
+        spare += world - 1
+        states_before, states = states, []
+        for stream in streams(ds, world, workers, seed=3, shuffle=shuffle, drop_last=drop_last):
+            if states_before:
+                stream.load_state_dict(data.draw(st.permutations(states_before)))
+            last = number == len(runs) - 1
+            count = len(stream) if last else data.draw(st.integers(0, len(stream)))
+            running = iter(stream)
+            read.update(next(running)["episode_id"] for _ in range(count))
+            states.append(json.loads(json.dumps(stream.state_dict())))
+    missing, twice = len(ds) - len(read), sum(read.values()) - len(read)
+    assert missing <= (spare if drop_last else 0)
+    assert twice <= (spare if drop_last is False else 0)
+    assert all(state["remaining"] == [] for state in states)
+
+
+def test_a_rank_resumes_from_its_own_states_with_other_workers(ds):
+    whole = ids(ds.iterable(rank=1, world_size=3))
+    old = [ds.iterable(rank=1, world_size=3, worker_id=k, num_workers=2) for k in range(2)]
+    read = [next(iter(stream))["episode_id"] for stream in old]
+    states = [stream.state_dict() for stream in old]
+    for workers in (1, 2, 5):
+        parts = []
+        for k in range(workers):
+            new = ds.iterable(rank=1, world_size=3, worker_id=k, num_workers=workers)
+            new.load_state_dict(states)
+            parts += ids(new)
+        assert sorted(parts + read) == sorted(whole)
+
+
+def test_states_that_are_not_all_or_not_its_own_are_refused(ds):
+    states = [stream.state_dict() for stream in streams(ds, 2, 2)]
+    mine = {"rank": 0, "world_size": 2, "worker_id": 1, "num_workers": 2}
+    ds.iterable(**mine).load_state_dict(states[1])
+    for wrong, name in (
+        (states[0], "worker_id"),
+        (states[2], "rank"),
+        (states[:3], "rank"),
+        ([*states, states[0]], "rank"),
+        ([states[1], states[1]], "worker_id"),
+        ([states[0], {**states[1], "epoch": 5}], "epoch"),
+        ([], "none"),
+        ({**states[1], "remaining": [[0, 1, 2]]}, "no state"),
+        ({**states[1], "remaining": [[5, 1]]}, "no range"),
+        ({name: states[1][name] for name in states[1] if name != "remaining"}, "remaining"),
+    ):
+        with pytest.raises(UsageError, match=name):
+            ds.iterable(**mine).load_state_dict(wrong)
+    with pytest.raises(UsageError, match="worker_id"):
+        ds.iterable(rank=0, world_size=2).load_state_dict(states[0])
+
+
+def test_the_epoch_of_a_state_may_be_set_again(ds):
+    stream = ds.iterable(epoch=3)
+    running = iter(stream)
+    head = [next(running)["episode_id"] for _ in range(10)]
+    again = ds.iterable()
+    again.load_state_dict(stream.state_dict())
+    again.set_epoch(3)  # as loops do before each epoch
+    assert len(again) == len(ds) - 10
+    assert head + ids(again) == ids(ds.iterable(epoch=3))
+    again.load_state_dict(stream.state_dict())
+    again.set_epoch(4)
+    assert ids(again) == ids(ds.iterable(epoch=4))
+
+
 def collate(rows):
     return [row["episode_id"] for row in rows]
 
 
-@pytest.mark.parametrize(("context", "workers"), [("fork", 2), ("spawn", 1)])
-@pytest.mark.parametrize("style", ["map", "iterable"])
+@pytest.mark.parametrize(
+    ("style", "context", "workers"),
+    [("map", "fork", 2), ("map", "spawn", 1), ("iterable", "fork", 2)],  # spawned streams: below
+)
 def test_torch_data_loader(ds, context, workers, style):
     data = pytest.importorskip("torch.utils.data")
     ds[0]  # open files and a cache before the fork
@@ -160,6 +273,65 @@ def test_torch_data_loader(ds, context, workers, style):
     assert sorted(got) == sorted(ids(ds))
     if style == "map":
         assert got == ids(ds)
+
+
+@pytest.mark.parametrize(
+    ("context", "workers", "persistent"),
+    [("fork", 2, True), ("fork", 2, False), ("spawn", 1, True), (None, 0, False)],
+)
+def test_set_epoch_reaches_workers(ds, context, workers, persistent):
+    data = pytest.importorskip("torch.utils.data")
+    stream = ds.iterable(seed=1)
+    loader = data.DataLoader(
+        stream,
+        batch_size=32,
+        num_workers=workers,
+        persistent_workers=persistent,
+        multiprocessing_context=context,
+        collate_fn=collate,
+    )
+
+    def epoch(number):
+        stream.set_epoch(number)
+        return [episode for batch in loader for episode in batch]
+
+    orders = [epoch(number) for number in (0, 1, 0, 7)]
+    assert orders[0] == orders[2]
+    assert len({tuple(order) for order in orders}) == 3
+    assert all(sorted(order) == sorted(ids(ds)) for order in orders)
+    if workers < 2:
+        assert orders[3] == ids(ds.iterable(seed=1, epoch=7))
+
+
+def test_states_and_workers_that_do_not_know_of_each_other_are_refused(ds):
+    data = pytest.importorskip("torch.utils.data")
+    stream = ds.iterable(seed=1)
+    state = stream.state_dict()
+    loader = data.DataLoader(
+        stream,
+        batch_size=None,
+        num_workers=1,
+        persistent_workers=True,
+        multiprocessing_context="fork",
+    )
+    next(iter(loader))
+    with pytest.raises(UsageError, match="state_dict: a DataLoader's workers"):
+        stream.state_dict()
+    stream.load_state_dict(state)
+    with pytest.raises(UsageError, match="make the DataLoader after"):
+        list(loader)
+
+
+def test_a_state_goes_into_any_number_of_a_loaders_workers(ds):
+    data = pytest.importorskip("torch.utils.data")
+    old = streams(ds, 2, 1)
+    head = [next(iter(stream))["episode_id"] for stream in old]
+    stream = ds.iterable()
+    stream.load_state_dict([stream.state_dict() for stream in old])
+    loader = data.DataLoader(stream, batch_size=None, num_workers=2, multiprocessing_context="fork")
+    rest = [row["episode_id"] for row in loader]
+    assert len(rest) == len(stream)
+    assert sorted(head + rest) == sorted(ids(ds))
 
 
 def test_torch_data_loader_without_workers_and_with_records(dataset_folder):
