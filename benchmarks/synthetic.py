@@ -275,11 +275,11 @@ def write_synthetic(out: Path, scenes: int, episodes: int, *, full: bool = False
     """Write a dataset; `full` ones have outcomes and an expert in every episode."""
     assets = catalogue()
     identity = Identity("synthetic", "1", 0, 1, "0" * 64, {"full": full})
-    store = open_staging(out, identity)
+    staging = open_staging(out, identity)
     for scene in range(scenes):
         rng = np.random.default_rng([scene, 1])
         house = _house(scene, rng, assets)
         rows = [_episode(house, index, rng, assets, full) for index in range(episodes)]
         redraws = {"no expert": 1} if full and scene % 10 == 0 else {}
-        stage_scene(store, scene, house, rows, redraws=redraws)
+        stage_scene(staging, scene, house, rows, redraws=redraws)
     return assemble(out, identity, assets, scenes)

@@ -45,9 +45,10 @@ def test_reading_imports_nothing_heavy(tmp_path, hand_house, hand_episode):
 
     out = tmp_path / "d"
     identity = Identity("test", "1", 0, 1, "0", {})
-    stage_scene(open_staging(out, identity), 3, hand_house, [hand_episode])
+    staging = open_staging(out, identity)
+    stage_scene(staging, 3, hand_house, [hand_episode])
     for scene in range(3):
-        stage_quarantine(out, scene, "none", split="train", attempts=1)
+        stage_quarantine(staging, scene, "none", split="train", attempts=1)
     assemble(out, identity, tuple(hand_house.assets.values()), 4)
     code = f"""
 from internav_data import load_dataset

@@ -67,8 +67,22 @@ class Store(Protocol):
         """Return a blob as a path, or as a file that can be read and sought."""
         ...
 
-    def put(self, name: str, data: bytes) -> None:
-        """Store a blob durably: readers see the old one or the new one, never a part."""
+    def put(self, name: str, data: bytes, *, beside: str = "") -> None:
+        """Store a blob durably: readers see the old one or the new one, never a part.
+
+        Parameters
+        ----------
+        name, data
+            Name and content of the blob.
+        beside
+            Name of a blob that must be there; with it, no removed folder is made again.
+
+        Raises
+        ------
+        FileNotFoundError
+            There is no blob `beside`.
+
+        """
         ...
 
     def names(self, prefix: str = "") -> list[str]:
@@ -152,9 +166,22 @@ class FolderStore:
         """Return the path of a file."""
         return self.root / name
 
-    def put(self, name: str, data: bytes) -> None:
-        """Write a file durably: readers see the old one or the new one, never a part."""
-        write_atomically(self.root / name, data)
+    def put(self, name: str, data: bytes, *, beside: str = "") -> None:
+        """Write a file durably: readers see the old one or the new one, never a part.
+
+        Raises
+        ------
+        FileNotFoundError
+            There is no file `beside`.
+
+        """
+        path = self.root / name
+        if beside:
+            self.size(beside)
+            _make_folders(path.parent, (self.root / beside).parent)
+            _write_atomically(path, data)
+        else:
+            write_atomically(path, data)
 
     def names(self, prefix: str = "") -> list[str]:
         """Return the names of the files below a folder, links to folders too, sorted.
@@ -195,6 +222,7 @@ class FolderStore:
 
         self.root.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(self.root, os.O_RDONLY)
+        _HELD.add(descriptor)
         try:
             # Some network file systems cannot lock folders: there we trust the user.
             with contextlib.suppress(OSError):
@@ -204,7 +232,19 @@ class FolderStore:
                     raise LockedError(f"{self.root}: {busy}") from None
             yield
         finally:
+            _HELD.discard(descriptor)
             os.close(descriptor)
+
+
+_HELD: set[int] = set()
+
+
+def held_locks() -> tuple[int, ...]:
+    """Return the file descriptors of the locks that this process holds.
+
+    A child process that inherits them keeps the folders locked for as long as it lives.
+    """
+    return tuple(_HELD)
 
 
 def write_atomically(path: Path, data: bytes) -> None:
@@ -214,6 +254,17 @@ def write_atomically(path: Path, data: bytes) -> None:
     was before.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
+    _write_atomically(path, data)
+
+
+def _make_folders(folder: Path, top: Path) -> None:
+    """Make a folder and those between it and `top`, never `top` itself."""
+    if folder != top and not folder.is_dir():
+        _make_folders(folder.parent, top)
+        folder.mkdir(exist_ok=True)
+
+
+def _write_atomically(path: Path, data: bytes) -> None:
     temporary = path.with_name(f".{path.name}.{os.getpid()}{TEMPORARY}")
     try:
         temporary.write_bytes(data)

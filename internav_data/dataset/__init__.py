@@ -1,7 +1,6 @@
 """Datasets on disk: schemas, shards, manifest, loader, statistics and dataset card."""
 
 from internav_data.dataset.commit import (
-    Identity,
     assemble,
     done_scenes,
     identity_of,
@@ -31,7 +30,9 @@ from internav_data.dataset.outcome_stats import refused_share
 from internav_data.dataset.parquet import FileInfo, read_table, write_parquet
 from internav_data.dataset.staging import (
     STAGING,
+    Identity,
     SceneState,
+    Staging,
     any_staged,
     read_staged_rows,
     stage_quarantine,
@@ -62,6 +63,7 @@ __all__ = [
     "Manifest",
     "Quarantined",
     "SceneState",
+    "Staging",
     "TableSpec",
     "any_staged",
     "assemble",

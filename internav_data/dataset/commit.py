@@ -2,10 +2,10 @@
 
 The order of calls of a generator:
 
-1. `open_staging(out, identity)` before the first scene: refuses a folder that holds anything else
-   or another configuration's dataset.
+1. `staging = open_staging(out, identity)` before the first scene: refuses a folder that holds
+   anything else or another configuration's dataset.
 2. `stage_scene` / `stage_quarantine` for every scene (any process, any order); on resume skip
-   `done_scenes(out)`: scenes in the finished dataset that is being extended, or staged.
+   `done_scenes(staging)`: scenes in the finished dataset that is being extended, or staged.
 3. `assemble(out, identity, assets, scenes)`: shards go into `data/`, the manifest last; then
    shards that it does not name and `.work/` are removed. After an interruption anywhere, a second
    call finishes.
@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 from internav_data.core.storage import Store, StoreLike, exists, is_temporary, store_of
@@ -33,32 +33,23 @@ from internav_data.dataset.manifest import (
 )
 from internav_data.dataset.metadata_files import write_metadata
 from internav_data.dataset.shards import SPLITS, SceneSource, put_shards
-from internav_data.dataset.staging import STAGING, SceneState, staged_scenes
+from internav_data.dataset.staging import (
+    IDENTITY,
+    STAGING,
+    Identity,
+    Staging,
+    read_identity,
+    remove_foreign,
+    staged_scenes,
+)
 from internav_data.dataset.tables import FORMAT_VERSION
 from internav_data.records.errors import CorruptDataError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from internav_data.dataset.staging import SceneState
     from internav_data.records import Asset
-
-_IDENTITY = f"{STAGING}identity.json"
-
-
-@dataclass(frozen=True, slots=True)
-class Identity:
-    """Inputs that decide every scene: runs of one identity make one dataset.
-
-    The number of scenes and of workers is no part of it.
-    """
-
-    generator: str
-    generator_version: str
-    seed: int
-    catalogue_version: int
-    catalogue_digest: str
-    config: Mapping[str, Any]
-    """The resolved configuration: numbers, strings, booleans, lists and mappings of them."""
 
 
 def identity_of(manifest: Manifest) -> Identity:
@@ -75,8 +66,8 @@ def identity_of(manifest: Manifest) -> Identity:
 
 def open_staging(
     out: StoreLike, identity: Identity, defaults: Mapping[str, Any] | None = None
-) -> Store:
-    """Prepare a folder for staging the scenes of a dataset; return its store.
+) -> Staging:
+    """Prepare a folder for staging the scenes of a dataset.
 
     Parameters
     ----------
@@ -104,25 +95,18 @@ def open_staging(
         ) from None
     if has_manifest(store):
         _same(place, identity_of(read_manifest(store)), identity, defaults or {})
-    if exists(store, _IDENTITY):
-        _same(place, _read_identity(store), identity, defaults or {})
+    if exists(store, IDENTITY):
+        _same(place, read_identity(store), identity, defaults or {})
     elif not has_manifest(store) and any(not name.startswith(STAGING) for name in names):
         raise UsageError(f"{place}: holds something that is no dataset: give a new or empty folder")
-    store.put(_IDENTITY, (json.dumps(asdict(identity), indent=1) + "\n").encode())
-    return store
-
-
-def _read_identity(store: Store) -> Identity:
-    try:
-        return Identity(**json.loads(store.read(_IDENTITY)))
-    except (ValueError, TypeError) as error:
-        raise CorruptDataError(
-            f"{store.at(_IDENTITY)}: damaged ({error}): remove {store.at(STAGING)} and start anew"
-        ) from error
+    store.put(IDENTITY, (json.dumps(asdict(identity), indent=1) + "\n").encode())
+    staging = Staging(store, identity.digest())
+    remove_foreign(staging)
+    return staging
 
 
 def _same(out: str, there: Identity, wanted: Identity, defaults: Mapping[str, Any]) -> None:
-    there = replace(there, config=_filled(there.config, defaults))
+    there = replace(there, config=_filled(there.config, defaults), rules=wanted.rules)
     old, new = (json.loads(json.dumps(asdict(i))) for i in (there, wanted))
     if difference := _first_difference(old, new, ""):
         raise UsageError(
@@ -150,12 +134,11 @@ def _first_difference(old: Any, new: Any, path: str) -> str:  # noqa: ANN401 - J
     return "" if old == new else f"{path}: there {old!r}, asked for {new!r}"
 
 
-def done_scenes(out: StoreLike) -> frozenset[int]:
+def done_scenes(staging: Staging) -> frozenset[int]:
     """Return the numbers of all scenes that need not be built again, quarantined ones included."""
-    store = store_of(out)
-    done = set(staged_scenes(store))
-    if has_manifest(store):
-        done.update(range(read_manifest(store).scenes))
+    done = set(staged_scenes(staging))
+    if has_manifest(staging.store):
+        done.update(range(read_manifest(staging.store).scenes))
     return frozenset(done)
 
 
@@ -173,14 +156,15 @@ def assemble(out: StoreLike, identity: Identity, assets: Sequence[Asset], scenes
     _remove_stale(store, old)
     first = old.scenes if old else 0
     scenes = max(scenes, first)
-    states = staged_scenes(store, range(first, scenes))
+    staging = Staging(store, identity.digest())
+    states = staged_scenes(staging, range(first, scenes))
     missing = [k for k in range(first, scenes) if k not in states]
     if missing:
         raise CorruptDataError(
             f"{store.at('')}: {len(missing)} scenes are not finished, "
             f"first {missing[0]}: generate again"
         )
-    source = SceneSource(store, old, states)
+    source = SceneSource(staging, old, states)
     files = put_shards(store, source, assets)
     manifest = _manifest(identity, scenes, old, states, source, files)
     write_metadata(store, manifest)

@@ -18,7 +18,7 @@ import pyarrow.compute as pc
 from internav_data.dataset.encode import to_table
 from internav_data.dataset.manifest import DataFile, Manifest, check_file, open_file
 from internav_data.dataset.parquet import file_info, parquet_bytes, read_all
-from internav_data.dataset.staging import SceneState, read_staged_rows
+from internav_data.dataset.staging import SceneState, Staging, read_staged_rows
 from internav_data.dataset.tables import ASSETS, EPISODES, SCENES, TableSpec
 
 if TYPE_CHECKING:
@@ -37,9 +37,9 @@ class SceneSource:
     """The rows of scenes, from an older version of the dataset or from staging."""
 
     def __init__(
-        self, store: Store, old: Manifest | None, states: Mapping[int, SceneState]
+        self, staging: Staging, old: Manifest | None, states: Mapping[int, SceneState]
     ) -> None:
-        self._store = store
+        self._staging, self._store = staging, staging.store
         self._states = {s.scene_id: s for s in states.values() if not s.quarantined}
         self._old_files = old.files if old else ()
         self._old_digests = {file.path: file.sha256 for file in self._old_files}
@@ -86,7 +86,7 @@ class SceneSource:
 
     def _new_rows(self, spec: TableSpec[Any], scene_id: str) -> pa.Table:
         scene = self._states[scene_id].scene
-        return read_staged_rows(self._store, scene, house=spec is SCENES)
+        return read_staged_rows(self._staging, scene, house=spec is SCENES)
 
     def _old_rows(self, spec: TableSpec[Any], scene_id: str) -> pa.Table:
         file = self._home.get((spec.name, scene_id))

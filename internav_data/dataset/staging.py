@@ -3,10 +3,13 @@
 Workers call `stage_scene` or `stage_quarantine` for every scene they finish; after a kill,
 `staged_scenes` tells which need not be built again. A file is
 
-    b"INWORK01"  sha256 of what follows (32 bytes)  u32 header length  header (JSON)
+    b"INWORK02"  sha256 of what follows (32 bytes)  digest of the run's identity (32 bytes)
+    u32 header length  header (JSON)
     u64 length  Arrow IPC stream of the scene row  u64 length  Arrow IPC stream of its episodes
 
-and one that is damaged counts as not done.
+and one that is damaged, or of another identity, counts as not done. A worker may outlive its run,
+whose folder may be removed or belong to another run by then: it writes only where the identity that
+its run put there still stands, and below a folder named by it.
 """
 
 from __future__ import annotations
@@ -14,26 +17,111 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
 
-from internav_data.core.storage import StoreLike, exists, store_of
+from internav_data.core.storage import Store, StoreLike, exists, store_of
 from internav_data.dataset.encode import to_table
 from internav_data.dataset.tables import EPISODES, SCENES
-from internav_data.records.errors import CorruptDataError
+from internav_data.records.errors import CorruptDataError, InternavError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from internav_data.core.storage import Store
     from internav_data.records import Episode, House, Split
 
 STAGING = ".work/"
 """Prefix of the names of an unfinished dataset's files."""
+IDENTITY = f"{STAGING}identity.json"
+"""Name of the file that holds the identity of the run whose scenes are staged."""
 _SCENES = f"{STAGING}scenes/"
-_MAGIC = b"INWORK01"
+_MAGIC = b"INWORK02"
 _HEAD = len(_MAGIC) + 32
+_BODY = _HEAD + 32
+_DIGITS = 16
+"""Hexadecimal digits of an identity's digest in the names of its scenes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """Inputs that decide every scene: runs of one identity make one dataset.
+
+    The number of scenes and of workers is no part of it.
+    """
+
+    generator: str
+    generator_version: str
+    seed: int
+    catalogue_version: int
+    catalogue_digest: str
+    config: Mapping[str, Any]
+    """The resolved configuration: numbers, strings, booleans, lists and mappings of them."""
+    rules: str = ""
+    """Digest of the code that makes scenes. Staged scenes of other rules are made again; a
+    finished dataset does not hold it, and is extended by later rules of the same version."""
+
+    def digest(self) -> str:
+        """Return the sha256 of all values, 64 hexadecimal digits."""
+        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()
+
+
+def read_identity(root: StoreLike) -> Identity:
+    """Return the identity of the run whose scenes are staged.
+
+    Raises
+    ------
+    FileNotFoundError
+        No run has opened the folder.
+    CorruptDataError
+        Damaged.
+
+    """
+    store = store_of(root)
+    data = store.read(IDENTITY)
+    try:
+        return Identity(**json.loads(data))
+    except (ValueError, TypeError) as error:
+        raise CorruptDataError(
+            f"{store.at(IDENTITY)}: damaged ({error}): remove {store.at(STAGING)} and start anew"
+        ) from error
+
+
+@dataclass(frozen=True, slots=True)
+class Staging:
+    """Staged scenes of one identity in a store; made by `open_staging`, pickled to workers."""
+
+    store: Store
+    digest: str
+    """Digest of the identity, 64 hexadecimal digits."""
+
+    def name(self, scene: int) -> str:
+        """Return the name of a scene's file: a thousand scenes a folder."""
+        return f"{self.folder}{scene // 1000:06d}/scene-{scene:06d}.work"
+
+    @property
+    def folder(self) -> str:
+        """Prefix of the names of the scenes of this identity."""
+        return f"{_SCENES}{self.digest[:_DIGITS]}/"
+
+    def check(self) -> None:
+        """Check that the run of this identity still has the store.
+
+        Raises
+        ------
+        InternavError
+            The folder was removed, or another run has begun in it.
+
+        """
+        try:
+            there = read_identity(self.store).digest()
+        except (FileNotFoundError, CorruptDataError):
+            there = ""
+        if there != self.digest:
+            raise InternavError(
+                f"{self.store.at(STAGING)}: removed, or another run's by now, while this one was "
+                "at work: run the command again, in a folder that stays"
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,18 +148,20 @@ class StagedScene:
     episodes: pa.Table
 
 
-def scene_name(scene: int) -> str:
-    """Return the name of a scene's file: a thousand scenes a folder."""
-    return f"{_SCENES}{scene // 1000:06d}/scene-{scene:06d}.work"
-
-
 def any_staged(root: StoreLike) -> bool:
     """Return whether a scene is staged, even a damaged one."""
     return any(name.endswith(".work") for name in store_of(root).names(_SCENES))
 
 
+def remove_foreign(staging: Staging) -> None:
+    """Remove staged scenes of other identities."""
+    for name in staging.store.names(_SCENES):
+        if not name.startswith(staging.folder):
+            staging.store.remove(name)
+
+
 def stage_scene(
-    root: StoreLike,
+    staging: Staging,
     scene: int,
     house: House,
     episodes: Sequence[Episode],
@@ -85,16 +175,18 @@ def stage_scene(
     ------
     ValidationError
         A value that its column cannot hold.
+    InternavError
+        The folder was removed or is another run's.
 
     """
     counts = dict(sorted((redraws or {}).items()))
     state = SceneState(scene, house.scene_id, house.split, len(episodes), counts, attempts, "")
     tables = to_table([house], SCENES), to_table(episodes, EPISODES)
-    _write(store_of(root), StagedScene(state, *tables))
+    _write(staging, StagedScene(state, *tables))
 
 
 def stage_quarantine(
-    root: StoreLike,
+    staging: Staging,
     scene: int,
     reason: str,
     *,
@@ -102,52 +194,60 @@ def stage_quarantine(
     attempts: int,
     redraws: Mapping[str, int] | None = None,
 ) -> None:
-    """Store a scene that was given up; its reason becomes data and must not name the machine."""
+    """Store a scene that was given up; its reason becomes data and must not name the machine.
+
+    Raises
+    ------
+    InternavError
+        The folder was removed or is another run's.
+
+    """
     counts = dict(sorted((redraws or {}).items()))
     state = SceneState(scene, f"scene-{scene:06d}", split, 0, counts, attempts, reason or "unknown")
-    _write(store_of(root), StagedScene(state, to_table([], SCENES), to_table([], EPISODES)))
+    _write(staging, StagedScene(state, to_table([], SCENES), to_table([], EPISODES)))
 
 
-def staged_scenes(root: StoreLike, scenes: Iterable[int] | None = None) -> dict[int, SceneState]:
+def staged_scenes(staging: Staging, scenes: Iterable[int] | None = None) -> dict[int, SceneState]:
     """Return the scenes that are staged undamaged, by number: all, or those of `scenes`."""
-    store = store_of(root)
+    store = staging.store
     if scenes is None:
-        names = [name for name in store.names(_SCENES) if name.endswith(".work")]
+        names = [name for name in store.names(staging.folder) if name.endswith(".work")]
     else:
-        names = [name for name in map(scene_name, scenes) if exists(store, name)]
+        names = [name for name in map(staging.name, scenes) if exists(store, name)]
     states = {}
     for name in names:
         try:
-            state = _state(store.at(name), store.read(name))
+            state = _state(staging, name, store.read(name))
         except CorruptDataError:
             continue
         states[state.scene] = state
     return dict(sorted(states.items()))
 
 
-def read_staged_rows(root: StoreLike, scene: int, *, house: bool) -> pa.Table:
+def read_staged_rows(staging: Staging, scene: int, *, house: bool) -> pa.Table:
     """Return one of a scene's two tables, its house's or its episodes', without the other.
 
     Raises
     ------
     CorruptDataError
-        Missing or damaged.
+        Missing, damaged, or of another identity.
 
     """
-    houses, episodes = _streams(store_of(root), scene)
+    houses, episodes = _streams(staging, scene)
     return _table(houses if house else episodes)
 
 
-def _streams(store: Store, scene: int) -> tuple[pa.Buffer, pa.Buffer]:
+def _streams(staging: Staging, scene: int) -> tuple[pa.Buffer, pa.Buffer]:
     """Check a scene's file and return its two streams."""
-    name = scene_name(scene)
-    place = store.at(name)
+    name = staging.name(scene)
     try:
-        data = store.read(name)
+        data = staging.store.read(name)
     except FileNotFoundError:
-        raise CorruptDataError(f"{place}: scene {scene} is not finished: generate again") from None
-    _state(place, data)
-    start = _HEAD + 4 + int.from_bytes(data[_HEAD : _HEAD + 4], "little")
+        raise CorruptDataError(
+            f"{staging.store.at(name)}: scene {scene} is not finished: generate again"
+        ) from None
+    _state(staging, name, data)
+    start = _BODY + 4 + int.from_bytes(data[_BODY : _BODY + 4], "little")
     streams = []
     for _ in range(2):
         length = int.from_bytes(data[start : start + 8], "little")
@@ -160,14 +260,16 @@ def _table(stream: pa.Buffer) -> pa.Table:
     return pa.ipc.open_stream(stream).read_all()
 
 
-def _write(store: Store, scene: StagedScene) -> None:
+def _write(staging: Staging, scene: StagedScene) -> None:
     header = json.dumps(asdict(scene.state)).encode()
-    parts = [len(header).to_bytes(4, "little"), header]
+    parts = [bytes.fromhex(staging.digest), len(header).to_bytes(4, "little"), header]
     for table in (scene.house, scene.episodes):
         stream = _stream(table)
         parts += [len(stream).to_bytes(8, "little"), stream]
     body = b"".join(parts)
-    store.put(scene_name(scene.state.scene), _MAGIC + hashlib.sha256(body).digest() + body)
+    staging.check()
+    name = staging.name(scene.state.scene)
+    staging.store.put(name, _MAGIC + hashlib.sha256(body).digest() + body, beside=IDENTITY)
 
 
 def _stream(table: pa.Table) -> bytes:
@@ -178,9 +280,11 @@ def _stream(table: pa.Table) -> bytes:
     return bytes(sink.getvalue())
 
 
-def _state(place: str, data: bytes) -> SceneState:
-    body = data[_HEAD:]
+def _state(staging: Staging, name: str, data: bytes) -> SceneState:
+    place, body = staging.store.at(name), data[_HEAD:]
     if data[: len(_MAGIC)] != _MAGIC or hashlib.sha256(body).digest() != data[len(_MAGIC) : _HEAD]:
         raise CorruptDataError(f"{place}: damaged: remove it and generate again")
-    length = int.from_bytes(body[:4], "little")
-    return SceneState(**json.loads(body[4 : 4 + length]))
+    if data[_HEAD:_BODY] != bytes.fromhex(staging.digest):
+        raise CorruptDataError(f"{place}: made by another run: remove it and generate again")
+    length = int.from_bytes(data[_BODY : _BODY + 4], "little")
+    return SceneState(**json.loads(data[_BODY + 4 : _BODY + 4 + length]))

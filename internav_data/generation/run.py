@@ -31,6 +31,7 @@ from internav_data.generation.executors import DEFAULT_EXECUTOR, Executor, get_e
 from internav_data.generation.messages import Done, Failed, Recipe
 from internav_data.generation.progress import GenerationProgress
 from internav_data.generation.report import Report, report_of
+from internav_data.generation.rules import source_digest
 from internav_data.generation.scenes import (
     ScenePayload,
     asset_folders,
@@ -48,7 +49,7 @@ if TYPE_CHECKING:
 
     from internav_data.catalog import Catalogue
     from internav_data.core.storage import Store
-    from internav_data.dataset import Manifest
+    from internav_data.dataset import Manifest, Staging
     from internav_data.records import Asset
 
 GENERATOR = "internav-gen"
@@ -121,15 +122,15 @@ def generate(
         store = FolderStore(out)
         with store.lock(BUSY):
             _forget_idle_staging(store)
-            open_staging(store, identity, GenerationConfig().identity(assets.digest))
-            done = _done_before(store, scenes)
+            staging = open_staging(store, identity, GenerationConfig().identity(assets.digest))
+            done = _done_before(staging, scenes)
             queue = _SceneQueue(config, scenes, tuple(k for k in range(scenes) if k not in done))
-            recipe = Recipe(setup, ScenePayload(config, assets, store))
+            recipe = Recipe(setup, ScenePayload(config, assets, staging))
             with Interrupts() as stop:
                 _make(chosen, recipe, queue, progress, stop)
                 if stop():
                     raise InterruptedRunError(_interruption(out, progress), stop.signum)
-            manifest = _assembled(store, identity, assets, scenes, progress)
+            manifest = _assembled(staging, identity, assets, scenes, progress)
     return report_of(out, manifest, progress)
 
 
@@ -193,11 +194,12 @@ def identity_for(config: GenerationConfig, assets: Catalogue) -> Identity:
         catalogue_version=assets.version,
         catalogue_digest=assets.digest,
         config=config.identity(assets.digest),
+        rules=source_digest(),
     )
 
 
-def _done_before(store: Store, scenes: int) -> frozenset[int]:
-    done = done_scenes(store)
+def _done_before(staging: Staging, scenes: int) -> frozenset[int]:
+    done, store = done_scenes(staging), staging.store
     held = read_manifest(store).scenes if has_manifest(store) else 0
     most = max(done, default=-1) + 1
     if scenes < most and most > held:
@@ -241,7 +243,7 @@ def _make(
     stop: Interrupts,
 ) -> None:
     """Have the scenes made; those that cannot be are stored as quarantined."""
-    store: Store = recipe.payload.store
+    staging: Staging = recipe.payload.staging
     before = queue.scenes - len(queue.todo)
     progress.begin(queue.scenes, before, sum(queue.expected(scene) for scene in queue.todo))
 
@@ -257,28 +259,29 @@ def _make(
             if isinstance(result, Failed):
                 progress.log(f"scene-{scene:06d} is quarantined: {result.reason}")
                 split, attempts = split_of_scene(scene), result.attempts
-                stage_quarantine(store, scene, result.reason, split=split, attempts=attempts)
+                stage_quarantine(staging, scene, result.reason, split=split, attempts=attempts)
             progress.scene(episodes, expected=queue.expected(scene))
             none_made = not before and progress.quarantined == progress.scenes
             if isinstance(result, Failed) and none_made and progress.scenes >= MAX_FIRST_FAILURES:
-                raise _hopeless(store, progress.scenes, result.reason)
+                raise _hopeless(staging.store, progress.scenes, result.reason)
     progress.end()
 
 
 def _assembled(
-    store: Store,
+    staging: Staging,
     identity: Identity,
     assets: Catalogue,
     scenes: int,
     progress: GenerationProgress,
 ) -> Manifest:
+    store = staging.store
     if has_manifest(store) and not any_staged(store):
         held = read_manifest(store)
         if held.scenes >= scenes:
             store.remove(STAGING)
             return held
     if not has_manifest(store):
-        states = staged_scenes(store)
+        states = staged_scenes(staging)
         if all(state.quarantined for state in states.values()):
             raise _hopeless(store, len(states), next(iter(states.values())).quarantined)
     progress.log(f"writing {scenes} scenes into {store.at('')}")

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from internav_data.catalog import Catalogue
-    from internav_data.core.storage import Store
+    from internav_data.dataset import Staging
     from internav_data.generation.config import GenerationConfig
     from internav_data.records import Asset, Episode, House, Split
 
@@ -40,8 +40,8 @@ class ScenePayload:
     config: GenerationConfig
     assets: Catalogue
     """Catalogue, built once by the parent: a user's meshes take a while to cut into parts."""
-    store: Store
-    """Store of the dataset, in which scenes are staged."""
+    staging: Staging
+    """Staged scenes of the run."""
 
 
 def build_scene(
@@ -85,13 +85,13 @@ def scene_maker(payload: ScenePayload) -> Callable[[int], int]:
     """Set a worker up; return a function that makes and stages a scene and counts its episodes."""
     from internav_data.dataset.staging import stage_scene  # noqa: PLC0415 - workers only
 
-    config, assets, store = payload.config, payload.assets, payload.store
+    config, assets, staging = payload.config, payload.assets, payload.staging
     gc.freeze()  # the catalogue stays: no collection need look at it again
 
     def make(scene: int) -> int:
         built = build_scene(scene, config, assets)
         stage_scene(
-            store,
+            staging,
             scene,
             built.house,
             built.episodes,

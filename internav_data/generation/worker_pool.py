@@ -19,6 +19,7 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
+from internav_data.core.storage import held_locks
 from internav_data.generation.messages import Done, Failed, Fatal, Ready, WorkerExited
 from internav_data.records.errors import InternavError
 
@@ -66,7 +67,7 @@ class _Worker:
             self.process = subprocess.Popen(  # noqa: S603 - our own interpreter and words
                 [sys.executable, "-c", entry],
                 env=_environment(),
-                pass_fds=(fd,),
+                pass_fds=(fd, *held_locks()),  # one that outlives us keeps its folder locked
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,  # Bullet greets on stdout
                 stderr=self._stderr,

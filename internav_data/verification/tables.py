@@ -11,6 +11,7 @@ from internav_data.records import OUTSIDE
 from internav_data.records.errors import InternavError
 from internav_data.verification.checked_config import checked_config
 from internav_data.verification.findings import FindingCollector
+from internav_data.verification.house_config import check_house_config, house_request
 from internav_data.verification.interactions import check_interactions
 from internav_data.verification.ranges import check_ranges
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     from internav_data.dataset import DataFile, Manifest
     from internav_data.records import House
+    from internav_data.verification.house_config import Rooms
 
 SPLIT_PERIOD = 120
 """Period of the splits: of every 120 scenes number 0 is val, 1 is test, the others are train."""
@@ -43,6 +45,8 @@ class DatasetKeys:
     assets: frozenset[str] = frozenset()
     scenes: dict[str, SceneKeys] = field(default_factory=dict)
     episodes: Counter[str] = field(default_factory=Counter)
+    first_rooms: Rooms | None = None
+    """Rooms of the first house."""
 
 
 def split_of(scene: int) -> str:
@@ -109,6 +113,7 @@ def _check_scenes(
     table: pa.Table, manifest: Manifest, file: DataFile, keys: DatasetKeys, report: FindingCollector
 ) -> None:
     houses = from_table(table, SCENES, {"assets": {}})
+    request = house_request(manifest.seed, manifest.config)
     numbers = [house.scene for house in houses]
     report.expect(
         numbers == sorted(numbers), "schema.scenes.order", "rows by scene", "another order"
@@ -128,6 +133,9 @@ def _check_scenes(
             f"{house.split} in a file of {file.split}",
         )
         report.expect(house.seed == manifest.seed, "schema.scenes.seed", manifest.seed, house.seed)
+        if request is not None:
+            rooms = check_house_config(house, request, keys.first_rooms, report)
+            keys.first_rooms = keys.first_rooms or rooms
         _check_links(house, keys, report)
         keys.scenes[house.scene_id] = SceneKeys(
             house.split,

@@ -30,7 +30,9 @@ class MemoryStore:
     def source(self, name):
         return io.BytesIO(self._blob(name))
 
-    def put(self, name, data):
+    def put(self, name, data, *, beside=""):
+        if beside:
+            self._blob(beside)
         self._change("put", name)
         self.blobs[name] = bytes(data)
 

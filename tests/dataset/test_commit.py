@@ -15,6 +15,7 @@ import strategies
 from internav_data.core import storage
 from internav_data.dataset import (
     Identity,
+    Staging,
     assemble,
     done_scenes,
     has_manifest,
@@ -28,7 +29,6 @@ from internav_data.dataset import (
     staged_scenes,
     write_manifest,
 )
-from internav_data.dataset.staging import scene_name
 from internav_data.records import Asset, Episode, House
 from internav_data.records.errors import CorruptDataError, UsageError
 
@@ -46,12 +46,16 @@ def split_of(scene):
     return ("val", "test", "train")[min(scene % 120, 2)]
 
 
+def staging_of(out, identity=IDENTITY):
+    return Staging(storage.store_of(out), identity.digest())
+
+
 def build(out, scenes, episodes=2, identity=IDENTITY, quarantined=()):
-    store = open_staging(out, identity)
+    staging = open_staging(out, identity)
     for scene in scenes:
         split, scene_id = split_of(scene), f"scene-{scene:06d}"
         if scene in quarantined:
-            stage_quarantine(store, scene, "too small", split=split, attempts=3)
+            stage_quarantine(staging, scene, "too small", split=split, attempts=3)
             continue
         house = strategies.plain(House, scene_id=scene_id, scene=scene, split=split)
         rows = [
@@ -65,7 +69,8 @@ def build(out, scenes, episodes=2, identity=IDENTITY, quarantined=()):
             )
             for index in range(episodes)
         ]
-        stage_scene(store, scene, house, rows, redraws={"spot": 1})
+        stage_scene(staging, scene, house, rows, redraws={"spot": 1})
+    return staging
 
 
 def tree(folder):
@@ -123,7 +128,7 @@ def test_an_extended_dataset_equals_one_built_at_once(tmp_path):
     manifest = read_manifest(grown)
     assert [q.scene for q in manifest.quarantined] == [5, 90]
     assert manifest.redraws == {"spot": 128}
-    assert done_scenes(grown) == frozenset(range(130))
+    assert done_scenes(staging_of(grown)) == frozenset(range(130))
 
 
 @pytest.mark.usefixtures("few_scenes_a_shard")
@@ -161,7 +166,7 @@ def test_killed_anywhere_readers_are_safe_and_the_next_call_finishes(tmp_path, m
             assert len(ids) in {2 * first, 40}
             assert len(set(ids)) == len(ids)
         open_staging(out, IDENTITY)
-        assert done_scenes(out) == frozenset(range(20))
+        assert done_scenes(staging_of(out)) == frozenset(range(20))
         assemble(out, IDENTITY, ASSETS, 20)
         assert tree(out) == tree(wanted)
         shutil.rmtree(out)
@@ -205,17 +210,17 @@ def test_a_scene_without_episodes_stays(tmp_path):
 
 
 def test_damaged_work_counts_as_not_done(tmp_path):
-    build(tmp_path, range(4))
-    assert set(staged_scenes(tmp_path)) == set(range(4))
-    path = tmp_path / scene_name(2)
+    staging = build(tmp_path, range(4))
+    assert set(staged_scenes(staging)) == set(range(4))
+    path = tmp_path / staging.name(2)
     data = path.read_bytes()
     for at in range(0, len(data), 97):
         path.write_bytes(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :])
-        assert set(staged_scenes(tmp_path)) == {0, 1, 3}
+        assert set(staged_scenes(staging)) == {0, 1, 3}
         with pytest.raises(CorruptDataError):
-            read_staged_rows(tmp_path, 2, house=False)
+            read_staged_rows(staging, 2, house=False)
     path.write_bytes(data[:-5])
-    assert set(staged_scenes(tmp_path, range(3))) == {0, 1}
+    assert set(staged_scenes(staging, range(3))) == {0, 1}
 
 
 @pytest.mark.parametrize(
@@ -255,7 +260,7 @@ def test_tuples_in_a_configuration_are_lists_on_disk(tmp_path):
     build(tmp_path, range(2))
     assemble(tmp_path, IDENTITY, ASSETS, 2)
     open_staging(tmp_path, same)
-    assert done_scenes(tmp_path) == frozenset(range(2)), "nothing is made again"
+    assert done_scenes(staging_of(tmp_path)) == frozenset(range(2)), "nothing is made again"
 
 
 def test_foreign_folder_and_file_are_refused_untouched(tmp_path):

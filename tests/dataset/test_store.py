@@ -6,7 +6,7 @@ import pickle
 
 import pytest
 from memory_store import KilledError, MemoryStore
-from test_commit import ASSETS, IDENTITY, build
+from test_commit import ASSETS, IDENTITY, build, staging_of
 
 from internav_data.core import storage
 from internav_data.core.storage import FolderStore, LockedError, OutsideError, Store, exists
@@ -95,7 +95,7 @@ def test_killed_before_any_change_readers_are_safe_and_the_next_call_finishes(mo
         if has_manifest(left):
             sizes.add(len({e.episode_id for e in load_dataset(left)}))
         open_staging(left, IDENTITY)
-        assert done_scenes(left) == frozenset(range(20))
+        assert done_scenes(staging_of(left)) == frozenset(range(20))
         assemble(left, IDENTITY, ASSETS, 20)
         assert left.blobs == whole.blobs
     assert sizes == {2 * first, 40} - {0}, "readers see the old dataset or the new one"

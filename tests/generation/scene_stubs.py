@@ -40,7 +40,7 @@ def episode(home, index):
 
 def stub(payload):
     """Make scenes as `stub.json` beside the dataset says: how long, and what fails."""
-    folder = payload.store.root.parent
+    folder = payload.staging.store.root.parent
     path = folder / "stub.json"
     orders = json.loads(path.read_text()) if path.exists() else {}
     journal = folder / "journal"
@@ -61,10 +61,10 @@ def stub(payload):
         if scene in orders.get("quarantine", ()) or orders.get("hopeless"):
             raise QuarantineError("nothing can be blocked")
         if orders.get("full") == scene:
-            raise OSError(28, "No space left on device", payload.store.at(STAGING))
+            raise OSError(28, "No space left on device", payload.staging.store.at(STAGING))
         home = house(payload.config.seed, scene)
         count = payload.config.episodes_of(home.split)
-        stage_scene(payload.store, scene, home, [episode(home, k) for k in range(count)])
+        stage_scene(payload.staging, scene, home, [episode(home, k) for k in range(count)])
         return count
 
     return make

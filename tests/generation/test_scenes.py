@@ -72,8 +72,8 @@ def test_unsolvable_episodes_stay_on_demand(monkeypatch, tmp_path):
     config = dataclasses.replace(CONFIG, episodes=episodes)
     made = build_scene(0, config, catalogue())
     identity = identity_for(config, catalogue())
-    store = open_staging(tmp_path, identity)
-    stage_scene(store, 0, made.house, made.episodes, redraws=made.redraws)
+    staging = open_staging(tmp_path, identity)
+    stage_scene(staging, 0, made.house, made.episodes, redraws=made.redraws)
     manifest = assemble(tmp_path, identity, tuple(catalogue().assets.values()), 1)
     held = list(load_dataset(tmp_path))
     assert [episode.expert for episode in held] == [None, None]

@@ -317,7 +317,7 @@ IDENTITY = Identity(
 def write_dataset(root, scenes, assets=None, config=None):
     """Write scenes as a dataset, by the same road as the generator."""
     identity = replace(IDENTITY, config={**IDENTITY.config, **(config or {})})
-    store = open_staging(root, identity)
+    staging = open_staging(root, identity)
     for number, (house, episodes) in enumerate(scenes):
-        stage_scene(store, number, house, episodes)
+        stage_scene(staging, number, house, episodes)
     return assemble(root, identity, list((assets or ASSETS).values()), len(scenes))
