@@ -10,6 +10,7 @@ import contextlib
 import hashlib
 import os
 import shutil
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
     from typing import BinaryIO
 
 _BLOCK = 1 << 20
+_ENDING_S = 1.0
+"""Seconds that the children of a killed process, which hold its lock too, may take to end."""
+_POLL_S = 0.02
 TEMPORARY = ".tmp"
 """Suffix of unfinished files in a folder; a kill leaves one behind."""
 
@@ -218,22 +222,32 @@ class FolderStore:
             Another process holds it; `busy` says what to do.
 
         """
-        import fcntl  # noqa: PLC0415 - POSIX only; readers need no lock
-
         self.root.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(self.root, os.O_RDONLY)
         _HELD.add(descriptor)
         try:
             # Some network file systems cannot lock folders: there we trust the user.
             with contextlib.suppress(OSError):
-                try:
-                    fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                except BlockingIOError:
-                    raise LockedError(f"{self.root}: {busy}") from None
+                deadline = time.monotonic() + _ENDING_S
+                while not _locked(descriptor):
+                    if time.monotonic() > deadline:
+                        raise LockedError(f"{self.root}: {busy}")
+                    time.sleep(_POLL_S)
             yield
         finally:
             _HELD.discard(descriptor)
             os.close(descriptor)
+
+
+def _locked(descriptor: int) -> bool:
+    """Lock a file if nobody else holds its lock, and return whether nobody does."""
+    import fcntl  # noqa: PLC0415 - POSIX only; readers need no lock
+
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
 
 
 _HELD: set[int] = set()

@@ -7,9 +7,10 @@ Workers call `stage_scene` or `stage_quarantine` for every scene they finish; af
     u32 header length  header (JSON)
     u64 length  Arrow IPC stream of the scene row  u64 length  Arrow IPC stream of its episodes
 
-and one that is damaged, or of another identity, counts as not done. A worker may outlive its run,
-whose folder may be removed or belong to another run by then: it writes only where the identity that
-its run put there still stands, and below a folder named by it.
+and one that is damaged, or of another identity, counts as not done. A worker whose parent is gone
+ends before it writes. Should it outlive its run all the same, the folder may be removed or belong
+to another run by then: it writes only where the identity that its run put there still stands, and
+below a folder named by it.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
 
+from internav_data.core.processes import end_if_orphaned
 from internav_data.core.storage import Store, StoreLike, exists, store_of
 from internav_data.dataset.encode import to_table
 from internav_data.dataset.tables import EPISODES, SCENES
@@ -267,6 +269,7 @@ def _write(staging: Staging, scene: StagedScene) -> None:
         stream = _stream(table)
         parts += [len(stream).to_bytes(8, "little"), stream]
     body = b"".join(parts)
+    end_if_orphaned()
     staging.check()
     name = staging.name(scene.state.scene)
     staging.store.put(name, _MAGIC + hashlib.sha256(body).digest() + body, beside=IDENTITY)

@@ -29,7 +29,7 @@ TIE = 1e-9
 HALL_FROM = {"paper": 7, "realistic": 5}
 """Number of rooms from which houses have a hall, unless the config says another."""
 
-Rooms = tuple[tuple[str, tuple[tuple[float, float], ...]], ...]
+RoomPlan = tuple[tuple[str, tuple[tuple[float, float], ...]], ...]
 """Types and polygons of a house's rooms."""
 
 
@@ -116,8 +116,8 @@ def room_counts(request: HouseRequest, scene: int) -> set[int]:
 
 
 def check_house_config(
-    house: House, request: HouseRequest, first: Rooms | None, report: FindingCollector
-) -> Rooms:
+    house: House, request: HouseRequest, first: RoomPlan | None, report: FindingCollector
+) -> RoomPlan:
     """Check a house against the config; return its rooms.
 
     Parameters
@@ -132,7 +132,7 @@ def check_house_config(
         Collector of findings.
 
     """
-    rooms: Rooms = tuple((room.type, room.polygon) for room in house.rooms)
+    rooms: RoomPlan = tuple((room.type, room.polygon) for room in house.rooms)
     predicate = "schema.scenes.config"
     report.expect(
         house.preset == request.preset,

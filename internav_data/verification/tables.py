@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from internav_data.dataset import DataFile, Manifest
     from internav_data.records import House
-    from internav_data.verification.house_config import Rooms
+    from internav_data.verification.house_config import RoomPlan
 
 SPLIT_PERIOD = 120
 """Period of the splits: of every 120 scenes number 0 is val, 1 is test, the others are train."""
@@ -45,7 +45,7 @@ class DatasetKeys:
     assets: frozenset[str] = frozenset()
     scenes: dict[str, SceneKeys] = field(default_factory=dict)
     episodes: Counter[str] = field(default_factory=Counter)
-    first_rooms: Rooms | None = None
+    first_rooms: RoomPlan | None = None
     """Rooms of the first house."""
 
 

@@ -1,6 +1,7 @@
 import functools
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -89,11 +90,16 @@ def test_nothing_at_all_is_an_error(tmp_path):
     assert not (tmp_path / "few" / "d" / "manifest.json").exists()
 
 
+def started(out, scenes, **orders):
+    """Start a generator over stub scenes in a process of its own, with two workers."""
+    (out.parent / "stub.json").write_text(json.dumps(orders))
+    script = Path(__file__).with_name("run_stub.py")
+    return subprocess.Popen([sys.executable, script, out, str(scenes), "2"])
+
+
 def killed(out, signum, scenes=60):
     """Start a generator over slow scenes and end it when some are done."""
-    (out.parent / "stub.json").write_text(json.dumps({"seconds": 0.2}))
-    script = Path(__file__).with_name("run_stub.py")
-    process = subprocess.Popen([sys.executable, script, out, str(scenes), "2"])
+    process = started(out, scenes, seconds=0.2)
     deadline = time.monotonic() + 300
     while len(list(out.rglob("scene-*.work"))) < 5 and time.monotonic() < deadline:
         time.sleep(0.02)
@@ -102,6 +108,28 @@ def killed(out, signum, scenes=60):
     while any(map(runs, (out.parent / "workers").read_text().split())):
         time.sleep(0.02)  # workers whose parent was killed end the scene they are at
     return code
+
+
+def test_workers_that_outlive_a_killed_run_spoil_no_other(tmp_path):
+    out, other = tmp_path / "d", load_config(overrides=["episodes_per_scene=2", "seed=3"])
+    made(tmp_path / "clean" / "d", 4, config=other)
+    (tmp_path / "journal").write_text("")
+    process = started(out, 60, seconds=4.0, outlives=True)
+    while len(journal(out)) < 2:
+        time.sleep(0.02)
+    process.kill()
+    process.wait()
+    workers = (tmp_path / "workers").read_text().split()
+    assert all(map(runs, workers)), "they are at their scenes"
+    with pytest.raises(LockedError), FolderStore(out).lock(""):
+        pass
+    shutil.rmtree(out)
+    made(out, 4, config=other)
+    assert contents(out) == contents(tmp_path / "clean" / "d")
+    shutil.rmtree(out)
+    while any(map(runs, workers)):
+        time.sleep(0.02)
+    assert not out.exists()
 
 
 def runs(pid):
