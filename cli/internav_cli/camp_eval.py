@@ -83,7 +83,7 @@ tables.md, tables.json, report.html.""",
     "conditions",
     multiple=True,
     metavar="COLUMN=VALUE",
-    help="Only these, as in room_count<=3; also != < > >=.  [repeatable]",
+    help="Only these, as in room_count<=3; != < > >= and 'expert is not null' too.  [repeatable]",
 )
 @click.option("--episodes-per-scene", type=int, callback=positive, help="The first of each house.")
 @click.option("--limit", type=int, callback=positive, help="A fixed random choice of so many.")

@@ -82,7 +82,8 @@ interrupted.""",
     "conditions",
     multiple=True,
     metavar="COLUMN=VALUE",
-    help="Only these episodes, as in room_count<=3; also != < > >=.  [repeatable]",
+    help="Only these episodes, as in room_count<=3; != < > >= and 'expert is not null' too."
+    "  [repeatable]",
 )
 @click.option(
     "--stages",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from internav_data.envs.loop import Environments
 
 _SINGLE = ("room_count", "==", 1)
+_WITH_EXPERT = ("expert", "is not", None)
 _MEANS = ("success", "spl", "sts", "distance_m", "steps")
 
 
@@ -71,6 +73,36 @@ class TrainingData:
             raise UsageError(f"{self.path}: there are no {what}; {advice}")
         return found
 
+    def episodes_of(self, stage: TrainingStage) -> Dataset[Episode]:
+        """Return the training episodes of a stage."""
+        if stage.clones:
+            return self.demonstrated
+        return self.episodes(single_room=stage.single_room)
+
+    @functools.cached_property
+    def demonstrated(self) -> Dataset[Episode]:
+        """Episodes of the training split that have an expert, for cloning.
+
+        Raises
+        ------
+        UsageError
+            None of them has one.
+        """
+        everything = self.episodes()
+        found = load_dataset(self.path, "train", [*self._where, _WITH_EXPERT])
+        if not len(found):
+            raise UsageError(
+                f"{self.path}: none of {len(everything)} training episodes has an expert to clone; "
+                "generate some without --keep-unsolvable, or train without --pretrain bc"
+            )
+        # A dataset without gaps keeps its own fingerprint, and its houses stay loaded.
+        return everything if len(found) == len(everything) else found
+
+    @functools.cached_property
+    def without_expert(self) -> int:
+        """Number of training episodes that cloning skips."""
+        return len(self.episodes()) - len(self.demonstrated)
+
     def environments(
         self, stage: TrainingStage, config: CampConfig, local: range, sensors: Sequence[str]
     ) -> Environments:
@@ -78,7 +110,7 @@ class TrainingData:
         from internav_data.envs.make import make_vector  # noqa: PLC0415 - the camera's kernels
 
         env: Any = make_vector(
-            len(local), self.episodes(single_room=stage.single_room),
+            len(local), self.episodes_of(stage),
             min(config.run.workers, len(local)), autoreset=False, copy=False, sensors=sensors,
             task=stage.tasks[local.start : local.stop] or "interactive",
             image_size=config.network.image_size, max_steps=config.run.max_steps,

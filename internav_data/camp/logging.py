@@ -185,9 +185,11 @@ class ProgressReporter(ProgressLine):
         steps_left = (counts["updates"] - counts["update"]) * row["step"] / counts["update"]
         share, left = counts["update"] / counts["updates"], clock(steps_left / max(rate, 1e-9))
         if cloning is not None:
+            skipped = cloning.get("without_expert", 0)
+            more = f", {skipped:,} episodes without an expert skipped" if skipped else ""
             return (
                 f"cloning: {row['step']:,} frames ({share:.0%}), loss {cloning['loss']:.3f}, "
-                f"{rate:,.0f} frames/s, {left} left"
+                f"{rate:,.0f} frames/s, {left} left{more}"
             )
         success = row["episode"].get("success")
         words = "" if success is None else f"success {success:.0%}, "

@@ -99,8 +99,8 @@ class Trainer:
         self.data = TrainingData(request.dataset, config.data.filter)
         self.agent = make_agent(self.method, config)
         self.stages = self._schedule()
-        for single in {stage.single_room for stage in self.stages}:
-            self.data.episodes(single_room=single)  # refuses a dataset without any
+        for stage in self.stages:
+            self.data.episodes_of(stage)  # refuses a dataset without any
         self.ranks = distributed_context(device_of(request.device))
         local = self.ranks.share(config.ppo.num_envs, "ppo.num_envs")
         if len(local) % config.ppo.num_minibatches:
@@ -219,7 +219,7 @@ class Trainer:
         optimiser = torch.optim.Adam(learner.optimised(), stage.rate)
         source: Collector | Demonstrations = Collector(env, learner, seed)
         if stage.clones:
-            source = Demonstrations(env, learner, experts_of(self.data.episodes()))
+            source = Demonstrations(env, learner, experts_of(self.data.demonstrated))
         if self._checkpoint is not None and self.state.done:
             tensors, progress = self._checkpoint.training, self._checkpoint.progress
             source.state, episode_starts = unpack(
@@ -264,6 +264,7 @@ class Trainer:
         if state.done % config.sync_every == 0:
             self.agent.synchronise()
         row = {**found, "learning_rate": rate, "update": state.done, "updates": stage.updates}
+        row["without_expert"] = self.data.without_expert
         row["frames_per_s"] = rates(frames, [self.lap()] * 3)["steps_per_s"]
         return {"step": state.cloned_frames, "cloning": row}
 

@@ -53,7 +53,8 @@ def load_dataset(
         train, val or test; all of them if not given.
     filters : list of (column, operator, value), optional
         Episodes to keep, on top-level columns, as in `[("room_count", ">=", 4)]`: all must hold.
-        A list of such lists is a choice between them. Operators: = == != < > <= >= in, not in.
+        A list of such lists is a choice between them. Operators: = == != < > <= >= in, not in;
+        is and is not, with None, on nested columns too: `[("expert", "is not", None)]`.
     columns : list of str, optional
         Read these columns only: items are then dictionaries by column instead of `Episode`.
 

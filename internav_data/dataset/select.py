@@ -25,11 +25,14 @@ if TYPE_CHECKING:
 Condition = tuple[str, str, Any]
 Filters = Sequence[Condition] | Sequence[Sequence[Condition]]
 _CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=|!=|==|=|<|>)\s*(.+?)\s*")
+_NULL = re.compile(r"\s*(\w+)\s+(is|is\s+not)\s+null\s*", re.IGNORECASE)
+NULL_OPERATORS = ("is", "is not")
+"""Operators whose value is None, on columns of any kind."""
 _WORDS = {"true": True, "false": False}
 
 
 def condition(text: str) -> Condition:
-    """Read a condition as people write it: `room_count<=3` or `mode=blocked`.
+    """Read a condition as people write it: `room_count<=3`, `mode=blocked`, `expert is not null`.
 
     Raises
     ------
@@ -37,10 +40,21 @@ def condition(text: str) -> Condition:
         It is no condition.
 
     """
+    found = _NULL.fullmatch(text)
+    if found is not None:
+        return found[1], " ".join(found[2].lower().split()), None
     found = _CONDITION.fullmatch(text)
     if found is None:
-        raise UsageError(f"--filter {text!r}: expected COLUMN=VALUE, as in room_count<=3")
+        raise UsageError(
+            f"--filter {text!r}: expected COLUMN=VALUE or COLUMN is null, as in room_count<=3, "
+            "expert is not null"
+        )
     name, operator, word = found.groups()
+    if word.lower() in {"null", "none"}:
+        raise UsageError(
+            f"--filter {text!r}: nothing equals null: write '{name} is null' or "
+            f"'{name} is not null'"
+        )
     value: object = _WORDS.get(word.lower(), word)
     for kind in (float, int):
         try:
@@ -96,36 +110,56 @@ def matching_rows(store: Store, files: Sequence[DataFile], filters: Filters) -> 
         An unknown column or operator, or a value of another type.
 
     """
-    names = _names(filters)
-    table = read_columns(store, files, EPISODES, names)
-    rows = pa.array(np.arange(table.num_rows))
+    groups = _groups(filters)
+    table = read_columns(store, files, EPISODES, sorted({c[0] for g in groups for c in g}))
+    columns = {"row number": pa.array(np.arange(table.num_rows))}
+    for name, column in zip(table.column_names, table.columns, strict=True):
+        columns |= {name: column, _null_column(name): column.is_null()}
+    plain = [[_without_null(each) for each in group] for group in groups]
     try:
-        expression = pq.filters_to_expression(_plain(filters))
-        kept = table.append_column("row number", rows).filter(expression)
+        kept = pa.table(columns).filter(pq.filters_to_expression(plain))["row number"]
     except (ValueError, TypeError, pa.ArrowInvalid, pa.ArrowNotImplementedError) as error:
         raise UsageError(f"filters: {error}: expected as in [('room_count', '>=', 4)]") from error
-    numbers: NDArray[np.int64] = kept["row number"].to_numpy()
+    numbers: NDArray[np.int64] = kept.to_numpy()
     return numbers
 
 
-def _plain(filters: Filters) -> list[Any]:
-    return [tuple(f) if isinstance(f[0], str) else [tuple(c) for c in f] for f in filters]
+def _null_column(name: str) -> str:
+    return f"{name} is null"
 
 
-def _names(filters: Filters) -> list[str]:
+def _without_null(given: Condition) -> Condition:
+    """Return a condition that pyarrow knows: `is null` asks for a column of its own."""
+    name, operator, value = given
+    if operator in NULL_OPERATORS:
+        return _null_column(name), "==", operator == "is"
+    return name, operator, value
+
+
+def _groups(filters: Filters) -> list[list[Condition]]:
+    """Return filters as a choice of lists of conditions, checked but for types of values."""
     try:
-        groups: list[Any] = [[f] if isinstance(f[0], str) else list(f) for f in filters]
-        names = [str(name) for group in groups for name, _, _ in group]
+        given: Any = [filters] if filters and isinstance(filters[0][0], str) else filters
+        groups = [[(str(name), str(op), value) for name, op, value in group] for group in given]
     except (TypeError, ValueError, IndexError, KeyError) as error:
         raise UsageError(
             f"filters: expected (column, operator, value) as in [('room_count', '>=', 4)], "
             f"got {filters!r}"
         ) from error
-    if not names:
+    if not any(groups):
         raise UsageError("filters: expected at least one condition, got none: leave filters out")
-    check_columns(names, EPISODES)
+    check_columns([name for group in groups for name, _, _ in group], EPISODES)
     scalar = {f.name for f in EPISODES.node.fields if isinstance(f.node, Leaf)}
-    for name in names:
-        if name not in scalar:
-            raise UsageError(f"filters: {name} is nested: expected one of {sorted(scalar)}")
-    return sorted(set(names))
+    for name, operator, value in (each for group in groups for each in group):
+        if operator in NULL_OPERATORS or value is None:
+            if operator not in NULL_OPERATORS or value is not None:
+                raise UsageError(
+                    f"filters: ({name!r}, {operator!r}, {value!r}): expected "
+                    f"({name!r}, 'is', None) or ({name!r}, 'is not', None)"
+                )
+        elif name not in scalar:
+            raise UsageError(
+                f"filters: {name} is nested: expected 'is' or 'is not' None, or one of "
+                f"{sorted(scalar)}"
+            )
+    return groups

@@ -269,3 +269,40 @@ def test_an_episode_without_expert_is_refused(houses, config, monkeypatch):
     monkeypatch.setattr(Source, "episode", lambda *_: bare)
     with pytest.raises(UsageError, match="has no expert to clone"):
         experts_of(dataset)(bare.episode_id)
+
+
+def test_episodes_without_an_expert_are_skipped_and_counted(houses, config, tmp_path):
+    """One of a house's two episodes has none, as `--keep-unsolvable` leaves them."""
+    from internav_data.camp.logging import ProgressReporter
+    from internav_data.camp.run import begin
+    from internav_data.camp.train import Request
+    from internav_data.dataset import Identity, assemble, load_dataset, open_staging, stage_scene
+
+    given = load_dataset(houses)
+    whole = [dataclasses.replace(each, split="train") for each in given]
+    bare = [whole[0], *(dataclasses.replace(each, expert=None) for each in whole[1:])]
+
+    def clone(name, episodes):
+        folder = tmp_path / name
+        identity = Identity("made by hand", "1", 0, 1, "0" * 64, {})
+        store = open_staging(folder, identity)
+        for number, scene in enumerate(given.scene_ids):
+            own = [each for each in episodes if each.scene_id == scene]
+            house = dataclasses.replace(given.scene(scene), split="train")
+            stage_scene(store, number, house, own, redraws={})
+        assemble(folder, identity, tuple(given.assets.values()), len(given.scene_ids))
+        sizes = {"frames": 16, "epochs": 1, "num_envs": 2, "num_steps": 8}
+        settings_of = config(cloning=sizes, run={"tensorboard": False, "max_steps": 200})
+        rows, reporter = [], ProgressReporter()
+        request = Request(
+            folder, tmp_path / "run" / name, "ppo", settings_of, (), clones=True,
+            callback=lambda row: (rows.append(row), reporter(row)),
+        )  # fmt: skip
+        begin(request)
+        return rows[-1]["cloning"], reporter.line()
+
+    row, line = clone("some", bare)
+    assert row["without_expert"] == len(bare) - 1
+    assert f"{len(bare) - 1} episodes without an expert skipped" in line
+    with pytest.raises(UsageError, match=r"none of .* training episodes has an expert"):
+        clone("none", [dataclasses.replace(each, expert=None) for each in bare])

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from internav_data.dataset import EPISODES, load_dataset, locate, read_manifest
 from internav_data.dataset import from_table as records_of
+from internav_data.dataset.select import condition
 from internav_data.records import Episode, House
 from internav_data.records.errors import UsageError
 
@@ -97,6 +98,19 @@ def test_a_choice_of_conditions(ds, everything):
     assert list(kept) == [episode for episode in everything if episode.index in (0, 3)]
 
 
+def test_null_is_selected_in_plain_and_in_nested_columns(ds, everything):
+    for name in ("obstructed_path_m", "obstacles"):
+        kept = load_dataset(ds.path, filters=[(name, "is", None)])
+        rest = load_dataset(ds.path, filters=[(name, "is not", None), ("index", "<", 3)])
+        assert list(kept) == [e for e in everything if getattr(e, name) is None]
+        assert list(rest) == [e for e in everything if getattr(e, name) is not None and e.index < 3]
+    assert condition(" expert IS  not Null ") == ("expert", "is not", None)
+    assert condition("obstructed_path_m is null") == ("obstructed_path_m", "is", None)
+    for text in ("expert = null", "expert!=None", "expert is", "expert is 3"):
+        with pytest.raises(UsageError, match="is null"):
+            condition(text)
+
+
 @pytest.mark.parametrize(
     "filters",
     [
@@ -106,6 +120,9 @@ def test_a_choice_of_conditions(ds, everything):
         [("obstacles", "==", 1)],
         [],
         [("room_count", ">")],
+        [("room_count", ">", 1), [("index", "==", 0)]],
+        [("obstructed_path_m", "==", None)],
+        [("expert", "is", 3)],
         "room_count > 4",
         [7],
     ],
