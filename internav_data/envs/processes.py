@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
-import multiprocessing
+import mmap
+import os
+import sys
+import tempfile
 import weakref
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium.vector import VectorEnv
 
-from internav_data.core.processes import become_child
+from internav_data.core.main_module import dumped, loaded
+from internav_data.core.processes import GRACE_S, Child
 from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.envs.slot import EpisodeSnapshot, check_options, task_names
 from internav_data.envs.spaces import buffer_shapes
@@ -25,9 +30,8 @@ from internav_data.envs.vector import (
 from internav_data.records.errors import InternavError, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from multiprocessing.connection import Connection
-    from multiprocessing.process import BaseProcess
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -37,34 +41,50 @@ if TYPE_CHECKING:
     from internav_data.envs.types import Observations, Stepped
     from internav_data.records import Episode
 
+ALIGNMENT = 64
+"""Bytes at a multiple of which each buffer begins in shared memory."""
+
 
 def _arrays(
-    memory: dict[str, Any], count: int, size: int, sensors: Sequence[str | Sensor]
+    memory: mmap.mmap, count: int, size: int, sensors: Sequence[str | Sensor]
 ) -> Observations:
     """Return views of shared memory as the buffers of a batch."""
-    return {
-        name: np.frombuffer(memory[name], dtype).reshape(shape)
-        for name, (shape, dtype) in buffer_shapes(count, size, sensors).items()
-    }
+    buffers, offset = {}, 0
+    for name, (shape, dtype) in buffer_shapes(count, size, sensors).items():
+        length = math.prod(shape)
+        buffers[name] = np.frombuffer(memory, dtype, length, offset).reshape(shape)
+        offset = _aligned(offset + buffers[name].nbytes)
+    return buffers
 
 
-def _serve(
-    pipe: Connection,
-    memory: dict[str, Any],
-    count: int,
-    rows: tuple[int, int],
-    arguments: dict[str, Any],
-) -> None:
+def _memory_size(count: int, size: int, sensors: Sequence[str | Sensor]) -> int:
+    """Return the bytes of a batch's buffers; at least 1, as no empty file can be mapped."""
+    shapes = buffer_shapes(count, size, sensors).values()
+    return sum(_aligned(math.prod(shape) * np.dtype(dtype).itemsize) for shape, dtype in shapes) + 1
+
+
+def _aligned(size: int) -> int:
+    return -(-size // ALIGNMENT) * ALIGNMENT
+
+
+@contextlib.contextmanager
+def _shared_file(size: int) -> Iterator[int]:
+    """Yield the descriptor of a file without a name that lies in memory where the system can."""
+    linux = sys.platform == "linux"
+    name = "internav-observations"
+    with os.fdopen(os.memfd_create(name), "r+b") if linux else tempfile.TemporaryFile() as file:
+        file.truncate(size)
+        yield file.fileno()
+
+
+def serve(pipe: Connection[Any, Any]) -> None:
     """Serve requests from a pipe until it asks to close: the main function of a process.
 
-    A request is (method, (arguments, keyword arguments)); an answer is (True, result) or
-    (False, error).
+    The first message holds the arguments. A request is (method, (arguments, keyword arguments));
+    an answer is (True, result) or (False, error).
     """
-    become_child()
     try:
-        whole = _arrays(memory, count, arguments["image_size"], arguments["sensors"])
-        own = {name: array[rows[0] : rows[1]] for name, array in whole.items()}
-        env = InterNavVectorEnv(rows[1] - rows[0], copy=False, buffers=own, **arguments)
+        env = _environments(*loaded(*pipe.recv()))
         pipe.send((True, None))
         while True:
             name, given = pipe.recv()
@@ -77,15 +97,28 @@ def _serve(
                 continue
             # Observations lie in the shared memory already: only the rest goes through the pipe.
             pipe.send((True, answer if name == "state" else answer[1:]))
-    except EOFError:
-        return
+    except (EOFError, BrokenPipeError, ConnectionResetError):
+        raise
     except Exception as error:  # noqa: BLE001 - the parent raises it
         pipe.send((False, error))
 
 
-def _kill(processes: Sequence[BaseProcess]) -> None:
+def _environments(
+    descriptor: int, count: int, rows: tuple[int, int], arguments: dict[str, Any]
+) -> InterNavVectorEnv:
+    """Return environments that write into some rows of a batch's buffers in a shared file."""
+    size, sensors = arguments["image_size"], arguments["sensors"]
+    memory = mmap.mmap(descriptor, _memory_size(count, size, sensors))
+    os.close(descriptor)
+    whole = _arrays(memory, count, size, sensors)
+    own = {name: array[rows[0] : rows[1]] for name, array in whole.items()}
+    return InterNavVectorEnv(rows[1] - rows[0], copy=False, buffers=own, **arguments)
+
+
+def _kill(processes: Sequence[Child]) -> None:
     for process in processes:
-        process.kill()
+        process.end(0.0)
+        process.close()
 
 
 def concatenate_infos(parts: Sequence[dict[str, Any]], counts: Sequence[int]) -> dict[str, Any]:
@@ -126,13 +159,11 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
         Arguments of `InterNavVectorEnv`; a loaded dataset is opened again in each process.
     workers
         Number of processes, at most one for each environment.
-    context
-        Start method of the processes: "spawn", "forkserver" or "fork".
 
     Raises
     ------
     UsageError
-        An argument is out of its bounds or unknown.
+        An argument is out of its bounds or unknown, or cannot be sent to another process.
     """
 
     def __init__(
@@ -145,40 +176,37 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
         autoreset: bool = True,
         copy: bool = True,
         sensors: Sequence[str | Sensor] = DEFAULT_SENSORS,
-        context: str = "spawn",
         **arguments: Any,  # noqa: ANN401 - those of `InterNavVectorEnv`
     ) -> None:
         if not 1 <= workers <= num_envs:
             raise UsageError(f"workers: expected 1 … {num_envs} (num_envs), got {workers}")
         declare_spaces(self, num_envs, image_size, sensors, autoreset=autoreset)
         self._copy = copy
-        start = multiprocessing.get_context(context)
-        # No locks: each process writes rows of its own, and only before it answers.
-        memory = {
-            name: start.RawArray("B", math.prod(shape) * np.dtype(dtype).itemsize)
-            for name, (shape, dtype) in buffer_shapes(num_envs, image_size, sensors).items()
-        }
-        self._buffers = _arrays(memory, num_envs, image_size, sensors)
         given = dict(arguments, dataset=dataset, image_size=image_size, autoreset=autoreset)
         given["sensors"], tasks = sensors, task_names(arguments, num_envs)
         bounds = [num_envs * k // workers for k in range(workers + 1)]
         self._rows = list(itertools.pairwise(bounds))
         self._counts = [high - low for low, high in self._rows]
-        self._pipes, self._processes = [], []
-        for rows in self._rows:
-            here, there = start.Pipe()
-            process = start.Process(  # type: ignore[attr-defined] # every context has it
-                target=_serve,
-                args=(there, memory, num_envs, rows, {**given, "task": tasks[slice(*rows)]}),
-                daemon=True,
-            )
-            process.start()
-            there.close()
-            self._pipes.append(here)
-            self._processes.append(process)
-        # Environments that nobody closes: multiprocessing would send them SIGTERM, and wait.
-        weakref.finalize(self, _kill, self._processes)
-        self._answers()
+        self._processes: list[Child] = []
+        # Environments that nobody closes, or that cannot be made.
+        self._end = weakref.finalize(self, _kill, self._processes)
+        # No locks: each process writes rows of its own, and only before it answers.
+        size = _memory_size(num_envs, image_size, sensors)
+        with _shared_file(size) as fd:
+            self._buffers = _arrays(mmap.mmap(fd, size), num_envs, image_size, sensors)
+            shares = [
+                dumped((fd, num_envs, rows, {**given, "task": tasks[slice(*rows)]}))
+                for rows in self._rows
+            ]
+            for _ in shares:
+                self._processes.append(Child(serve, quiet=False, pass_fds=[fd]))
+        for process, share in zip(self._processes, shares, strict=True):
+            process.send(share)
+        try:
+            self._answers()
+        except BaseException:
+            self._end()
+            raise
 
     def reset(
         self,
@@ -231,7 +259,7 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
 
     def state(self) -> tuple[EpisodeSnapshot, ...]:
         """Return a snapshot of each environment."""
-        for k in range(len(self._pipes)):
+        for k in range(len(self._processes)):
             self._ask(k, "state")
         return tuple(state for states in self._answers() for state in states)
 
@@ -252,18 +280,14 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
 
     def close_extras(self, **_: Any) -> None:  # noqa: ANN401 - Gymnasium's signature
         """Stop the processes."""
-        for k in range(len(self._pipes)):
+        for k in range(len(self._processes)):
             self._ask(k, "close")
         for process in self._processes:
-            process.join(5.0)
-            if process.is_alive():
-                process.kill()
+            process.end(GRACE_S)
+        self._end()
 
     def _ask(self, k: int, name: str, *given: Any, **named: Any) -> None:  # noqa: ANN401 - of any method
-        try:
-            self._pipes[k].send((name, (given, named)))
-        except OSError:
-            return  # it died: `_answers` raises
+        self._processes[k].send((name, (given, named)))
 
     def _answers(self, of: Sequence[int] | None = None) -> list[Any]:
         """Return the answers of some processes, or raise the first error.
@@ -272,21 +296,22 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
         """
         answers: list[Any] = []
         errors: list[Exception] = []
-        for k in range(len(self._pipes)) if of is None else of:
+        for k in range(len(self._processes)) if of is None else of:
             try:
-                good, answer = self._pipes[k].recv()
+                good, answer = self._processes[k].pipe.recv()
             except (EOFError, OSError):
-                good, answer = (
-                    False,
-                    InternavError(
-                        f"InterNav: process {k} of {len(self._pipes)} died (out of memory?); "
-                        "make the environment again, with fewer workers or num_envs"
-                    ),
-                )
+                good, answer = False, InternavError(self._death(k))
             (answers if good else errors).append(answer)
         if errors:
             raise errors[0]
         return answers
+
+    def _death(self, k: int) -> str:
+        return (
+            f"environments: process {k + 1} of {len(self._processes)} "
+            f"{self._processes[k].exit_cause()}; make the environment again, with fewer workers or "
+            "num_envs"
+        )
 
     def _observations(self) -> Observations:
         if not self._copy:

@@ -11,13 +11,13 @@ import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
-from internav_data.generation.worker_pool import WorkerPool
+from internav_data.core.worker_pool import WorkerPool
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Mapping
 
-    from internav_data.generation.messages import Done, Failed, Recipe
+    from internav_data.core.messages import Done, Failed, Recipe
 
 DEFAULT_EXECUTOR: Final = "local"
 
@@ -51,7 +51,9 @@ class Executor(Protocol):
         Raises
         ------
         InternavError
-            Nothing can be done any more: setup failed, or the disk is full or read-only.
+            Nothing can be done any more: setup failed.
+        OSError
+            The same: a disk is full or read-only.
 
         """
         ...

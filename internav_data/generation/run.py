@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from internav_data.core.interrupts import InterruptedRunError, Interrupts
+from internav_data.core.messages import Done, Failed, Recipe
 from internav_data.core.storage import FolderStore
 from internav_data.dataset import (
     STAGING,
@@ -28,7 +29,6 @@ from internav_data.dataset import (
 )
 from internav_data.generation.config import GenerationConfig
 from internav_data.generation.executors import DEFAULT_EXECUTOR, Executor, get_executor
-from internav_data.generation.messages import Done, Failed, Recipe
 from internav_data.generation.progress import GenerationProgress
 from internav_data.generation.report import Report, report_of
 from internav_data.generation.rules import source_digest
@@ -318,7 +318,8 @@ def _disk_errors(out: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
+        where = error.filename or out
         raise InternavError(
-            f"cannot write to {out}: {error.strerror or error}; make it writable or free some "
+            f"cannot write to {where}: {error.strerror or error}; make it writable or free some "
             "space, then run the same command again: finished scenes are kept"
         ) from error

@@ -69,7 +69,7 @@ def build_scene(
             reason = str(error)
         else:
             return Scene(house, made.episodes, attempt + 1, made.redraws)
-    raise QuarantineError(reason)
+    raise QuarantineError(reason, ATTEMPTS)
 
 
 def obstacle_pool(catalogue: Catalogue, config: GenerationConfig, split: Split) -> Sequence[Asset]:

@@ -29,6 +29,11 @@ class QuarantineError(InternavError):
 
     exit_code: ClassVar[int] = 4
 
+    def __init__(self, message: str, attempts: int = 1) -> None:
+        super().__init__(message)
+        self.attempts = attempts
+        """Number of tries that failed."""
+
 
 class CorruptDataError(InternavError):
     """File that is damaged, edited, missing or of a version that this release cannot read."""

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any
 
-from internav_data.core.processes import become_child
+from internav_data.core.messages import Failed, Recipe
+from internav_data.core.worker_pool import WorkerPool
 from internav_data.dataset import ASSETS, EPISODES, SCENES, from_table, read_table
 from internav_data.dataset.parquet import open_parquet, read_group
 from internav_data.records import LoaderStream, Purpose, generator
-from internav_data.records.errors import UsageError
+from internav_data.records.errors import InternavError, UsageError
 from internav_data.verification.checked_config import CheckedConfig, checked_config
 from internav_data.verification.files import check_file, check_listing, check_manifest
 from internav_data.verification.findings import LEVELS, FindingCollector, Findings, Level, join
@@ -80,8 +78,7 @@ def validate(
         Number of scenes whose geometry and physics are checked, drawn from the dataset's seed;
         None for all.
     workers
-        Processes for geometry and physics. With more than one, a script that calls this needs the
-        usual `if __name__ == "__main__":`.
+        Processes for geometry and physics.
     progress
         Called with the level, the number of units done and the total.
 
@@ -96,6 +93,8 @@ def validate(
         No such folder, level, sample or number of workers.
     CorruptDataError
         The folder holds no finished dataset.
+    InternavError
+        Some scenes could not be checked: their worker processes died again and again.
 
     """
     _check_arguments(level, sample, workers)
@@ -170,13 +169,36 @@ def _check_scenes(
 
 
 def _check_units(units: Sequence[Unit], workers: int) -> Iterator[FindingCollector]:
-    """Yield the findings of each unit, in order."""
+    """Yield the findings of each unit, in order.
+
+    Raises
+    ------
+    InternavError
+        A unit could not be checked: its worker died again and again, or met a bug.
+    """
     if workers == 1 or len(units) == 1:
         yield from map(check_unit, units)
         return
-    spawn, count = get_context("spawn"), min(workers, len(units))
-    with ProcessPoolExecutor(count, spawn, become_child, (os.getpid(),)) as pool:
-        yield from pool.map(check_unit, units)
+    waiting: dict[int, FindingCollector] = {}
+    following = 0
+    with WorkerPool(min(workers, len(units)), Recipe(_unit_checker, tuple(units))) as pool:
+        for result in pool.run(range(len(units))):
+            if isinstance(result, Failed):
+                raise InternavError(_unchecked(units[result.task], result.reason))
+            waiting[result.task] = result.value
+            while following in waiting:
+                yield waiting.pop(following)
+                following += 1
+
+
+def _unit_checker(units: Sequence[Unit]) -> Callable[[int], FindingCollector]:
+    """Set a worker up: return a function that checks the unit of a number."""
+    return lambda number: check_unit(units[number])
+
+
+def _unchecked(unit: Unit, reason: str) -> str:
+    first, last = unit.shard_refs[0].scene_id, unit.shard_refs[-1].scene_id
+    return f"{unit.root}: {first} … {last} could not be checked: {reason}"
 
 
 def _shard_refs(root: Path, manifest: Manifest, damaged: frozenset[str]) -> list[ShardRef]:

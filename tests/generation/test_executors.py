@@ -9,6 +9,8 @@ import pytest
 import worker_stubs
 from scene_stubs import CATALOGUE, stub
 
+from internav_data.core.messages import Done, Fatal, Recipe
+from internav_data.core.worker import run_task
 from internav_data.generation.config import load_config
 from internav_data.generation.executors import (
     EXECUTORS,
@@ -17,9 +19,7 @@ from internav_data.generation.executors import (
     cores,
     get_executor,
 )
-from internav_data.generation.messages import Done, Fatal, Recipe
 from internav_data.generation.run import generate
-from internav_data.generation.worker import run_task
 from internav_data.records.errors import InternavError, QuarantineError, UsageError
 
 CONFIG = load_config(overrides=["episodes_per_scene=3"])

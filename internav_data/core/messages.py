@@ -1,4 +1,4 @@
-"""Messages between a run and its workers. Plain data: they travel pickled."""
+"""Messages between a worker pool and its workers. Plain data: they travel pickled."""
 
 from __future__ import annotations
 
@@ -64,14 +64,20 @@ class Failed:
 
 @dataclass(frozen=True, slots=True)
 class Fatal:
-    """Error that ends the run: setup failed, or the disk is full or read-only."""
+    """Error that ends the run: setup failed, or a file cannot be read or written."""
 
     kind: str
     """Class name of the error."""
     reason: str
+    errno: int | None = None
+    """Number of an OSError."""
+    filename: str | None = None
+    """File of an OSError."""
 
-    def error(self) -> InternavError:
+    def error(self) -> InternavError | OSError:
         """Return the error that the worker met."""
+        if self.kind == "OSError":
+            return OSError(self.errno or 0, self.reason, self.filename)
         return _KINDS.get(self.kind, InternavError)(self.reason)
 
 

@@ -2,42 +2,24 @@
 
 from __future__ import annotations
 
-import atexit
-import faulthandler
 import os
 import time
 import traceback
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from internav_data.core.processes import become_child
-from internav_data.generation.messages import Done, Failed, Fatal, Ready
-from internav_data.generation.scenes import ATTEMPTS
+from internav_data.core.messages import Done, Failed, Fatal, Ready
 from internav_data.records.errors import InternavError, QuarantineError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from multiprocessing.connection import Connection
 
-    from internav_data.generation.messages import Recipe
-
-
-def main(fd: int, parent: int) -> None:
-    """Serve the socket `fd` of a process until its other end closes."""
-    become_child(parent)
-    faulthandler.enable()  # a crash in native code leaves its name on stderr
-    with Connection(fd) as pipe:
-        try:
-            _serve(pipe)
-        except (EOFError, BrokenPipeError, ConnectionResetError):
-            # The parent is gone or has closed the pipe: nothing is left to do but to tidy up, as
-            # `multiprocessing` does. Skipping the interpreter's own shutdown ends the process
-            # without waiting for libraries' threads.
-            atexit._run_exitfuncs()  # noqa: SLF001 - has no public name
-            os._exit(0)
+    from internav_data.core.messages import Recipe
 
 
-def _serve(pipe: Connection[Any, Any]) -> None:
+def serve(pipe: Connection[Any, Any]) -> None:
+    """Do the tasks that come through a pipe until its other end closes."""
     recipe: Recipe = pipe.recv()
     began = time.perf_counter()
     try:
@@ -61,16 +43,12 @@ def run_task(work: Callable[[Any], Any], task: Any) -> Done | Failed | Fatal:  #
     try:
         return Done(task, work(task))
     except QuarantineError as error:
-        return Failed(task, str(error), ATTEMPTS)
+        return Failed(task, str(error), error.attempts)
     except InternavError as error:
         return Fatal(type(error).__name__, str(error))
     except OSError as error:
-        where = f" ({error.filename})" if error.filename else ""
-        return Fatal(
-            "InternavError",
-            f"cannot write: {error.strerror or error}{where}; make room for the dataset, then "
-            "run the same command again: finished scenes are kept",
-        )
+        named = None if error.filename is None else str(error.filename)
+        return Fatal("OSError", error.strerror or str(error), error.errno, named)
     except MemoryError:
         os._exit(1)  # a new process may have more luck: the parent tries again
     except Exception as error:  # noqa: BLE001 - any error must reach the parent

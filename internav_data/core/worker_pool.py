@@ -1,90 +1,49 @@
 """Worker processes, each on a pipe: one that dies costs one retry of its task.
 
-A `ProcessPoolExecutor` fails all pending work when one of its processes dies, and multiprocessing's
-spawn runs the caller's `__main__` again. Workers here are plain interpreters that receive the
-function to import over a socket; they see the socket close when this process dies, and end.
+A `ProcessPoolExecutor` fails all pending work when one of its processes dies.
 """
 
 from __future__ import annotations
 
-import os
-import signal
-import socket
-import subprocess
-import sys
-import tempfile
 import time
 from collections import Counter, deque
-from multiprocessing.connection import Connection, wait
-from pathlib import Path
+from multiprocessing.connection import wait
 from typing import TYPE_CHECKING, Any, Self
 
+from internav_data.core.messages import Done, Failed, Fatal, Ready, WorkerExited
+from internav_data.core.processes import GRACE_S, Child
 from internav_data.core.storage import held_locks
-from internav_data.generation.messages import Done, Failed, Fatal, Ready, WorkerExited
+from internav_data.core.worker import serve
 from internav_data.records.errors import InternavError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
     from types import TracebackType
 
-    from internav_data.generation.messages import Message, Recipe
+    from internav_data.core.messages import Message, Recipe
 
 MAX_CRASHES = 3
 """Crashes of its workers after which a task is given up."""
 MAX_FALSE_STARTS = 3
 """Workers that die in a row before they are ready, after which none can start."""
-GRACE_S = 5.0
-"""Seconds that workers have to finish their tasks after an interruption."""
 TICK_S = 0.25
 """Longest time between two calls of `tick`, seconds."""
-SINGLE_THREADED = dict.fromkeys(
-    (
-        "OMP_NUM_THREADS",
-        "OPENBLAS_NUM_THREADS",
-        "MKL_NUM_THREADS",
-        "NUMEXPR_NUM_THREADS",
-        "NUMBA_NUM_THREADS",
-        "OPENCV_FOR_THREADS_NUM",
-    ),
-    "1",
-)
-"""Environment of a worker: one thread a process, as processes share the cores already."""
 
 
 class CannotStartError(InternavError):
     """Worker processes end before they are ready."""
 
 
-class _Worker:
-    """One process, its pipe and the task it holds."""
+class _Worker(Child):
+    """One process and the task it holds."""
 
     def __init__(self, recipe: Recipe) -> None:
-        ours, theirs = socket.socketpair()
-        self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
-        with theirs:
-            fd = theirs.fileno()
-            entry = f"from internav_data.generation.worker import main; main({fd}, {os.getpid()})"
-            self.process = subprocess.Popen(  # noqa: S603 - our own interpreter and words
-                [sys.executable, "-c", entry],
-                env=_environment(),
-                pass_fds=(fd, *held_locks()),  # one that outlives us keeps its folder locked
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,  # Bullet greets on stdout
-                stderr=self._stderr,
-                process_group=0,  # Ctrl-C is for the parent, which ends its workers in order
-            )
-        self.pipe: Connection[Any, Any] = Connection(ours.detach())
+        # One that outlives us keeps its folder locked.
+        super().__init__(serve, pass_fds=held_locks())
         self.ready = False
         self.task: Any = None
         self.busy = False
         self.send(recipe)
-
-    def send(self, message: object) -> None:
-        """Send a recipe or a task; a worker that has just died is noticed when its pipe is read."""
-        try:
-            self.pipe.send(message)
-        except (BrokenPipeError, ConnectionResetError):
-            return
 
     def begin(self, task: object) -> None:
         self.task, self.busy = task, True
@@ -95,39 +54,8 @@ class _Worker:
         try:
             message: Message = self.pipe.recv()
         except (EOFError, ConnectionResetError):
-            return WorkerExited(self._exit_cause())
+            return WorkerExited(f"its worker {self.exit_cause()}")
         return message
-
-    def _exit_cause(self) -> str:
-        try:
-            code = self.process.wait(timeout=GRACE_S)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            code = self.process.wait()
-        return _cause(code, self.last_stderr_line())
-
-    def last_stderr_line(self) -> str:
-        """Return the last line that the process wrote to stderr."""
-        self._stderr.seek(0)
-        lines = self._stderr.read().decode(errors="replace").strip().splitlines()
-        return lines[-1].strip() if lines else ""
-
-    def close(self) -> None:
-        self.pipe.close()
-        self._stderr.close()
-
-
-def _environment() -> dict[str, str]:
-    path = os.pathsep.join(entry or str(Path.cwd()) for entry in sys.path)
-    return os.environ | SINGLE_THREADED | {"PYTHONPATH": path}
-
-
-def _cause(code: int, stderr_line: str) -> str:
-    if code < 0:
-        name = signal.Signals(-code).name
-        hint = "; the system may be short of memory" if name == "SIGKILL" else ""
-        return f"its worker was killed by {name}{hint}"
-    return f"its worker ended with code {code}" + (f": {stderr_line}" if stderr_line else "")
 
 
 class WorkerPool:
@@ -161,11 +89,7 @@ class WorkerPool:
             worker.pipe.close()  # an idle worker sees this and ends
         deadline = time.monotonic() + (GRACE_S if kind is None else 0.0)
         for worker in self._workers:
-            try:
-                worker.process.wait(timeout=max(0.0, deadline - time.monotonic()))
-            except subprocess.TimeoutExpired:
-                worker.process.kill()
-                worker.process.wait()
+            worker.end(deadline - time.monotonic())
             worker.close()
         self._workers.clear()
 
@@ -185,8 +109,9 @@ class WorkerPool:
         Raises
         ------
         InternavError
-            A worker's setup failed, or the disk is full; `CannotStartError` when workers die
-            before they are ready.
+            A worker's setup failed; `CannotStartError` when workers die before they are ready.
+        OSError
+            A worker cannot read or write a file, as when the disk is full.
 
         """
         todo, crashes = deque(tasks), Counter[Any]()

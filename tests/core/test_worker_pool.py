@@ -1,12 +1,13 @@
+import errno
 import os
 import time
 
 import pytest
 import worker_stubs
 
-from internav_data.generation.messages import Done, Failed, Recipe
-from internav_data.generation.worker_pool import CannotStartError, WorkerPool
-from internav_data.records.errors import InternavError, UsageError
+from internav_data.core.messages import Done, Failed, Recipe
+from internav_data.core.worker_pool import CannotStartError, WorkerPool
+from internav_data.records.errors import UsageError
 
 
 def outcomes(recipe, tasks, size=2):
@@ -60,9 +61,9 @@ def test_workers_that_cannot_start_end_the_run():
 
 
 def test_a_full_disk_ends_the_run():
-    with pytest.raises(InternavError, match=r"No space left on device \(/data/1\)") as caught:
+    with pytest.raises(OSError, match="No space left on device") as caught:
         outcomes(Recipe(worker_stubs.full_disk, None), [1])
-    assert caught.value.exit_code == 1
+    assert (caught.value.errno, caught.value.filename) == (errno.ENOSPC, "/data/1")
 
 
 def test_after_a_stop_only_running_tasks_end(tmp_path):

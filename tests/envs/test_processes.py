@@ -1,0 +1,96 @@
+"""Environments in processes of their own: how they start and end."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+
+import psutil
+import pytest
+from gymnasium.spaces import Box
+
+from internav_data.envs import InterNavProcesses, Sensor
+from internav_data.records.errors import InternavError, UsageError
+
+LIMIT_S = 120.0
+SCRIPT = """
+import sys
+import gymnasium, numpy as np
+from internav_data.envs import InterNavProcesses, Sensor
+{own}
+env = InterNavProcesses(2, sys.argv[1], 2, 16{more})
+print(sorted(env.reset(seed=1)[0]), flush=True)
+{then}
+"""
+OWN = """
+def space(size):
+    return gymnasium.spaces.Box(0.0, 1.0, (1,), np.float32)
+def write(run, frames, out):
+    out[...] = 1.0
+"""
+MORE = ', sensors=["goal", Sensor("mine", space, write)]'
+
+
+def script(tmp_path, small, own="", more="", then=""):
+    path = tmp_path / "script.py"
+    path.write_text(SCRIPT.format(own=own, more=more, then=then))
+    return [sys.executable, str(path), str(small)]
+
+
+def ran(words):
+    return subprocess.run(words, capture_output=True, text=True, check=False, timeout=LIMIT_S)
+
+
+def test_a_script_needs_no_main_guard_and_ends_without_closing(tmp_path, small):
+    done = ran(script(tmp_path, small))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "'rgb'" in done.stdout
+
+
+def test_a_scripts_own_sensors_need_the_guard_and_it_is_asked_for(tmp_path, small):
+    words = script(tmp_path, small, OWN, MORE)
+    done = ran(words)
+    assert done.returncode == 1
+    assert 'below `if __name__ == "__main__":`' in done.stderr.splitlines()[-1]
+    path = tmp_path / "script.py"
+    head, tail = path.read_text().split("env = ")
+    body = textwrap.indent(f"env = {tail}", "    ")
+    path.write_text(f'{head}\nif __name__ == "__main__":\n{body}\n')
+    done = ran(words)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "['goal', 'mine']\n", "")
+
+
+def test_what_cannot_be_sent_is_refused(small):
+    sensor = Sensor("mine", lambda _: Box(0.0, 1.0, (1,)), lambda *_: None)
+    with pytest.raises(UsageError, match="cannot be sent to another process"):
+        InterNavProcesses(2, small, 2, 16, sensors=[sensor])
+
+
+def children(process):
+    return psutil.Process(process.pid).children()
+
+
+@pytest.mark.parametrize("signum", [signal.SIGKILL, signal.SIGTERM])
+def test_processes_end_with_a_script_that_is_killed(tmp_path, small, signum):
+    words = script(tmp_path, small, then="sys.stdin.read()")
+    parent = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert parent.stdout.readline()
+    processes = children(parent)
+    assert len(processes) == 2
+    parent.send_signal(signum)
+    assert parent.wait(LIMIT_S) == -signum
+    assert psutil.wait_procs(processes, LIMIT_S)[1] == []
+
+
+def test_a_process_that_is_killed_is_named(small):
+    env = InterNavProcesses(2, small, 2, 16)
+    env.reset(seed=1)
+    second = max(psutil.Process(os.getpid()).children(), key=lambda child: child.pid)
+    second.kill()
+    with pytest.raises(InternavError, match="process 2 of 2 was killed by SIGKILL"):
+        env.step([0, 0])
+    began = time.monotonic()
+    env.close()
+    assert time.monotonic() - began < LIMIT_S
