@@ -39,6 +39,7 @@ Examples:
   camp-train data/mine --filter "shortest_path_m<=6" --set run.max_steps=200
   camp-train --dry-run                                    how long it would take
   camp-train --out runs/camp-0 --resume                   go on after Ctrl-C
+  camp-train --out runs/camp-0 --resume --steps 600000    more steps, for the last stage
   camp-train --print-config > mine.toml                   all settings, to be changed
   torchrun --nproc-per-node 2 -m internav_cli.camp_train data/mine   several GPUs
 
@@ -76,7 +77,12 @@ interrupted.""",
     help="One setting, as in --set ppo.num_steps=32; wins over the file.  [repeatable]",
 )
 @click.option("--seed", type=int, help="Every random number derives from it.  [default: 0]")
-@click.option("--steps", type=int, help="Environment steps of all stages together.")
+@click.option(
+    "--steps",
+    type=int,
+    help="Environment steps of all stages together; with --resume, those above the run's go to its "
+    "last stage.",
+)
 @click.option(
     "--filter",
     "conditions",
@@ -101,11 +107,20 @@ interrupted.""",
     help="Intent input of the global policy (Table 4).  [default: integrated]",
 )
 @click.option("--sync-every", type=int, help="Rollouts between copies of global.  [default: 3]")
-@click.option("--workers", type=int, help="Processes that step environments.  [default: none]")
+@click.option(
+    "--workers",
+    type=int,
+    help="Processes that step environments; they change no number.  [default: none]",
+)
 @click.option(
     "--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto", show_default=True
 )
-@click.option("--resume", is_flag=True, help="Go on from the last checkpoint of --out.")
+@click.option(
+    "--resume",
+    is_flag=True,
+    help="Go on from the last checkpoint of --out: with one thread, to the bits of an unbroken "
+    "run, whatever --workers. Steps, workers, threads and intervals may change.",
+)
 @click.option("--dry-run", is_flag=True, help="Tell how long it would take; write nothing.")
 @click.option("--print-config", is_flag=True, help="Print all settings as TOML and stop.")
 @renamed_option("--init-from", "--pretrain bc")
@@ -199,13 +214,16 @@ def _train(request: Request, given: dict[str, Any]) -> int:
 
 def _asked(given: dict[str, Any], request: Request) -> dict[str, Any]:
     """Return what was asked for besides --resume, to be compared with the run."""
-    from internav_data.core.config import keys_given
+    from internav_data.camp.run import CHANGEABLE
+    from internav_data.core.config import keys_given, known_keys
 
     keys = keys_given(given["config_file"], given["overrides"], _settings(given))
+    if given["preset"]:
+        keys += [key for key in known_keys(request.config) if key not in CHANGEABLE]
     return {
         "method": given["method"],
-        "config": request.config if keys or given["preset"] else None,
-        "keys": None if given["preset"] else keys,
+        "config": request.config if keys else None,
+        "keys": keys,
         "clones": request.clones,
         "parts": request.parts if given["stages"] else None,
     }

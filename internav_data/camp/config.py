@@ -146,6 +146,9 @@ class StagesConfig:
 
     total_timesteps: Annotated[int, Bounds(1)] = 300_000
     """Number of environment steps of all stages together, the same for every method."""
+    extra_timesteps: Annotated[int, Bounds(0)] = 0
+    """Number of environment steps on top, all in the last stage: `--resume` with more `--steps`
+    sets it, and leaves the stages before as long as they were."""
     auxiliary_share: Annotated[float, Bounds(0.0, 1.0)] = 0.1
     """Share of the steps in the three auxiliary tasks; for flat methods, on the main task in
     single rooms."""

@@ -10,15 +10,22 @@ from pathlib import Path
 from typing import Any, Final
 
 from internav_data.camp.checkpoint import TrainState, has_checkpoint, read
-from internav_data.camp.config import CampConfig
+from internav_data.camp.config import CampConfig, from_mapping
 from internav_data.camp.logging import LOG
+from internav_data.camp.stages import PARTS
 from internav_data.camp.train import Request, Trainer
-from internav_data.core.config import config_toml, known_keys, plain
+from internav_data.core.config import config_toml, known_keys, nested, plain
 from internav_data.core.storage import write_atomically
 from internav_data.records.errors import UsageError
 
 CONFIG: Final = "config.toml"
 """File of a run's resolved settings, for people and for `--config`."""
+CHANGEABLE: Final = (
+    "stages.total_timesteps", "run.threads", "run.workers", "run.checkpoint_every",
+    "run.validate_every", "run.tensorboard", "data.house_cache_size",
+)  # fmt: skip
+"""Settings that a resumed run may change. More steps go to its last stage."""
+_TOTAL, _EXTRA = "stages.total_timesteps", "stages.extra_timesteps"
 _MEASURED: Final = 2
 """Updates that a forecast is made of, after one that warms up."""
 
@@ -39,9 +46,7 @@ def begin(request: Request) -> Trainer:
     if out.exists() and not out.is_dir():
         raise UsageError(f"{out}: --out: expected a folder, this is a file")
     trainer = Trainer(request, TrainState(request.parts, request.clones))
-    if trainer.ranks.first:
-        out.mkdir(parents=True, exist_ok=True)
-        write_atomically(out / CONFIG, config_toml(request.config, "camp-train").encode())
+    _write_config(trainer)
     trainer.fit()
     return trainer
 
@@ -55,12 +60,14 @@ def resume(request: Request, asked: Mapping[str, Any]) -> Trainer:
         Arguments of the run; its config and method are those of the checkpoint.
     asked
         Arguments that must agree with the checkpoint: `method`, `clones`, and `config` (those of
-        its settings that `keys` names, else all); `parts` replace those of the run.
+        its settings that `keys` names, else all; those of `CHANGEABLE` replace the run's); `parts`
+        replace those of the run.
 
     Raises
     ------
     UsageError
-        The checkpoint is of another method, config or dataset.
+        The checkpoint is of another method, config or dataset, or has more steps than are asked
+        for.
     CorruptDataError
         The checkpoint is damaged.
     """
@@ -75,8 +82,9 @@ def resume(request: Request, asked: Mapping[str, Any]) -> Trainer:
             f"{out}: a run of method {checkpoint.method!r}, asked for {asked['method']!r}: "
             "leave --method out, or choose another --out"
         )
+    config = checkpoint.config
     if asked.get("config") is not None:
-        _compare(out, checkpoint.config, asked["config"], asked.get("keys"))
+        config = _continued(out, config, asked["config"], asked.get("keys"))
     state = TrainState.from_progress(checkpoint.progress)
     if asked.get("clones") and not state.clones:
         raise UsageError(
@@ -85,7 +93,9 @@ def resume(request: Request, asked: Mapping[str, Any]) -> Trainer:
         )
     if asked.get("parts") is not None:
         state.parts = tuple(asked["parts"])
-    request = replace(request, method=checkpoint.method, config=checkpoint.config)
+    if config.stages.extra_timesteps > checkpoint.config.stages.extra_timesteps:
+        _check_last(out, state)
+    request = replace(request, method=checkpoint.method, config=config)
     trainer = Trainer(request, state, checkpoint)
     known = checkpoint.progress.get("dataset")
     if known != trainer.data.fingerprint:
@@ -93,6 +103,8 @@ def resume(request: Request, asked: Mapping[str, Any]) -> Trainer:
             f"{request.dataset}: fingerprint {trainer.data.fingerprint}, the run was trained on "
             f"{known}: give the same dataset"
         )
+    if config != checkpoint.config:
+        _write_config(trainer)
     trainer.fit()
     return trainer
 
@@ -121,12 +133,44 @@ def forecast(request: Request) -> list[tuple[str, int, float]]:
     return found
 
 
-def _compare(out: Path, known: CampConfig, asked: CampConfig, keys: Collection[str] | None) -> None:
-    """Refuse settings that differ from those of a run; only `keys`, where they are given."""
+def _write_config(trainer: Trainer) -> None:
+    if trainer.ranks.first:
+        trainer.run.mkdir(parents=True, exist_ok=True)
+        write_atomically(trainer.run / CONFIG, config_toml(trainer.config, "camp-train").encode())
+
+
+def _continued(
+    out: Path, known: CampConfig, asked: CampConfig, keys: Collection[str] | None
+) -> CampConfig:
+    """Return a run's config with what is `CHANGEABLE` as asked; refuse other settings that differ.
+
+    Only `keys` are looked at, where they are given.
+    """
+    config = known
     for key in known_keys(known) if keys is None else keys:
         ours, theirs = plain(attrgetter(key)(known)), plain(attrgetter(key)(asked))
-        if ours != theirs:
+        if ours == theirs or key == _EXTRA:
+            continue
+        if key not in CHANGEABLE:
             raise UsageError(
                 f"{out}: {key} is {ours!r} in this run, asked for {theirs!r}: leave settings out "
-                "with --resume, or choose another --out"
+                f"with --resume, or choose another --out (only {', '.join(CHANGEABLE)} may change)"
             )
+        if key == _TOTAL:
+            extra = int(theirs) - int(ours)
+            if extra < known.stages.extra_timesteps:
+                raise UsageError(
+                    f"{out}: {key} is {int(ours) + known.stages.extra_timesteps} in this run, "
+                    f"asked for {theirs}: a run can be given more steps, not fewer"
+                )
+            key, theirs = _EXTRA, extra  # noqa: PLW2901 - steps that are asked for on top
+        config = from_mapping(config, nested(key, theirs), "--resume")
+    return config
+
+
+def _check_last(out: Path, state: TrainState) -> None:
+    if PARTS[-1] not in state.parts:
+        raise UsageError(
+            f"{out}: more steps go to the stage {PARTS[-1]!r}, which this run leaves out: add it "
+            "by --stages"
+        )

@@ -94,14 +94,18 @@ def schedule(
         shares["auxiliary"] = (tasks, auxiliary)
     single = stages_config.single_room_share
     shares |= {"single": ((), single), "all": ((), 1.0 - auxiliary - single)}
-    updates = max(1, round(stages_config.total_timesteps / (count * config.ppo.num_steps)))
+    steps = count * config.ppo.num_steps
+    updates = max(1, round(stages_config.total_timesteps / steps))
+    extra = round(stages_config.extra_timesteps / steps)
     stages, share_before = [], 0.0
     for name, (tasks, share) in shares.items():
         first, last = round(updates * share_before), round(updates * (share_before + share))
         share_before += share
+        if name == PARTS[-1]:
+            last += extra
         if name.split("-")[0] not in parts or last == first:
             continue
-        decay = (first / updates, last / updates)
+        decay = (first / (updates + extra), last / (updates + extra))
         joint = hierarchical and not tasks
         stages.append(
             TrainingStage(
@@ -114,7 +118,7 @@ def schedule(
     if not stages:
         raise UsageError(
             f"stages.total_timesteps is {stages_config.total_timesteps}: less than one update of "
-            f"{count * config.ppo.num_steps} steps is left for {', '.join(parts)}"
+            f"{steps} steps is left for {', '.join(parts)}"
         )
     return stages
 

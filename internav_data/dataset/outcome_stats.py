@@ -6,11 +6,10 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from internav_data.dataset.summary_statistics import Spread, mean, share, spread
+from internav_data.dataset.summary_statistics import Spread, mean, path_efficiency, share, spread
 from internav_data.records.agent import SPACING_M
 
 if TYPE_CHECKING:
@@ -130,9 +129,7 @@ def expert_row(table: pa.Table, manifest: Manifest) -> ExpertRow:
         steps=spread(steps),
         pushes=mean(pushes),
         picks=mean(picks),
-        spl=share(
-            float((shortest_path_m / np.maximum(path_m, shortest_path_m)).sum()), len(solved)
-        ),
+        spl=share(float(path_efficiency(shortest_path_m, path_m).sum()), len(solved)),
         sts=share(float((shortest_path_m / SPACING_M / steps).sum()), len(solved)),
         refused=manifest.redraws.get(REFUSED, 0),
         refused_share=refused_share(manifest),

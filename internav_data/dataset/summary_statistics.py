@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     import pyarrow as pa
     from numpy.typing import NDArray
 
+    from internav_data.core.typing import Floats
+
+    FloatsLike = float | NDArray[np.float64]
+
 
 _DIGITS = 6
 
@@ -34,6 +38,17 @@ def mean(values: NDArray[Any]) -> float:
 def share(part: float, whole: float) -> float:
     """Return a part's share of a whole; 0 of nothing."""
     return round(part / whole, _DIGITS) if whole else 0.0
+
+
+def path_efficiency(shortest_path_m: FloatsLike, path_m: FloatsLike) -> Floats:
+    """Return L / max(P, L) of SPL for shortest paths L and paths P that were taken, (n,) float64.
+
+    Where the start is the goal (L = 0) it is 1 of a path of length 0, and 0 of any other, as in
+    AllenAct; the definition of Anderson et al. 2018 leaves 0 / 0 open.
+    """
+    shortest = np.asarray(shortest_path_m, np.float64)
+    longest = np.maximum(path_m, shortest)
+    return np.divide(shortest, longest, out=np.ones_like(longest), where=longest > 0.0)
 
 
 def spread(values: NDArray[Any]) -> Spread:

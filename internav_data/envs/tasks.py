@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, ClassVar, Final, NamedTuple
 
 from internav_data.core.config import Bounds, check_bounds
+from internav_data.dataset.summary_statistics import path_efficiency
 from internav_data.envs.auxiliary import is_cleared
 from internav_data.navigation import SPACING_M
 from internav_data.records import PushModel  # noqa: TC001 - fields' types are read at run time
@@ -196,7 +197,7 @@ class InteractiveNavigation(Task):
         return {
             "success": self.success,
             "distance_to_goal_m": self.distance_m,
-            "spl": length_m / max(path_m, length_m) if self.success else 0.0,
+            "spl": float(path_efficiency(length_m, path_m)) if self.success else 0.0,
             "sts": length_m / SPACING_M / statistics.steps if self.success else 0.0,
             **statistics.metrics(),
         }

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from collections import Counter
 from dataclasses import replace
 
 import pytest
@@ -107,6 +108,58 @@ def test_a_finished_run_is_left_as_it_is(request_for):
     before = written(asked.out)
     resume(asked, {})
     assert written(asked.out) == before
+
+
+def test_a_finished_run_goes_on_with_more_steps(request_for):
+    """They go to the last stage; broken off again, it ends with the same bytes."""
+
+    def resumed(name, *stops):
+        given = request_for(name, "ppo")
+        begin(given)
+        before = written(given.out)
+        more = {"config": request_for(name, stages={"total_timesteps": 480}).config,
+                "keys": ["stages.total_timesteps"]}  # fmt: skip
+        for stop in stops:
+            with pytest.raises(InterruptedRunError):
+                resume(replace(given, interrupted=after(stop)), more)
+        resume(given, more)
+        resume(given, more)  # the same command once more: all is done
+        return before, written(given.out)
+
+    before, whole = resumed("whole")
+    assert whole == resumed("broken", 2, 1)[1]
+    assert whole[0][: len(before[0])] == before[0]
+    assert whole[1]["progress"]["environment_steps"] == 480
+    lengths = Counter(row["stage"] for row in whole[0] if "ppo" in row)
+    assert lengths == Counter(row["stage"] for row in before[0] if "ppo" in row) + Counter(all=5)
+    told = (request_for("whole").out / "config.toml").read_text()
+    assert "extra_timesteps = 160" in told
+
+
+def test_more_steps_need_the_last_stage_and_fewer_are_refused(request_for):
+    given = request_for("some", "ppo")
+    given = replace(given, parts=("auxiliary",))
+    begin(given)
+    for steps, words in ((100, "320 in this run, asked for 100.*not fewer"), (480, "'all'")):
+        config = request_for("some", stages={"total_timesteps": steps}).config
+        with pytest.raises(UsageError, match=words):
+            resume(given, {"config": config, "keys": ["stages.total_timesteps"]})
+
+
+def test_other_workers_change_no_bit_of_a_resumed_run(request_for):
+    short = {"validation_episodes": 0}
+    begin(request_for("whole", "ppo", run=short))
+    given = request_for("other", "ppo", run=short)
+    with pytest.raises(InterruptedRunError):
+        begin(replace(given, interrupted=after(12)))
+    run = {"workers": 2, "checkpoint_every": 1, "threads": 1}
+    other = request_for("other", "ppo", run=short | run).config
+    resume(given, {"config": other, "keys": [f"run.{name}" for name in run]})
+    whole, again = written(request_for("whole").out), written(given.out)
+    assert again[1]["config"]["run"]["workers"] == 2
+    assert whole[0] == again[0]
+    assert whole[1]["progress"] == again[1]["progress"]
+    assert whole[2:] == again[2:]
 
 
 def test_parts_follow_from_the_last_ones_checkpoint(request_for):

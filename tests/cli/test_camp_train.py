@@ -118,6 +118,20 @@ def test_a_checkpoint_that_is_no_checkpoint_is_refused(call, dataset, tmp_path):
         assert words in err
 
 
+def test_a_resumed_run_may_be_given_more_steps_and_other_workers(call, dataset, tmp_path):
+    assert call(dataset, *TINY, "--steps", 96)[0] == 0
+    again = (dataset, "--out", "runs/ppo-0", "--resume")
+    assert call(*again, *TINY, "--steps", 192, "--set", "run.threads=1")[0] == 0
+    rows = (tmp_path / "runs" / "ppo-0" / "log.jsonl").read_text().splitlines()
+    assert json.loads(rows[-1])["step"] == 192
+    code, _, err = call(*again, "--set", "ppo.gamma=0.5")
+    assert code == 2
+    assert "run.workers, " in err, "it says what may change"
+    for words in ((), ("--steps", 96), ("--steps", 192)):
+        code, _, err = call(*again, *words)
+        assert (code, "was finished already" in err) == (0, True)
+
+
 def test_ctrl_c_saves_and_a_second_one_leaves_the_last_checkpoint(dataset, tmp_path):
     run = tmp_path / "run"
     words = [TRAIN, dataset, *TINY, "--out", run, "--steps", 320_000]

@@ -6,11 +6,13 @@ import json
 import statistics
 from collections import Counter
 
+import numpy as np
 import pytest
 
 from internav_data.core.field_docs import descriptions
 from internav_data.dataset import compute_stats, load_dataset, read_manifest
 from internav_data.dataset.nodes import Record, Sequence
+from internav_data.dataset.summary_statistics import path_efficiency
 from internav_data.dataset.tables import TABLES
 
 
@@ -112,6 +114,11 @@ def test_statistics_of_nothing(tmp_path):
     assert stats["episodes"] == 0
     assert [row["ratio"] for row in stats["table2"]] == [0, 0, 0]
     assert list(load_dataset(tmp_path)) == []
+
+
+def test_efficiency_of_paths_without_length():
+    shortest_m, taken_m = np.array([0.0, 0.0, 2.0, 3.0]), np.array([0.0, 0.5, 1.0, 4.0])
+    assert path_efficiency(shortest_m, taken_m).tolist() == [1.0, 0.0, 1.0, 0.75]
 
 
 def test_card_names_every_file_and_column(dataset_folder):

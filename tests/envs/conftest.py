@@ -52,8 +52,8 @@ def hand_run():
     """Make a run along +x: a crate in a door (divided) or in the middle of a room."""
     houses = {d: LoadedHouse.of(hand_house(divided=d)) for d in (False, True)}
 
-    def make(*, divided, pickable=True, mass_kg=5.0, **config):
-        x, start_i = (3.0, 8) if divided else (2.0, 4)
+    def make(*, divided, pickable=True, mass_kg=5.0, start_i=None, **config):
+        x, start_i = (3.0, start_i or 8) if divided else (2.0, start_i or 4)
         obstacle = builders.obstacle(crate(pickable=pickable), x, 1.5)
         episode = builders.episode(
             houses[divided].model.house,

@@ -95,6 +95,18 @@ def test_a_failed_done_ends_the_episode(hand_run, option):
     assert said["distance_to_goal_m"] == pytest.approx(3.0)
 
 
+@pytest.mark.parametrize(
+    ("steps", "spl"), [((DONE,), 1.0), ((LEFT, DONE), 1.0), ((AHEAD, LEFT, LEFT, AHEAD, DONE), 0.0)]
+)
+def test_spl_where_the_start_is_the_goal(hand_run, steps, spl):
+    """0 / 0 is 1: nobody could do better. Moves away and back again make it 0."""
+    run = hand_run(divided=False, start_i=20)
+    for action in steps:
+        run.step(action)
+    said = run.task.metrics()
+    assert (said["success"], said["spl"], said["sts"]) == (True, spl, 0.0)
+
+
 def test_moves_on_a_loop_add_up_to_nothing(hand_run):
     run = hand_run(divided=False)
     steps = [AHEAD, LEFT, AHEAD, LEFT, AHEAD, LEFT, AHEAD, LEFT]
