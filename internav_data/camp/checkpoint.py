@@ -31,6 +31,7 @@ from internav_data.camp.agents.protocol import Agent, State
 from internav_data.camp.config import CampConfig, from_mapping, preset
 from internav_data.camp.stages import check_parts
 from internav_data.core import config as values
+from internav_data.core.files import FileLimits, read_json
 from internav_data.core.storage import file_sha256, sync, write_atomically, write_folder_atomically
 from internav_data.records.errors import CorruptDataError, InternavError, UsageError
 
@@ -43,8 +44,10 @@ POINTER: Final = "checkpoints.json"
 ABOUT, WEIGHTS, TRAINING = "checkpoint.json", "weights.safetensors", "training.safetensors"
 _EXPORTED: Final = ("environment_steps", "cloned_frames", "training_s", "dataset")
 """Progress that goes with an agent alone: evaluations show it."""
-_MAX_JSON_BYTES: Final = 256_000_000
-"""Maximum size of a JSON file; the actions of 65,536 environments stay below."""
+_FILE: Final = FileLimits(
+    remedy="copy the checkpoint again", max_bytes=256_000_000, max_values=50_000_000
+)
+"""Limits of the JSON files; the actions of 65,536 environments stay below."""
 _MAX_TENSOR_BYTES: Final = 16_000_000_000
 
 
@@ -238,14 +241,7 @@ def _pointer(run: Path) -> dict[str, Any]:
 
 
 def _json(path: Path) -> dict[str, Any]:
-    try:
-        if path.stat().st_size > _MAX_JSON_BYTES:
-            raise CorruptDataError(f"{path}: more than {_MAX_JSON_BYTES} bytes: no checkpoint")
-        return _object(json.loads(path.read_bytes()), path)
-    except OSError as error:
-        raise CorruptDataError(f"{path}: {error.strerror or error}") from error
-    except (ValueError, RecursionError) as error:
-        raise CorruptDataError(f"{path}: this is not JSON: {error}") from error
+    return _object(read_json(path, _FILE), path)
 
 
 def _object(value: object, path: Path | str) -> dict[str, Any]:

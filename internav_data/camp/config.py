@@ -317,7 +317,7 @@ def config_of(
     """
     config = preset(name)
     if file is not None:
-        config = values.from_mapping(config, values.read_toml(file), str(file))
+        config = values.from_mapping(config, values.read_settings(file), str(file))
     for key, value in (options or {}).items():
         config = values.from_mapping(config, values.nested(key, value), "option")
     for override in overrides:

@@ -17,10 +17,10 @@ Without the file, every mesh gets the defaults. `ignore = true` leaves a file ou
 from __future__ import annotations
 
 import difflib
-import tomllib
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from internav_data.core.files import FileLimits, read_toml
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 MANIFEST = "assets.toml"
 MESH_SUFFIXES = (".glb", ".obj", ".stl", ".ply", ".off")
-_MAX_MANIFEST_BYTES = 1_000_000
+_FILE = FileLimits(error=UsageError, remedy="docs/assets.md shows one")
 _MAX_PARTS = 32
 _MAX_FRICTION = 2.0
 _MAX_MASS_KG = 1e5
@@ -75,7 +75,7 @@ def read_notes(directory: Path, names: tuple[str, ...]) -> dict[str, MeshNote]:
     path = directory / MANIFEST
     if not path.exists():
         return {name: MeshNote() for name in names}
-    tables = _parsed(path)
+    tables = read_toml(path, _FILE)
     default = _note(path, "default", tables.pop("default", {}), MeshNote())
     for name in tables:
         if name not in names:
@@ -84,15 +84,6 @@ def read_notes(directory: Path, names: tuple[str, ...]) -> dict[str, MeshNote]:
                 f"{_nearest(name, (*names, 'default'))}; write default or a file's name, quoted"
             )
     return {name: _note(path, name, tables.get(name, {}), default) for name in names}
-
-
-def _parsed(path: Path) -> dict[str, Any]:
-    try:
-        if path.is_symlink() or path.stat().st_size > _MAX_MANIFEST_BYTES:
-            raise UsageError(f"{path}: must be a plain file of less than 1 MB")
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise UsageError(f"{path}: cannot be read as TOML ({error}); mend that line") from error
 
 
 def _nearest(name: str, known: tuple[str, ...]) -> str:

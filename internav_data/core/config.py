@@ -13,7 +13,6 @@ import functools
 import json
 import math
 import textwrap
-import tomllib
 import types
 import typing
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from internav_data.core.field_docs import descriptions
+from internav_data.core.files import FileLimits, parse_toml, read_toml
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ MANY: Final = 10**12
 """Upper bound of numbers that have no other: larger than any that makes sense."""
 MAX_SEED: Final = 2**63 - 1
 """Upper bound of seeds, which are stored as int64."""
+_FILE = FileLimits("config", UsageError, "--print-config shows one", max_values=10_000)
 WORDS = {bool: "true or false", int: "a whole number", float: "a number", str: "text in quotes"}
 
 
@@ -132,7 +133,7 @@ def _in_hint(hint: Any) -> Iterator[Bounds]:  # noqa: ANN401 - a type hint
     yield from (note for note in getattr(hint, "__metadata__", ())[:1] if isinstance(note, Bounds))
 
 
-def read_toml(path: Path) -> dict[str, Any]:
+def read_settings(path: Path) -> dict[str, Any]:
     """Return the values in a file of settings.
 
     Raises
@@ -141,12 +142,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         The file cannot be read, or is not TOML.
 
     """
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UsageError(f"cannot read config {path}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"config {path} is not TOML: {error}") from error
+    return read_toml(path, _FILE)
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401 - whatever a config holds
@@ -274,9 +270,11 @@ def _is_text(hint: Any) -> bool:  # noqa: ANN401 - a type hint
 
 
 def _parsed(text: str) -> Any:  # noqa: ANN401 - any TOML value
+    if text in {"nan", "inf", "-inf", "+inf"}:
+        return float(text)  # refused with the setting's name
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+        return parse_toml(f"value = {text}".encode(errors="replace"), "", _FILE)["value"]
+    except UsageError:
         return text
 
 
@@ -383,4 +381,4 @@ def keys_given(
         ]
 
     named = [override.partition("=")[0].strip() for override in overrides]
-    return [*flat(read_toml(file) if file is not None else {}), *named, *options]
+    return [*flat(read_settings(file) if file is not None else {}), *named, *options]

@@ -18,7 +18,7 @@ from collections import Counter
 from dataclasses import dataclass
 from datetime import date, time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NoReturn
+from typing import TYPE_CHECKING, Any, Final
 
 from internav_data.records.errors import CorruptDataError, InternavError
 
@@ -99,6 +99,20 @@ def open_regular(path: str | Path) -> BinaryIO:
     except BaseException:
         os.close(descriptor)
         raise
+
+
+def size_of_regular(path: Path) -> int:
+    """Return the number of bytes of a regular file; links are followed.
+
+    Raises
+    ------
+    OSError
+        Missing, or a folder, pipe, socket or device.
+
+    """
+    found = path.stat()
+    _check_kind(found.st_mode, path)
+    return found.st_size
 
 
 def read_file(path: str | Path, limits: FileLimits) -> bytes:
@@ -182,7 +196,7 @@ def parse_json(data: bytes, place: object, limits: FileLimits) -> Any:  # noqa: 
     """
     text = _decoded(data, place, limits)
     try:
-        value = json.loads(text, object_pairs_hook=_object, parse_constant=_no_constant)
+        value = json.loads(text, object_pairs_hook=_object)
         _check_value(value, limits, 0)
     except (ValueError, RecursionError) as error:
         raise limits.refusal(place, f"not JSON ({_reason(error)})") from error
@@ -245,12 +259,13 @@ def _check_kind(mode: int, path: str | Path) -> None:
         raise OSError(errno.EINVAL, f"{kind}, expected a regular file", str(path))
 
 
-def _check_size(size: int, path: str | Path, limits: FileLimits) -> None:
+def _check_size(size: int, place: object, limits: FileLimits) -> None:
     if size > limits.max_bytes:
-        raise limits.refusal(path, f"is too large, expected at most {limits.max_bytes:,} bytes")
+        raise limits.refusal(place, f"is too large, expected at most {limits.max_bytes:,} bytes")
 
 
 def _decoded(data: bytes, place: object, limits: FileLimits) -> str:
+    _check_size(len(data), place, limits)
     if sum(map(data.count, _OPENERS)) > limits.max_values:
         expected = f"expected at most {limits.max_values:,} values"
         raise limits.refusal(place, f"holds too much, {expected}")
@@ -266,10 +281,6 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         twice, _ = Counter(name for name, _ in pairs).most_common(1)[0]
         raise ValueError(f"the key {_shown(twice)} is there twice")
     return found
-
-
-def _no_constant(name: str) -> NoReturn:
-    raise ValueError(f"{name} is no number")
 
 
 def _reason(error: Exception) -> str:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
 
+from internav_data.core.files import open_regular, size_of_regular
 from internav_data.records.errors import InternavError
 
 if TYPE_CHECKING:
@@ -150,19 +151,21 @@ class FolderStore:
         ------
         FileNotFoundError
             There is no such file.
+        OSError
+            It is a folder, pipe, socket or device.
         OutsideError
             It is a link out of the folder.
 
         """
         path = self.root / name
-        size = path.stat().st_size
+        size = size_of_regular(path)
         if not path.resolve().is_relative_to(self.root.resolve()):
             raise OutsideError(f"{path}: a link out of {self.root}")
         return size
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> bytes:
         """Return the bytes start … stop - 1 of a file; fewer where it ends earlier."""
-        with (self.root / name).open("rb") as stream:
+        with open_regular(self.root / name) as stream:
             stream.seek(start)
             return stream.read(-1 if stop is None else stop - start)
 
@@ -321,7 +324,7 @@ def sync(path: Path) -> None:
 def file_sha256(path: Path) -> str:
     """Return the sha256 of a file's bytes, 64 hexadecimal digits."""
     digest = hashlib.sha256()
-    with path.open("rb") as stream:
+    with open_regular(path) as stream:
         while block := stream.read(_BLOCK):
             digest.update(block)
     return digest.hexdigest()

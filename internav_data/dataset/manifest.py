@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from internav_data.core.files import FileLimits, parse_json
 from internav_data.core.storage import OutsideError, Store, StoreLike, exists, store_of
 from internav_data.dataset.consistency import inconsistencies
 from internav_data.dataset.location import making_command
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 D = TypeVar("D", bound="DataclassInstance")
 
 MANIFEST = "manifest.json"
-_MAX_BYTES = 64 << 20
 _MAX_FILES = 100_000
 _MAX_FILE_BYTES = 1 << 40
 _MAX_ROWS = 1 << 40
@@ -47,6 +47,8 @@ _KEYS_WITHOUT_DIGEST = frozenset(
     )
 )
 """Keys of a manifest that may lack its digest: those of the releases before it was written."""
+MANIFEST_LIMITS = FileLimits(remedy=_AGAIN, max_bytes=32 << 20, max_values=1_000_000)
+"""Limits of the file: 1,000,000 scenes take 2.4 MB; 100,000 quarantined ones add some 25 MB."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,17 +185,12 @@ def read_manifest_and_digest(root: StoreLike) -> tuple[Manifest, str]:
     store = store_of(root)
     path = store.at(MANIFEST)
     try:
-        text = store.read(MANIFEST, stop=_MAX_BYTES + 1)
+        content = store.read(MANIFEST, stop=MANIFEST_LIMITS.max_bytes + 1)
     except FileNotFoundError:
         raise CorruptDataError(_absence(store)) from None
     except OSError as error:
-        raise CorruptDataError(f"{path}: cannot be read: {error.strerror}") from error
-    if len(text) > _MAX_BYTES:
-        raise CorruptDataError(f"{path}: larger than {_MAX_BYTES >> 20} MiB: {_AGAIN}")
-    try:
-        raw = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise CorruptDataError(f"{path}: no valid JSON ({error}): {_AGAIN}") from error
+        raise CorruptDataError(f"{path}: cannot be read: {error.strerror}: {_AGAIN}") from error
+    raw = parse_json(content, path, MANIFEST_LIMITS)
     _check_version(path, raw)
     _check_digest(path, raw)
     manifest = _parse(path, raw)
@@ -202,7 +199,7 @@ def read_manifest_and_digest(root: StoreLike) -> tuple[Manifest, str]:
     for file in manifest.files:
         _check_entry(path, file)
     _check_consistency(path, manifest)
-    return manifest, hashlib.sha256(text).hexdigest()
+    return manifest, hashlib.sha256(content).hexdigest()
 
 
 def _absence(store: Store) -> str:

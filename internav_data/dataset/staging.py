@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
 
+from internav_data.core.files import FileLimits, parse_json
 from internav_data.core.processes import end_if_orphaned
 from internav_data.core.storage import Store, StoreLike, exists, store_of
 from internav_data.dataset.encode import to_table
@@ -37,6 +38,7 @@ STAGING = ".work/"
 """Prefix of the names of an unfinished dataset's files."""
 IDENTITY = f"{STAGING}identity.json"
 """Name of the file that holds the identity of the run whose scenes are staged."""
+_FILE = FileLimits(remedy=f"remove {STAGING} and start anew")
 _SCENES = f"{STAGING}scenes/"
 _MAGIC = b"INWORK02"
 _HEAD = len(_MAGIC) + 32
@@ -80,13 +82,15 @@ def read_identity(root: StoreLike) -> Identity:
 
     """
     store = store_of(root)
-    data = store.read(IDENTITY)
+    place = store.at(IDENTITY)
+    values = parse_json(store.read(IDENTITY, stop=_FILE.max_bytes + 1), place, _FILE)
     try:
-        return Identity(**json.loads(data))
-    except (ValueError, TypeError) as error:
-        raise CorruptDataError(
-            f"{store.at(IDENTITY)}: damaged ({error}): remove {store.at(STAGING)} and start anew"
-        ) from error
+        identity = Identity(**values)
+    except TypeError as error:
+        raise _FILE.refusal(place, f"damaged ({error})") from error
+    if not isinstance(identity.config, dict):
+        raise _FILE.refusal(place, "damaged (config: expected an object)")
+    return identity
 
 
 @dataclass(frozen=True, slots=True)

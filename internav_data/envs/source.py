@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from internav_data.core.files import read_file
 from internav_data.core.lru import LRUCache
 from internav_data.dataset import load_dataset
-from internav_data.dataset.manifest import MANIFEST
+from internav_data.dataset.manifest import MANIFEST, MANIFEST_LIMITS
 from internav_data.envs.auxiliary import auxiliary_starts
 from internav_data.envs.order import EpisodeOrder, scene_bounds
 from internav_data.geometry import round_m
@@ -207,6 +208,6 @@ def open_source(
     path = Path(dataset)
     if not (path / MANIFEST).exists():
         load_dataset(path)  # raises with what is wrong there
-    digest = hashlib.sha256((path / MANIFEST).read_bytes()).hexdigest()
+    digest = hashlib.sha256(read_file(path / MANIFEST, MANIFEST_LIMITS)).hexdigest()
     key = repr((str(path.resolve()), digest, split, filters))
     return _SOURCES.get(key, lambda: Source(load_dataset(path, split, filters)))

@@ -7,13 +7,14 @@ import re
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from types import NoneType
-from typing import TYPE_CHECKING, Any, Final, get_args, get_type_hints
+from typing import TYPE_CHECKING, Final, get_args, get_type_hints
 
+from internav_data.core.files import FileLimits, read_json
 from internav_data.core.storage import write_atomically
 from internav_data.dataset import from_table, write_parquet
 from internav_data.dataset.parquet import open_parquet, read_all
 from internav_data.evaluation.metrics import RESULTS, EpisodeResult
-from internav_data.records.errors import CorruptDataError, UsageError
+from internav_data.records.errors import CorruptDataError, InternavError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,7 +25,7 @@ EPISODES: Final = "episodes.parquet"
 """Name of the table."""
 FORMAT: Final = 2
 """Version of both files."""
-_MAX_BYTES: Final = 1_000_000
+_FILE: Final = FileLimits(remedy="evaluate again with `camp-eval RUN DATASET`", max_number=2.0**63)
 _MAX_ROWS: Final = 5_000_000
 _MAX_DEPTH: Final = 3
 """Depth of folders in which evaluations are searched."""
@@ -143,17 +144,10 @@ def find_evaluations(path: Path) -> list[Path]:
 
 
 def _about(path: Path) -> tuple[About, int]:
-    def wrong(text: str) -> CorruptDataError:
-        return CorruptDataError(f"{path}: {text}; evaluate again with `camp-eval RUN DATASET`")
+    def wrong(text: str) -> InternavError:
+        return _FILE.refusal(path, text)
 
-    try:
-        with path.open("rb") as file:
-            raw = file.read(_MAX_BYTES + 1)
-        values: Any = json.loads(raw.decode("utf-8")) if len(raw) <= _MAX_BYTES else None
-    except OSError as error:
-        raise wrong(f"cannot be read: {error.strerror}") from error
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise wrong("not JSON") from error
+    values = read_json(path, _FILE)
     if not isinstance(values, dict) or values.get("format") != FORMAT:
         raise wrong(f"expected an evaluation of format {FORMAT}")
     hints = get_type_hints(About)

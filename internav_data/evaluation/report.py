@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import json
 import math
+from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any, Final
 
+from internav_data.core.files import open_regular
 from internav_data.core.storage import write_atomically
 from internav_data.evaluation.metrics import GROUPS, MEASURES
 from internav_data.evaluation.statements import as_json as differences_json
@@ -61,7 +63,7 @@ def read_log(path: Path) -> Series:
     series: Series = {}
     if path.stat().st_size > MAX_BYTES:
         return series
-    with path.open(encoding="utf-8", errors="replace") as lines:
+    with TextIOWrapper(open_regular(path), encoding="utf-8-sig", errors="replace") as lines:
         for line in lines:
             row = _row(line)
             step = next((row[name] for name in STEPS if name in row), None)

@@ -14,12 +14,13 @@ from internav_data.core.config import (
     from_mapping,
     nested,
     plain,
-    read_toml,
+    read_settings,
     updated,
 )
+from internav_data.core.files import read_file
 from internav_data.episodes.config import EpisodeConfig
 from internav_data.houses.config import HouseConfig
-from internav_data.houses.plan_file import load_floor_plan
+from internav_data.houses.plan_file import FLOOR_PLAN, load_floor_plan
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
@@ -90,7 +91,9 @@ class GenerationConfig:
         values = self.resolved()
         values["assets"] = catalogue_digest
         plan = self.house.floor_plan
-        values["house"]["floor_plan"] = None if plan is None else _sha256_of(Path(plan))
+        values["house"]["floor_plan"] = (
+            None if plan is None else hashlib.sha256(read_file(plan, FLOOR_PLAN)).hexdigest()
+        )
         return values
 
 
@@ -111,7 +114,7 @@ def load_config(
     """
     config = GenerationConfig()
     if path is not None:
-        config = from_mapping(config, read_toml(path), str(path), COMMAND_LINE_ONLY)
+        config = from_mapping(config, read_settings(path), str(path), COMMAND_LINE_ONLY)
         config = _beside(config, path.parent)
     for key, value in (options or {}).items():
         config = from_mapping(config, nested(key, value), "option")
@@ -125,10 +128,3 @@ def _beside(config: GenerationConfig, folder: Path) -> GenerationConfig:
     if config.house.floor_plan is not None:
         changes["house"] = {"floor_plan": str(folder / config.house.floor_plan)}
     return from_mapping(config, changes, "paths")
-
-
-def _sha256_of(path: Path) -> str:
-    try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise UsageError(f"cannot read floor plan {path}: {error.strerror}") from error

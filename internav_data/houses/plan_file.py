@@ -27,13 +27,12 @@ Polygons are the centre lines of walls 0.12 m thick, in metres; rooms share wall
 
 from __future__ import annotations
 
-import json
 import math
-import tomllib
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
+from internav_data.core.files import FileLimits, parse_json, parse_toml, read_file
 from internav_data.houses.access import JAMB_CM, spans
 from internav_data.houses.plan import FloorPlan, Opening
 from internav_data.houses.plan_shapes import FloorPlanError, lay_out, read_polygon
@@ -48,7 +47,13 @@ if TYPE_CHECKING:
     from internav_data.houses.plan import FloorGrid, WallSegment
     from internav_data.records import DoorKind
 
+FLOOR_PLAN: Final = FileLimits(
+    "floor plan", UsageError, "docs/floor-plans.md shows one", max_values=20_000, max_number=1e6
+)
+"""Limits of a plan's file."""
 MAX_PLAN_ROOMS = 40
+MAX_OPENINGS: Final = 400
+"""Largest number of doors, and of windows."""
 _DOOR_KINDS: Mapping[str, int] = {
     "opening": 200,
     "doorway": 100,
@@ -77,29 +82,26 @@ def load_floor_plan(path: str | Path) -> FloorPlan:
 
     """
     path = Path(path)
+    data = read_file(path, FLOOR_PLAN)
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"floor plan {path}: cannot be read ({error}); check the path") from error
-    try:
-        return _parsed(text, path.suffix.lower())
+        return _parsed(data, path)
     except FloorPlanError as complaint:
         raise UsageError(f"floor plan {path}: {complaint}") from complaint
 
 
 @lru_cache(maxsize=8)
-def _parsed(text: str, suffix: str) -> FloorPlan:
-    try:
-        data = json.loads(text) if suffix == ".json" else tomllib.loads(text)
-    except ValueError as error:
-        msg = f"is no valid {'JSON' if suffix == '.json' else 'TOML'} ({error})"
-        raise FloorPlanError(msg) from error
+def _parsed(content: bytes, path: Path) -> FloorPlan:
+    parse = parse_json if path.suffix.lower() == ".json" else parse_toml
+    data = parse(content, path, FLOOR_PLAN)
     if not isinstance(data, dict):
         raise FloorPlanError("expected a table with [[rooms]] and [[doors]]")
     _known(data, "")
     rooms = _tables(data, "rooms")
     if not 1 <= len(rooms) <= MAX_PLAN_ROOMS:
         raise FloorPlanError(f"has {len(rooms)} rooms: give 1 to {MAX_PLAN_ROOMS} [[rooms]]")
+    for kind in ("doors", "windows"):
+        if len(_tables(data, kind)) > MAX_OPENINGS:
+            raise FloorPlanError(f"has more than {MAX_OPENINGS} {kind}")
     names = _names(rooms)
     polygons = [read_polygon(r.get("polygon"), n) for r, n in zip(rooms, names, strict=True)]
     grid, shift = lay_out(polygons, names)
@@ -143,7 +145,7 @@ def _names(rooms: Sequence[Mapping[str, Any]]) -> list[str]:
     for k, room in enumerate(rooms):
         kind = room.get("type")
         name = str(room.get("name", kind if kind is not None else f"number {k + 1}"))
-        if kind not in ROOM_TYPES:
+        if kind not in list(ROOM_TYPES):  # a list, as what cannot be hashed is no type either
             raise FloorPlanError(
                 f"room '{name}': type is {kind!r}; choose one of {', '.join(sorted(ROOM_TYPES))}"
             )
@@ -219,7 +221,7 @@ def _door(
     if a == b:
         raise FloorPlanError(f"{what}: a door joins two different rooms")
     kind = entry.get("kind", "single")
-    if kind not in _DOOR_KINDS:
+    if kind not in list(_DOOR_KINDS):  # a list, as what cannot be hashed is no kind either
         raise FloorPlanError(f"{what}: kind is {kind!r}; choose one of {', '.join(_DOOR_KINDS)}")
     at = _point(entry.get("at"), what, shift)
     width = _centimetres(entry.get("width", _DOOR_KINDS[kind] / 100.0), what)

@@ -19,6 +19,8 @@ MIN_SIDE_CM = 100
 """Smallest side of a room: narrower ones leave the agent no place to turn beside furniture."""
 MAX_EXTENT_CM = 10_000
 """Largest coordinate."""
+MAX_CORNERS = 100
+"""Largest number of a room's corners."""
 
 
 class FloorPlanError(ValueError):
@@ -38,6 +40,8 @@ def read_polygon(value: object, name: str) -> list[Corner]:
         raise FloorPlanError(
             f"room '{name}': 'polygon' needs four or more corners [x, y] in metres"
         )
+    if len(value) > MAX_CORNERS:
+        raise FloorPlanError(f"room '{name}': {len(value)} corners, at most {MAX_CORNERS}")
     corners: list[Corner] = []
     for entry in value:
         good = (

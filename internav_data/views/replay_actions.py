@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
+from internav_data.core.files import FileLimits, read_json
 from internav_data.records.errors import UsageError
 from internav_data.views.replay_story import MAX_ACTIONS
 from internav_data.world import ACTION_COUNT, ACTIONS, Action
 
-_MAX_BYTES: Final = 1_000_000
+if TYPE_CHECKING:
+    from pathlib import Path
+
 _KEYS: Final = {"episode_id", "actions"}
 _NAMES: Final = {action.name.replace("_", "").lower(): action for action in Action}
 _EXAMPLE: Final = '["MoveAhead", "PushAhead", 0, 11] or {"episode_id": ..., "actions": [...]}'
+_FILE: Final = FileLimits(error=UsageError, remedy=f"expected {_EXAMPLE}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,18 +41,7 @@ def read_actions(path: Path) -> ActionList:
     UsageError
         The file cannot be read, or does not hold such a list.
     """
-    path = Path(path)
-    try:
-        with path.open("rb") as file:
-            raw = file.read(_MAX_BYTES + 1)
-    except OSError as error:
-        raise UsageError(f"{path}: cannot be read: {error.strerror}") from error
-    if len(raw) > _MAX_BYTES:
-        raise UsageError(f"{path}: too large for a list of actions: over {_MAX_BYTES} bytes")
-    try:
-        data = json.loads(raw.decode("utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise UsageError(f"{path}: not JSON ({error}); expected {_EXAMPLE}") from error
+    data = read_json(path, _FILE)
     episode_id = None
     if isinstance(data, dict):
         if not {"actions"} <= set(data) <= _KEYS:

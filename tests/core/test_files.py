@@ -108,11 +108,10 @@ def test_byte_order_marks_are_accepted_and_other_encodings_named(tmp_path):
     ("text", "problem"),
     [
         ('{"a": 1, "b": 2, "a": 3}', "'a' is there twice"),
-        ("[NaN]", "NaN is no number"),
-        ("[-Infinity]", "-Infinity is no number"),
+        ('{"a": [NaN]}', "a[0]: nan is no finite number"),
+        ("[-Infinity]", "[0]: -inf is no finite number"),
         ('{"a": [1, 1e999]}', "a[1]: inf is no finite number"),
         ('{"a": {"b": 1e308}}', "a.b: 1e+308 is out of range, expected at most 1e+06"),
-        ("[" + "9" * 5000 + "]", "thousands of digits"),
         ("[" + "9" * 100 + "]", "a number of 333 bits is out of range"),
         ("[" * 5 + "]" * 5, "nested too deeply, expected at most 4"),
         ("[" * 40 + "]" * 40, "nested too deeply"),

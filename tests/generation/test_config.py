@@ -84,8 +84,8 @@ def test_errors_name_the_file(tmp_path):
     path.write_text("[house]\nscal = 1\n")
     assert str(path) in refusal(path=path)
     path.write_text("seed = = 1\n")
-    assert "is not TOML" in refusal(path=path)
-    assert "cannot read config" in refusal(path=tmp_path / "none.toml")
+    assert "not TOML" in refusal(path=path)
+    assert "cannot be read" in refusal(path=tmp_path / "none.toml")
     assert "is no folder" in refusal(f'assets=["{tmp_path}/none"]')
 
 

@@ -84,10 +84,16 @@ BAD_PLANS = {
     ),
     "not finite": (
         (LIVING, {**BEDROOM, "polygon": [[5, 0], [9, 0], [9, float("nan")], [5, 4]]}),
-        "'bedroom': corner",
+        r"rooms\[1\]\.polygon\[2\]\[1\]: nan is no finite number",
     ),
     "narrow": ((LIVING, room("den", 5, 0, 5.6, 4)), "'den'.*narrower"),
     "unknown type": ((LIVING, {**BEDROOM, "type": "ballroom"}), "'ballroom'.*choose"),
+    "far away": (
+        (LIVING, {**BEDROOM, "polygon": [[5, 0], [9, 0], [9, 1e308], [5, 4]]}),
+        "1e[+]308 is out of range",
+    ),
+    "many corners": ((LIVING, {**BEDROOM, "polygon": [[5, 0], [9, 0]] * 60}), "at most 100"),
+    "type is a list": ((LIVING, {**BEDROOM, "type": ["living"]}), "type is .'living'.*choose"),
     "name twice": ((LIVING, {**BEDROOM, "name": "living"}), "'living'.*taken"),
     "no rooms": ((), "0 rooms"),
     "unknown key": ((LIVING, {**BEDROOM, "colour": "red"}), "unknown key 'colour'"),
@@ -163,7 +169,7 @@ def test_what_is_no_plan_is_refused(tmp_path, text):
 
 
 def test_a_missing_or_binary_file_is_named(tmp_path):
-    with pytest.raises(UsageError, match=r"gone\.toml.*check the path"):
+    with pytest.raises(UsageError, match=r"gone\.toml.*No such file"):
         load_floor_plan(tmp_path / "gone.toml")
     path = tmp_path / "plan.toml"
     path.write_bytes(b"\xff\xfe\x00")
