@@ -19,14 +19,13 @@ from internav_data.core.files import FileLimits, parse_json
 from internav_data.core.storage import OutsideError, Store, StoreLike, exists, store_of
 from internav_data.dataset.consistency import inconsistencies
 from internav_data.dataset.location import making_command
-from internav_data.dataset.parquet import footer_sha256, open_parquet
+from internav_data.dataset.parquet import TableFile, footer_sha256, open_parquet
 from internav_data.dataset.staging import STAGING
 from internav_data.dataset.tables import FORMAT_VERSION, TABLES
 from internav_data.records import Split  # noqa: TC001 - as above
 from internav_data.records.errors import CorruptDataError
 
 if TYPE_CHECKING:
-    import pyarrow.parquet as pq
     from _typeshed import DataclassInstance
 
     from internav_data.dataset.tables import TableSpec
@@ -305,8 +304,8 @@ def _check_entry(manifest: str, file: DataFile) -> None:
             raise CorruptDataError(f"{where}: {name}: expected 0 … {most}, got {value!r}: {_AGAIN}")
 
 
-def open_file(root: StoreLike, file: DataFile, spec: TableSpec[Any]) -> pq.ParquetFile:
-    """Open a file of the manifest; page checksums are verified as it is read.
+def open_file(root: StoreLike, file: DataFile, spec: TableSpec[Any]) -> TableFile:
+    """Open a file of the manifest; whatever is read from it is verified.
 
     Raises
     ------
@@ -322,6 +321,7 @@ def open_file(root: StoreLike, file: DataFile, spec: TableSpec[Any]) -> pq.Parqu
         )
     opened = open_parquet(store.at(file.path), spec, store.source(file.path))
     if opened.metadata.num_rows != file.rows:
+        opened.close()
         raise CorruptDataError(
             f"{store.at(file.path)}: expected {file.rows} rows, got {opened.metadata.num_rows}: "
             f"{_AGAIN}"

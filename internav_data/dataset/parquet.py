@@ -1,16 +1,18 @@
-"""One Parquet file: written with page checksums, read with them verified."""
+"""One Parquet file: written with checksums of its pages and chunks, which reading verifies."""
 
 from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from internav_data.core.storage import Store, write_atomically
+from internav_data.dataset.checksums import ChunkChecksums, checksums_of, with_checksums
 from internav_data.dataset.compatibility import conformed, problems
 from internav_data.dataset.decode import one_array
 from internav_data.dataset.digest import logical_digest
@@ -19,7 +21,6 @@ from internav_data.records.errors import CorruptDataError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
     from typing import BinaryIO
 
     from internav_data.dataset.tables import TableSpec
@@ -89,7 +90,7 @@ def parquet_bytes(table: pa.Table, spec: TableSpec[Any]) -> bytes:
     ) as writer:
         for start, stop in group_bounds(table):
             writer.write_table(table.slice(start, stop - start), row_group_size=stop - start)
-    return bytes(sink.getvalue())
+    return with_checksums(sink.getvalue(), spec.schema)
 
 
 def file_info(path: str, data: bytes, table: pa.Table) -> FileInfo:
@@ -142,9 +143,129 @@ def footer_sha256(store: Store, name: str, size: int) -> str:
     return hashlib.sha256(store.read(name, size - length)).hexdigest()
 
 
+class TableFile:
+    """An open Parquet file of a table: what is read from it is verified before.
+
+    Page checksums are verified, and those of the column chunks if the footer states them. Not to
+    be used by a forked process.
+
+    Parameters
+    ----------
+    place
+        Place of the file, for error messages.
+    source
+        The file: a path, or one that can be read and sought.
+    spec
+        Table of which it has the columns.
+
+    Raises
+    ------
+    OSError, pyarrow.ArrowException, ValueError
+        It cannot be read, or is no Parquet file.
+
+    """
+
+    def __init__(self, place: str, source: Path | BinaryIO, spec: TableSpec[Any]) -> None:
+        self.place, self._spec = place, spec
+        self._source = (
+            pa.OSFile(str(source)) if isinstance(source, Path) else pa.PythonFile(source, mode="r")
+        )
+        try:
+            self._file = pq.ParquetFile(self._source, page_checksum_verification=True)
+            self.schema: pa.Schema = self._file.schema_arrow
+            self._checksums: ChunkChecksums | None = checksums_of(self._file.metadata)
+        except BaseException:
+            self._source.close()
+            raise
+        self._exact = self.schema.equals(spec.schema)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._source.close()
+
+    @property
+    def metadata(self) -> pq.FileMetaData:
+        """Footer of the file."""
+        return self._file.metadata
+
+    def read_group(self, group: int, columns: Sequence[str] | None = None) -> pa.Table:
+        """Return one row group as columns of the table.
+
+        Raises
+        ------
+        CorruptDataError
+            A page or a column chunk is damaged.
+
+        """
+        names = None if columns is None or not self._exact else list(columns)
+        try:
+            self._verify([group], names)
+            table = self._file.read_row_group(group, columns=names, use_threads=False)
+            table = table.replace_schema_metadata(None)  # the checksums, of this file alone
+            return table if self._exact else conformed(table, self._spec.schema, columns)
+        except Exception as error:
+            raise damaged(self.place, error) from error
+
+    def read_all(self, columns: Sequence[str] | None = None) -> pa.Table:
+        """Return all rows as columns of the table.
+
+        Raises
+        ------
+        CorruptDataError
+            A page or a column chunk is damaged.
+
+        """
+        names = None if columns is None or not self._exact else list(columns)
+        table = self._read_all(names)
+        try:
+            return table if self._exact else conformed(table, self._spec.schema, columns)
+        except Exception as error:
+            raise damaged(self.place, error) from error
+
+    def read_as_written(self) -> pa.Table:
+        """Return all rows with every column of the file, known to this release or not.
+
+        Raises
+        ------
+        CorruptDataError
+            A page or a column chunk is damaged.
+
+        """
+        return self._read_all(None)
+
+    def _read_all(self, names: list[str] | None) -> pa.Table:
+        try:
+            self._verify(range(self.metadata.num_row_groups), names)
+            table = self._file.read(columns=names).replace_schema_metadata(None)
+            table.validate(full=True)
+        except Exception as error:
+            raise damaged(self.place, error) from error
+        return table
+
+    def _verify(self, groups: Sequence[int], names: Sequence[str] | None) -> None:
+        """Check the column chunks that are about to be read."""
+        if self._checksums is None:
+            return
+        columns = range(self.metadata.num_columns) if names is None else self._leaves(names)
+        for group in groups:
+            self._checksums.verify(self._source.read_at, group, columns)
+
+    def _leaves(self, names: Sequence[str]) -> list[int]:
+        """Return the numbers of the leaf columns that are named, or lie below one that is."""
+        paths = (self._file.schema.column(k).path for k in range(self.metadata.num_columns))
+        wanted = {*names}, tuple(f"{name}." for name in names)
+        return [k for k, p in enumerate(paths) if p in wanted[0] or p.startswith(wanted[1])]
+
+
 def open_parquet(
     path: Path | str, spec: TableSpec[Any], source: Path | BinaryIO | None = None
-) -> pq.ParquetFile:
+) -> TableFile:
     """Open a Parquet file of the spec's columns.
 
     Parameters
@@ -163,45 +284,21 @@ def open_parquet(
 
     """
     try:
-        file = pq.ParquetFile(path if source is None else source, page_checksum_verification=True)
-        schema = file.schema_arrow
+        file = TableFile(str(path), Path(path) if source is None else source, spec)
     except FileNotFoundError:
         raise CorruptDataError(f"{path}: the file is missing: {MENDING}") from None
     except Exception as error:
         raise damaged(path, error) from error
-    if not schema.equals(spec.schema) and (found := problems(schema, spec.schema)):
+    if not file.schema.equals(spec.schema) and (found := problems(file.schema, spec.schema)):
+        file.close()
         raise CorruptDataError(
             f"{path}: the columns are not those of {spec.name}: {', '.join(found[:3])}: {MENDING}"
         )
     return file
 
 
-def read_group(
-    path: Path | str,
-    file: pq.ParquetFile,
-    group: int,
-    spec: TableSpec[Any],
-    columns: Sequence[str] | None = None,
-) -> pa.Table:
-    """Return one row group as columns of the spec, its page checksums verified.
-
-    Raises
-    ------
-    CorruptDataError
-        A page is damaged.
-
-    """
-    try:
-        if file.schema_arrow.equals(spec.schema):
-            names = None if columns is None else list(columns)
-            return file.read_row_group(group, columns=names, use_threads=False)
-        return conformed(file.read_row_group(group, use_threads=False), spec.schema, columns)
-    except Exception as error:
-        raise damaged(path, error) from error
-
-
 def read_table(path: Path, spec: TableSpec[Any], columns: Sequence[str] | None = None) -> pa.Table:
-    """Return the table in a file, all its page checksums verified.
+    """Return the table in a file, everything that is read of it verified.
 
     Raises
     ------
@@ -210,50 +307,7 @@ def read_table(path: Path, spec: TableSpec[Any], columns: Sequence[str] | None =
 
     """
     with open_parquet(path, spec) as file:
-        return read_all(path, file, spec, columns)
-
-
-def read_all(
-    path: Path | str,
-    file: pq.ParquetFile,
-    spec: TableSpec[Any],
-    columns: Sequence[str] | None = None,
-) -> pa.Table:
-    """Return the table in an open file as columns of the spec.
-
-    Raises
-    ------
-    CorruptDataError
-        A page is damaged.
-
-    """
-    try:
-        if file.schema_arrow.equals(spec.schema):
-            table = file.read(columns=None if columns is None else list(columns))
-        else:
-            table = conformed(file.read(), spec.schema, columns)
-        table.validate(full=True)
-    except Exception as error:
-        raise damaged(path, error) from error
-    return table
-
-
-def read_as_written(path: Path, spec: TableSpec[Any]) -> pa.Table:
-    """Return the table in a file with every column that it holds, known to this release or not.
-
-    Raises
-    ------
-    CorruptDataError
-        Missing, damaged or of other columns.
-
-    """
-    with open_parquet(path, spec) as file:
-        try:
-            table = file.read()
-            table.validate(full=True)
-        except Exception as error:
-            raise damaged(path, error) from error
-    return table
+        return file.read_all(columns)
 
 
 def damaged(path: Path | str, error: BaseException) -> CorruptDataError:

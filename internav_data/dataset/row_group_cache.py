@@ -9,19 +9,17 @@ import numpy as np
 
 from internav_data.core.lru import LRUCache
 from internav_data.dataset.decode import ColumnReader, RecordReader
-from internav_data.dataset.parquet import read_group
 from internav_data.dataset.snapshot import open_shard
 from internav_data.records.errors import CorruptDataError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    import pyarrow as pa
-    import pyarrow.parquet as pq
     from numpy.typing import NDArray
 
     from internav_data.core.storage import Store
     from internav_data.dataset.manifest import DataFile
+    from internav_data.dataset.parquet import TableFile
     from internav_data.dataset.tables import TableSpec
 
 V = TypeVar("V")
@@ -75,7 +73,7 @@ class RowGroupCache:
     def _open_anew(self) -> None:
         # A forked process shares file positions with its parent: nothing of it may be used.
         self._process = os.getpid()
-        self._open: LRUCache[int, pq.ParquetFile] = LRUCache(
+        self._open: LRUCache[int, TableFile] = LRUCache(
             MAX_OPEN_FILES, on_evict=lambda file: file.close()
         )
         self._groups: LRUCache[int, tuple[int, Reader]] = LRUCache(
@@ -91,7 +89,7 @@ class RowGroupCache:
         """Drop the row groups in memory; files stay open."""
         self._groups.clear()
 
-    def file(self, number: int) -> pq.ParquetFile:
+    def file(self, number: int) -> TableFile:
         """Return an open file.
 
         Raises
@@ -135,19 +133,15 @@ class RowGroupCache:
     def _read(self, number: int, group: int) -> tuple[int, Reader]:
         """Return the bytes of a row group in memory, and its reader."""
         try:
-            table = self._group_table(number, group)
+            table = self.file(number).read_group(group, self._columns)
         except CorruptDataError:
             # A network file system takes a removed file away from those who hold it open.
             self._open.clear()
-            table = self._group_table(number, group)
+            table = self.file(number).read_group(group, self._columns)
         if self._columns is not None:
             return table.nbytes, ColumnReader(table.select(list(self._columns)), self._spec)
         extra = self._extra() if self._extra else None
         return table.nbytes, RecordReader(table, self._spec, extra)
-
-    def _group_table(self, number: int, group: int) -> pa.Table:
-        path = self._store.at(self._files[number].path)
-        return read_group(path, self.file(number), group, self._spec, self._columns)
 
     def row(self, row: int) -> Any:  # noqa: ANN401 - a record, or a dictionary of columns
         """Return one row."""

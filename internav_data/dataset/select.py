@@ -84,7 +84,7 @@ def check_columns(names: Sequence[str], spec: TableSpec[Any]) -> None:
 def read_columns(
     store: Store, files: Sequence[DataFile], spec: TableSpec[Any], names: Sequence[str]
 ) -> pa.Table:
-    """Return some columns of all rows of the files, page checksums verified.
+    """Return some columns of all rows of the files, their checksums verified.
 
     Raises
     ------

@@ -17,7 +17,7 @@ import pyarrow.compute as pc
 
 from internav_data.dataset.encode import to_table
 from internav_data.dataset.manifest import DataFile, Manifest, check_file, open_file
-from internav_data.dataset.parquet import file_info, parquet_bytes, read_all
+from internav_data.dataset.parquet import file_info, parquet_bytes
 from internav_data.dataset.staging import SceneState, Staging, read_staged_rows
 from internav_data.dataset.tables import ASSETS, EPISODES, SCENES, TableSpec
 
@@ -61,7 +61,7 @@ class SceneSource:
         self, file: DataFile, spec: TableSpec[Any], columns: Sequence[str] | None = None
     ) -> pa.Table:
         with open_file(self._store, file, spec) as opened:
-            return read_all(self._store.at(file.path), opened, spec, columns)
+            return opened.read_all(columns)
 
     def in_place(self, path: str, sha256: str) -> bool:
         """Return whether the older dataset has this very file."""

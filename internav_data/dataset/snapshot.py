@@ -17,17 +17,16 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from internav_data.dataset.digest import logical_digest
 from internav_data.dataset.manifest import open_file, read_manifest, read_manifest_and_digest
-from internav_data.dataset.parquet import damaged, read_all
 from internav_data.records.errors import CorruptDataError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     from internav_data.core.storage import Store
     from internav_data.dataset.manifest import DataFile, Manifest
+    from internav_data.dataset.parquet import TableFile
     from internav_data.dataset.tables import TableSpec
 
 T = TypeVar("T")
@@ -57,7 +56,7 @@ def with_manifest(store: Store, use: Callable[[Manifest, str], T]) -> T:
     return use(*read_manifest_and_digest(store))
 
 
-def open_shard(store: Store, file: DataFile, spec: TableSpec[Any]) -> pq.ParquetFile:
+def open_shard(store: Store, file: DataFile, spec: TableSpec[Any]) -> TableFile:
     """Open a file of a manifest, or the one that has taken its place.
 
     The latter begins with the same `file.rows` rows, proven by their digest; any after them are
@@ -80,7 +79,7 @@ def open_shard(store: Store, file: DataFile, spec: TableSpec[Any]) -> pq.Parquet
             opened = open_file(store, later, spec)
         except CorruptDataError:
             continue  # replaced in its turn
-        if _begins_with(store.at(later.path), opened, file):
+        if logical_digest(opened.read_as_written().slice(0, file.rows)) == file.logical_digest:
             return opened
         break
     raise CorruptDataError(
@@ -96,11 +95,11 @@ def read_shard(
     Raises
     ------
     CorruptDataError
-        As `open_shard`, or a page is damaged.
+        As `open_shard`, or a column chunk is damaged.
 
     """
     with open_shard(store, file, spec) as opened:
-        return read_all(store.at(file.path), opened, spec, columns).slice(0, file.rows)
+        return opened.read_all(columns).slice(0, file.rows)
 
 
 def _replacement(store: Store, file: DataFile) -> DataFile | None:
@@ -110,11 +109,3 @@ def _replacement(store: Store, file: DataFile) -> DataFile | None:
         if other.path.rpartition("-")[0] == stem and other.rows >= file.rows:
             return None if other.path == file.path else other
     return None
-
-
-def _begins_with(path: str, opened: pq.ParquetFile, file: DataFile) -> bool:
-    try:
-        rows = opened.read().slice(0, file.rows)
-    except Exception as error:
-        raise damaged(path, error) from error
-    return logical_digest(rows) == file.logical_digest

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final, get_args, get_type_hints
 from internav_data.core.files import FileLimits, read_json
 from internav_data.core.storage import write_atomically
 from internav_data.dataset import from_table, write_parquet
-from internav_data.dataset.parquet import open_parquet, read_all
+from internav_data.dataset.parquet import open_parquet
 from internav_data.evaluation.metrics import RESULTS, EpisodeResult
 from internav_data.records.errors import CorruptDataError, InternavError, UsageError
 
@@ -107,7 +107,7 @@ def read_evaluation(folder: Path) -> Evaluation:
                 f"{table_path}: expected {episodes} rows as {ABOUT} says (at most "
                 f"{_MAX_ROWS}), got {rows}; evaluate again"
             )
-        results = tuple(from_table(read_all(table_path, opened, RESULTS), RESULTS))
+        results = tuple(from_table(opened.read_all(), RESULTS))
     if len({result.episode_id for result in results}) != len(results):
         raise CorruptDataError(f"{table_path}: an episode is there twice; evaluate again")
     return Evaluation(about, results)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from internav_data.dataset import TABLES, logical_digest, read_manifest
 from internav_data.dataset.manifest import MANIFEST
-from internav_data.dataset.parquet import read_as_written
+from internav_data.dataset.parquet import open_parquet
 from internav_data.records.errors import CorruptDataError, InternavError, UsageError
 from internav_data.verification.findings import FindingCollector
 
@@ -56,7 +56,7 @@ def check_listing(root: Path, manifest: Manifest, report: FindingCollector) -> N
 
 
 def check_file(root: Path, file: DataFile) -> FindingCollector:
-    """Check one Parquet file: bytes, hashes, rows, page checksums."""
+    """Check one Parquet file: bytes, hashes, rows, checksums."""
     report = FindingCollector(file.path)
     report.counts["files"] += 1
     path = root / file.path
@@ -76,7 +76,8 @@ def check_file(root: Path, file: DataFile) -> FindingCollector:
     )
     spec = next(spec for spec in TABLES if spec.name == file.table)
     try:
-        table = read_as_written(path, spec)
+        with open_parquet(path, spec) as opened:
+            table = opened.read_as_written()
     except InternavError as error:
         report.expect(False, "files.readable", "a whole Parquet file of its table", error)  # noqa: FBT003
         return report

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from internav_data.core.messages import Failed, Recipe
 from internav_data.core.worker_pool import WorkerPool
 from internav_data.dataset import ASSETS, EPISODES, SCENES, from_table, read_table
-from internav_data.dataset.parquet import open_parquet, read_group
+from internav_data.dataset.parquet import open_parquet
 from internav_data.records import LoaderStream, Purpose, generator
 from internav_data.records.errors import InternavError, UsageError
 from internav_data.verification.checked_config import CheckedConfig, checked_config
@@ -70,7 +70,7 @@ def validate(
     path
         Folder of a finished dataset.
     level
-        `files`: hashes, page checksums, nothing unlisted. `schema`: columns, ranges, ids.
+        `files`: hashes, checksums, nothing unlisted. `schema`: columns, ranges, ids.
         `geometry`: every predicate of every house and episode, derived again by shapely, scipy
         and networkx. `physics`: settling, outcomes and experts, replayed. Each level runs
         those before it; an episode whose geometry is untrue is not replayed.
@@ -209,8 +209,8 @@ def _shard_refs(root: Path, manifest: Manifest, damaged: frozenset[str]) -> list
             if file.path in damaged:
                 continue
             with open_parquet(root / file.path, spec) as parquet:
-                for group in range(parquet.num_row_groups):
-                    column = read_group(root / file.path, parquet, group, spec, ["scene_id"])
+                for group in range(parquet.metadata.num_row_groups):
+                    column = parquet.read_group(group, ["scene_id"])
                     for scene_id in column.column(0).unique().to_pylist():
                         found[name].setdefault(scene_id, (file.path, group))
     return [
@@ -231,7 +231,7 @@ class _Reader:
             file, group = row_group
             spec = SCENES if name == "scenes" else EPISODES
             with open_parquet(self._root / file, spec) as parquet:
-                table = read_group(self._root / file, parquet, group, spec)
+                table = parquet.read_group(group)
             extra: dict[str, Any] | None = {"assets": {}} if name == "scenes" else None
             self._last[name] = (row_group, from_table(table, spec, extra))
         return self._last[name][1]

@@ -11,7 +11,7 @@ import pytest
 
 from internav_data.dataset import EPISODES, from_table, load_dataset, read_table, to_table
 from internav_data.dataset.compatibility import conformed, problems
-from internav_data.dataset.parquet import open_parquet, read_all
+from internav_data.dataset.parquet import open_parquet
 from internav_data.records.errors import CorruptDataError
 
 KEPT = sorted((Path(__file__).parents[1] / "data").glob("dataset-*"))
@@ -58,7 +58,7 @@ def test_later_columns_are_ignored_at_the_top_and_inside(dataset_folder, tmp_pat
     assert from_table(read_table(tmp_path / "later.parquet", EPISODES), EPISODES) == episodes
     names = ["mode", "expert.steps", "obstacles.list.element.type"]
     with open_parquet(tmp_path / "later.parquet", EPISODES) as file:
-        part = read_all(tmp_path / "later.parquet", file, EPISODES, names)
+        part = file.read_all(names)
     assert part.column("mode").to_pylist() == [episode.mode for episode in episodes]
     assert part.column("expert").to_pylist() == [
         episode.expert and {"steps": episode.expert.steps} for episode in episodes

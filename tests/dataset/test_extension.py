@@ -21,6 +21,7 @@ from internav_data.dataset import (
     shards,
     snapshot,
 )
+from internav_data.dataset.parquet import TableFile
 from internav_data.records.errors import CorruptDataError
 
 SIZES = {"episodes": 8, "scenes": 20}
@@ -95,24 +96,20 @@ def test_a_file_taken_from_those_who_hold_it_open_is_found_again(tmp_path, monke
     before = list(ds)
     ds.row_group_cache.clear()
     extend(tmp_path, 10, 19)
-    monkeypatch.setattr(
-        "internav_data.dataset.row_group_cache.read_group", _stale(tmp_path, monkeypatch)
-    )
+    monkeypatch.setattr(TableFile, "read_group", _stale(tmp_path))
     assert list(ds) == before
 
 
-def _stale(folder, monkeypatch):
-    from internav_data.dataset import row_group_cache
-
-    real, paths = row_group_cache.read_group, {file.path for file in read_manifest(folder).files}
+def _stale(folder):
+    real, paths = TableFile.read_group, {file.path for file in read_manifest(folder).files}
     seen = []
 
-    def read_group(path, file, *args):
-        name = path.removeprefix(f"{folder}/")
+    def read_group(file, *args):
+        name = file.place.removeprefix(f"{folder}/")
         if name not in paths and not seen:
             seen.append(name)
-            raise CorruptDataError(f"{path}: the file is damaged (Stale file handle)")
-        return real(path, file, *args)
+            raise CorruptDataError(f"{file.place}: the file is damaged (Stale file handle)")
+        return real(file, *args)
 
     return read_group
 
