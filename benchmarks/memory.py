@@ -4,7 +4,7 @@
 
 One environment of 16x16 pixels, all actions but Done in a walker's shares. Caches fill up
 first: `grown_mib` is the growth in the second half. Target: 64 MiB at most, whatever the counts.
-`--clear` empties the caches of physics and visibility at the end and prints their sizes.
+`--clear` empties the caches of geometry and visibility at the end and prints their sizes.
 """
 
 from __future__ import annotations
@@ -22,8 +22,6 @@ import psutil
 
 from internav_data.envs import InterNavEnv
 from internav_data.physics.narrow_phase import prisms_of
-from internav_data.physics.pushing import _push_alone, _push_in
-from internav_data.physics.settling import _settle_alone
 from internav_data.physics.sweep import centred_corners
 from internav_data.planner.problem import _blocked_indices
 from internav_data.world.drop import _standing
@@ -33,9 +31,6 @@ TARGET_MIB = 64.0
 SHARES = np.array([8, 2, 2, 0.5, 0.5, 0.4, 0.4, 0.4, 0.4, 1, 1, 0], np.float64)
 REPORTS = 20
 CACHES = {
-    "push alone": _push_alone,
-    "push in a scene": _push_in,
-    "settle alone": _settle_alone,
     "shells of assets": occlusion_shape,
     "shells in place": placed_occlusion_shape,
     "outlines in place": prisms_of,

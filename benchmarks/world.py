@@ -25,10 +25,9 @@ from internav_data.episodes import build_episodes
 from internav_data.episodes.outcomes import outcomes_of
 from internav_data.geometry import yaw_quaternion
 from internav_data.houses import HouseConfig, build_house
-from internav_data.physics import push
+from internav_data.physics import get_engine, push
 from internav_data.physics.cache import CachedEngine
 from internav_data.physics.engines.bullet import bullet
-from internav_data.physics.pushing import _push_alone, _push_in
 from internav_data.physics.result_cache import FOLDER_VARIABLE, ResultCache
 from internav_data.physics.scene import UPRIGHT, Body, PhysicsScene
 from internav_data.records import PUSH_SPECS, Pose
@@ -63,10 +62,11 @@ def summary(times: list[float]) -> dict[str, float]:
     }
 
 
-def forget() -> None:
-    """Drop every cached push."""
-    _push_alone.cache_clear()
-    _push_in.cache_clear()
+def forget(*, lone: bool = True) -> None:
+    """Drop the pushes in memory: all, or only those among other objects."""
+    engine = get_engine()
+    assert isinstance(engine, CachedEngine)
+    engine.forget(lone=lone)
 
 
 def make_worlds(scenes: int, count: int) -> list[World]:
@@ -163,7 +163,7 @@ def main() -> None:
     housed = pushes_in_houses(worlds)
     forget()
     cold = [timed(lambda w=world: outcomes_of(w)) for world in worlds]
-    _push_in.cache_clear()
+    forget(lone=False)
     lone_known = [timed(lambda w=world: outcomes_of(w)) for world in worlds]
     warm = [timed(lambda w=world: outcomes_of(w)) for world in worlds]
     with tempfile.TemporaryDirectory() as folder:

@@ -1,13 +1,16 @@
 """Cache that drops the entries used least recently.
 
 For functions of their arguments `functools.lru_cache` does the same; this one bounds the weight of
-its entries rather than their number, closes what it drops, and can be emptied or enlarged.
+its entries rather than their number, closes what it drops, and can be emptied or enlarged. Threads
+may share it.
 """
 
 from __future__ import annotations
 
 from collections import OrderedDict
 from typing import TYPE_CHECKING, Generic, TypeVar
+
+from internav_data.core.locks import ThreadLock
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable
@@ -37,7 +40,7 @@ class LRUCache(Generic[K, V]):
         Called with every value that goes, as by `clear`.
     """
 
-    __slots__ = ("_entries", "_on_evict", "_weigh", "_weight", "capacity")
+    __slots__ = ("_entries", "_lock", "_on_evict", "_weigh", "_weight", "capacity")
 
     def __init__(
         self,
@@ -49,6 +52,7 @@ class LRUCache(Generic[K, V]):
         self._weigh, self._on_evict = weigh, on_evict
         self._entries: OrderedDict[K, V] = OrderedDict()
         self._weight = 0.0
+        self._lock = ThreadLock()
 
     def __len__(self) -> int:
         return len(self._entries)
@@ -59,21 +63,23 @@ class LRUCache(Generic[K, V]):
     def get(self, key: K, make: Callable[[], V]) -> V:
         """Return the value of a key, made if the cache has none; it is now the newest entry.
 
-        If `make` raises, nothing changes.
+        If `make` raises, nothing changes. A value is made by one thread; others wait for it.
         """
-        if key in self._entries:
-            self._entries.move_to_end(key)
-            return self._entries[key]
-        value = self._entries[key] = make()
-        self._weight += self._weigh(value)
-        while self._weight > self.capacity and len(self._entries) > 1:
-            self._evict()
-        return value
+        with self._lock:
+            if key in self._entries:
+                self._entries.move_to_end(key)
+                return self._entries[key]
+            value = self._entries[key] = make()
+            self._weight += self._weigh(value)
+            while self._weight > self.capacity and len(self._entries) > 1:
+                self._evict()
+            return value
 
     def clear(self) -> None:
         """Drop every entry."""
-        while self._entries:
-            self._evict()
+        with self._lock:
+            while self._entries:
+                self._evict()
 
     def _evict(self) -> None:
         _, value = self._entries.popitem(last=False)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from internav_data.core.locks import ThreadLock
 from internav_data.core.lru import LRUCache
 from internav_data.dataset.decode import ColumnReader, RecordReader
 from internav_data.dataset.snapshot import open_shard
@@ -65,6 +66,8 @@ class RowGroupCache:
         self.starts: NDArray[np.int64] = np.cumsum([0, *[file.rows for file in files]])
         """(files + 1,) row number at which each file starts."""
         self._bounds: dict[int, NDArray[np.int64]] = {}
+        # One for files and groups: no thread closes a file that another one reads.
+        self._lock = ThreadLock()
         self._open_anew()
 
     def __len__(self) -> int:
@@ -106,13 +109,15 @@ class RowGroupCache:
 
     def bounds(self, number: int) -> NDArray[np.int64]:
         """Return the row numbers at which a file's row groups start, and the end: (groups + 1,)."""
-        if number not in self._bounds:
-            metadata = self.file(number).metadata
-            rows = [metadata.row_group(k).num_rows for k in range(metadata.num_row_groups)]
-            # A file that took another's place ends later: its first groups are the other's.
-            starts, total = np.cumsum([0, *rows]), self._files[number].rows
-            self._bounds[number] = self.starts[number] + np.append(starts[starts < total], total)
-        return self._bounds[number]
+        with self._lock:
+            if number not in self._bounds:
+                metadata = self.file(number).metadata
+                rows = [metadata.row_group(k).num_rows for k in range(metadata.num_row_groups)]
+                # A file that took another's place ends later: its first groups are the other's.
+                starts, total = np.cumsum([0, *rows]), self._files[number].rows
+                kept = np.append(starts[starts < total], total)
+                self._bounds[number] = self.starts[number] + kept
+            return self._bounds[number]
 
     def all_bounds(self) -> NDArray[np.int64]:
         """Return the rows at which the row groups of all files start, and the end: (n,) int64."""
@@ -122,13 +127,14 @@ class RowGroupCache:
     def group_of(self, row: int) -> tuple[int, int, Reader]:
         """Return the first row and the end of a row's group, and the group's reader."""
         number = int(np.searchsorted(self.starts, row, side="right")) - 1
-        bounds = self.bounds(number)
-        group = int(np.searchsorted(bounds, row, side="right")) - 1
-        first, end = int(bounds[group]), int(bounds[group + 1])
-        if self._process != os.getpid():
-            self._open_anew()
-        _, reader = self._groups.get(first, lambda: self._read(number, group))
-        return first, end, reader
+        with self._lock:
+            bounds = self.bounds(number)
+            group = int(np.searchsorted(bounds, row, side="right")) - 1
+            first, end = int(bounds[group]), int(bounds[group + 1])
+            if self._process != os.getpid():
+                self._open_anew()
+            _, reader = self._groups.get(first, lambda: self._read(number, group))
+            return first, end, reader
 
     def _read(self, number: int, group: int) -> tuple[int, Reader]:
         """Return the bytes of a row group in memory, and its reader."""

@@ -1,11 +1,12 @@
-"""Wrapper of a physics engine that looks solutions up in the result cache before it solves.
+"""Wrapper of a physics engine that looks solutions up, in memory and on disk, before it solves.
 
 This module knows physics: which problems are equal, what a solution depends on besides, and how it
 is packed into bytes. The file on disk that holds those bytes is `result_cache`, which knows none.
 
 A problem is plain data and its solution depends on nothing else. Solutions recur: on free ground
-an object settles and slides the same way in every house, and training meets the scenes that
-generation has solved.
+an object settles and slides the same way in every house. Problems of one object are kept on disk.
+Those of several recur within a process at most (generation asks none again, training with another
+seed 3 to 7 %), and would be half of what is written.
 """
 
 from __future__ import annotations
@@ -15,23 +16,26 @@ import hashlib
 import math
 import platform
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib import metadata
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypeVar
 
-from internav_data.physics.scene import PushSolution, SettleSolution
+from internav_data.core.lru import LRUCache
+from internav_data.physics.scene import PhysicsScene, PushSolution, SettleSolution
 from internav_data.physics.sweep import PATH_POSE_BYTES
 from internav_data.records import Pose
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from internav_data.physics.result_cache import ResultCache
-    from internav_data.physics.scene import Engine, PhysicsScene
+    from internav_data.physics.scene import Engine
     from internav_data.records import Asset, PushSpec
+
+S = TypeVar("S")
 
 _PACKAGE: Final = "internav_data"
 _SOLVERS: Final = ("internav_data.geometry", "internav_data.physics")
@@ -48,14 +52,46 @@ _MOVER: Final = struct.Struct("<7d8dI")
 """Pose, sweep, length of the path in bytes; the paths follow after all of these."""
 
 
+SAMPLE: Final = 1000
+"""One of so many keys has its solution compared with a new one whenever it is read from disk."""
+_LONE_BYTES: Final = 48 << 20
+"""Memory for solutions of one object, about 10,000 pushes, in each process."""
+_CROWDED_BYTES: Final = 48 << 20
+"""Memory for solutions of several objects, about 4,000 pushes, in each process."""
+_OBJECT_BYTES: Final = 2048
+"""Memory of a solution and its key besides the paths, for a body that moves."""
+
+
+def _bytes_of(solution: SettleSolution | PushSolution) -> float:
+    if isinstance(solution, SettleSolution):
+        return _OBJECT_BYTES
+    return _OBJECT_BYTES * len(solution.poses) + sum(map(len, solution.paths))
+
+
+def _settles() -> LRUCache[PhysicsScene, SettleSolution]:
+    return LRUCache(_LONE_BYTES // 4, _bytes_of)
+
+
+def _pushes(capacity: int) -> LRUCache[tuple[PushSpec, PhysicsScene], PushSolution]:
+    return LRUCache(capacity, _bytes_of)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class CachedEngine:
-    """An engine that solves only problems whose solution is not in the result cache."""
+    """An engine that solves only problems whose solution is not known yet."""
 
     engine: Engine
-    result_cache: ResultCache
+    result_cache: ResultCache | None
+    """Solutions on disk; None to keep those of this process alone."""
     origin: str
     """Inputs of a solution besides the problem: engine, code, libraries, machine (`origin`)."""
+    _settled: LRUCache[PhysicsScene, SettleSolution] = field(default_factory=_settles)
+    _lone: LRUCache[tuple[PushSpec, PhysicsScene], PushSolution] = field(
+        default_factory=lambda: _pushes(_LONE_BYTES)
+    )
+    _crowded: LRUCache[tuple[PushSpec, PhysicsScene], PushSolution] = field(
+        default_factory=lambda: _pushes(_CROWDED_BYTES)
+    )
 
     @property
     def name(self) -> str:
@@ -84,25 +120,58 @@ class CachedEngine:
 
     def settle(self, scene: PhysicsScene) -> SettleSolution:
         """Let the first body of the scene fall until it rests."""
-        if not self.result_cache.is_open:
+
+        def solve() -> SettleSolution:
             return self.engine.settle(scene)
-        key = self._key("settle", scene)
-        known = unpack_settle(self.result_cache.get(key))
-        if known is None:
-            known = self.engine.settle(scene)
-            self.result_cache.put(key, pack_settle(known))
-        return known
+
+        return self._settled.get(
+            scene, lambda: self._find("settle", scene, solve, pack_settle, unpack_settle)
+        )
 
     def push(self, scene: PhysicsScene, spec: PushSpec) -> PushSolution:
         """Push the first body of the scene along +x."""
-        if not self.result_cache.is_open:
+
+        def solve() -> PushSolution:
             return self.engine.push(scene, spec)
-        key = self._key(repr(spec), scene)
-        known = unpack_push(self.result_cache.get(key), sum(b.moves for b in scene.bodies))
+
+        known = self._lone if _is_lone(scene) else self._crowded
+        return known.get(
+            (spec, scene), lambda: self._find(repr(spec), scene, solve, pack_push, unpack_lone_push)
+        )
+
+    def forget(self, *, lone: bool = True) -> None:
+        """Drop the solutions in memory: all, or only those of several objects."""
+        self._crowded.clear()
+        if lone:
+            self._settled.clear()
+            self._lone.clear()
+
+    def _find(
+        self,
+        what: str,
+        scene: PhysicsScene,
+        solve: Callable[[], S],
+        pack: Callable[[S], bytes],
+        unpack: Callable[[bytes | None], S | None],
+    ) -> S:
+        """Return a solution from disk, or a new one."""
+        kept = self.result_cache
+        if kept is None or not kept.is_open or not _is_lone(scene):
+            return solve()
+        key = self._key(what, scene)
+        known = unpack(kept.get(key))
+        if known is not None and int.from_bytes(key[-8:], "big") % SAMPLE:
+            return known
+        solution = solve()
         if known is None:
-            known = self.engine.push(scene, spec)
-            self.result_cache.put(key, pack_push(known))
-        return known
+            kept.put(key, pack(solution))
+        elif pack(solution) != pack(known):
+            self.forget()
+            kept.drop(
+                "a solution in this cache was wrong, so data made with it may be too "
+                "(`internav-gen validate` tells)"
+            )
+        return solution
 
     def _key(self, what: str, scene: PhysicsScene) -> bytes:
         # By geometry, not by asset: equal parts under another id, or with other dynamics of the
@@ -113,6 +182,11 @@ class CachedEngine:
         )
         asked = (self.origin, what, scene.agent, *bodies)
         return hashlib.sha256(repr(asked).encode()).digest()
+
+
+def _is_lone(scene: PhysicsScene) -> bool:
+    """Return whether an object is alone: the problems that recur in other houses."""
+    return len(scene.bodies) == 1 and scene.agent is None
 
 
 @lru_cache(maxsize=8192)
@@ -150,6 +224,11 @@ def pack_push(solution: PushSolution) -> bytes:
         *(_MOVER.pack(*_numbers(pose), *sweep, len(path)) for pose, sweep, path in movers),
         *solution.paths,
     ))  # fmt: skip
+
+
+def unpack_lone_push(value: bytes | None) -> PushSolution | None:
+    """Return the solution of a push of one object; None for bytes that hold none."""
+    return unpack_push(value, 1)
 
 
 def unpack_push(value: bytes | None, movers: int) -> PushSolution | None:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import TYPE_CHECKING, Final, Literal
 
 from internav_data.geometry import round_m
@@ -158,7 +157,7 @@ def push(
 
     """
     problem = _Problem.of(body, heading, near, spec, engine)
-    solution = free = _push_alone(problem.pushed, spec, problem.solver)
+    solution = free = _push_alone(problem)
     movers: Movers = ()
     failure: Failure = "too heavy"
 
@@ -198,7 +197,7 @@ def count_movers(
 
     """
     problem = _Problem.of(body, heading, near, spec, engine)
-    free = _push_alone(problem.pushed, spec, problem.solver)
+    free = _push_alone(problem)
     if not _is_moved(body, problem.frame, free):
         return 0
 
@@ -211,15 +210,8 @@ def count_movers(
     return len(known)
 
 
-@lru_cache(maxsize=32768)
-def _push_alone(pushed: Body, spec: PushSpec, solver: Engine) -> PushSolution:
-    return solver.push(PhysicsScene((pushed,)), spec)
-
-
-@lru_cache(maxsize=4096)
-def _push_in(scene: PhysicsScene, spec: PushSpec, solver: Engine) -> PushSolution:
-    """Push in a scene; a failed push changed nothing and is likely to be tried again."""
-    return solver.push(scene, spec)
+def _push_alone(problem: _Problem) -> PushSolution:
+    return problem.solver.push(PhysicsScene((problem.pushed,)), problem.spec)
 
 
 def _push_among(
@@ -237,7 +229,7 @@ def _push_among(
         others = [pair for pair in around if not pair[1].moves]
         bodies = (replace(body, pose=frame.enter(body.pose)) for _, body in (*movers, *others))
         scene = PhysicsScene((problem.pushed, *bodies), collider)
-        solution = _push_in(scene, problem.spec, problem.solver)
+        solution = problem.solver.push(scene, problem.spec)
         met = _met(problem, (problem.pushed.asset, *_assets(movers)), solution, known)
         if not met:
             break

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
+from internav_data.core.locks import ThreadLock
 from internav_data.physics.cache import CachedEngine, origin
 from internav_data.physics.engines import DEFAULT_ENGINE, ENGINES
 from internav_data.physics.result_cache import ResultCache, result_cache
@@ -16,18 +18,19 @@ if TYPE_CHECKING:
 
     from internav_data.physics.scene import Engine
 
-_cache_off = False
+_cache_off: ContextVar[bool] = ContextVar("_cache_off", default=False)
+"""Of one thread: another one may read the cache meanwhile."""
+_MAKING: Final = ThreadLock()
 
 
 @contextmanager
 def cache_disabled() -> Iterator[None]:
-    """Solve every problem anew: inside, the result cache is neither read nor filled."""
-    global _cache_off  # noqa: PLW0603 - belongs to the process, as the engines do
-    before, _cache_off = _cache_off, True
+    """Solve every problem of this thread anew: inside, the result cache is not used."""
+    before = _cache_off.set(True)
     try:
         yield
     finally:
-        _cache_off = before
+        _cache_off.reset(before)
 
 
 def get_engine(name: str = DEFAULT_ENGINE) -> Engine:
@@ -44,10 +47,11 @@ def get_engine(name: str = DEFAULT_ENGINE) -> Engine:
     if name not in ENGINES:
         raise UsageError(f"no physics engine is called {name!r}; known are {', '.join(ENGINES)}")
     engine = ENGINES[name]()
-    return engine if _cache_off else _cached(engine, result_cache())
+    with _MAKING:
+        return _cached(engine, None if _cache_off.get() else result_cache())
 
 
 @lru_cache(maxsize=8)
-def _cached(engine: Engine, known: ResultCache) -> Engine:
+def _cached(engine: Engine, known: ResultCache | None) -> Engine:
     where = origin(engine)
-    return engine if where is None else CachedEngine(engine, known, where)
+    return CachedEngine(engine, known if where else None, where or "")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from internav_data.geometry import multiply, rotation_matrix, round_m, round_quaternion
@@ -16,7 +15,7 @@ from internav_data.records import Pose
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from internav_data.physics.scene import Engine, SettleSolution
+    from internav_data.physics.scene import SettleSolution
 
 DROP_M = 0.01
 """Height above the floor from which an object is released, metres."""
@@ -70,15 +69,10 @@ def settle(
     """
     solver = get_engine(engine)
     falling = Body(body.asset, _START, body.dynamics)
-    solution = _settle_alone(falling, solver)
+    solution = solver.settle(PhysicsScene((falling,)))
     if solution.reach_m + solver.contact_margin_m > clearance_m:
         solution = solver.settle(_scene(falling, body.pose, neighbours()))
     return _judged(body.pose, solution)
-
-
-@lru_cache(maxsize=8192)
-def _settle_alone(falling: Body, engine: Engine) -> SettleSolution:
-    return engine.settle(PhysicsScene((falling,)))
 
 
 _START = Pose(0.0, 0.0, DROP_M, UPRIGHT)

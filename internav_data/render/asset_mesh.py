@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from internav_data.catalog import part_triangles
+from internav_data.core.locks import ThreadLock
 from internav_data.geometry import rotation_matrix
 from internav_data.records import Part
 from internav_data.render.materials import Mesh, look_row, part_look
@@ -216,21 +217,23 @@ class Library:
         self._numbers: dict[Asset, int] = {}
         self._models: list[Model] = []
         self._mesh: Mesh | None = None
+        self._lock = ThreadLock()
         self.max_vertices = 4
         self.max_corners = 8
 
     def number(self, asset: Asset) -> int:
         """Return the number of an asset's model; the model is built at the first call."""
-        found = self._numbers.get(asset)
-        if found is None:
-            found = len(self._models)
-            model = model_of(asset)
-            self._models.append(model)
-            self._numbers[asset] = found
-            self._mesh = None
-            self.max_vertices = max(self.max_vertices, int(model.vertex_counts.max()))
-            self.max_corners = max(self.max_corners, int(model.corner_counts.max()))
-        return found
+        with self._lock:
+            found = self._numbers.get(asset)
+            if found is None:
+                found = len(self._models)
+                model = model_of(asset)
+                self._models.append(model)
+                self._numbers[asset] = found
+                self._mesh = None
+                self.max_vertices = max(self.max_vertices, int(model.vertex_counts.max()))
+                self.max_corners = max(self.max_corners, int(model.corner_counts.max()))
+            return found
 
     def faces(self, number: int) -> int:
         """Return the number of faces of a model."""
@@ -239,9 +242,10 @@ class Library:
     @property
     def mesh(self) -> Mesh:
         """Mesh of all models so far."""
-        if self._mesh is None:
-            self._mesh = mesh_of(self._models)
-        return self._mesh
+        with self._lock:
+            if self._mesh is None:
+                self._mesh = mesh_of(self._models)
+            return self._mesh
 
 
 LIBRARY = Library()

@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
+from internav_data.core.locks import ThreadLock
 from internav_data.geometry import rotation_matrix
 from internav_data.records.agent import AGENT
 from internav_data.records.errors import UsageError
@@ -146,7 +147,7 @@ class CameraView:
 
 
 class Camera:
-    """Camera that draws square pictures of field of view 90 degrees; one thread at a time.
+    """Camera that draws square pictures of field of view 90 degrees; threads take turns.
 
     Parameters
     ----------
@@ -169,6 +170,7 @@ class Camera:
         self.size = size
         self._portals = portals
         self._scratch: Scratch | None = None
+        self._lock = ThreadLock()
 
     def frames(self, count: int) -> Frames:
         """Return buffers for `count` pictures, to be passed to `render`."""
@@ -192,8 +194,10 @@ class Camera:
                 f"buffers for {len(views)} pictures of {self.size} pixels a side expected, "
                 f"got rgb of shape {target.rgb.shape}: make them with Camera.frames"
             )
-        for k, view in enumerate(views):
-            self._draw(view, target.rgb[k], target.depth[k], target.ids[k])
+        # The kernels run while other threads do: two of them must not draw into one scratch.
+        with self._lock:
+            for k, view in enumerate(views):
+                self._draw(view, target.rgb[k], target.depth[k], target.ids[k])
         return target
 
     def _draw(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from internav_data.core.locks import ThreadLock
 from internav_data.geometry import Polygons, footprint, wall_footprints
 from internav_data.navigation import SPACING_M, Lattice, TangentGraph
 from internav_data.physics.kdop import EMPTY, dop8_of_rectangle
@@ -87,6 +88,7 @@ class HouseModel:
     handles: tuple[int, ...]
     """The lattice's handles of `items`."""
     _tangent_graphs: dict[tuple[int, ...], TangentGraph] = field(default_factory=dict)
+    _lock: ThreadLock = field(default_factory=ThreadLock)
 
     @staticmethod
     def of(house: House) -> HouseModel:
@@ -123,15 +125,16 @@ class HouseModel:
 
     def tangent_graph(self, displaced: tuple[int, ...] = ()) -> TangentGraph:
         """Return the tangent graph among all furniture but some items (indices, ascending)."""
-        graph = self._tangent_graphs.get(displaced)
-        if graph is None:
-            left = (item.footprint for k, item in enumerate(self.items) if k not in displaced)
-            graph = TangentGraph.of_polygons(Polygons.joined([self.footprints, *left]))
-            if len(self._tangent_graphs) >= MAX_TANGENT_GRAPHS:
-                # The oldest goes, but never the one with all furniture in its place.
-                del self._tangent_graphs[next(key for key in self._tangent_graphs if key)]
-            self._tangent_graphs[displaced] = graph
-        return graph
+        with self._lock:
+            graph = self._tangent_graphs.get(displaced)
+            if graph is None:
+                left = (item.footprint for k, item in enumerate(self.items) if k not in displaced)
+                graph = TangentGraph.of_polygons(Polygons.joined([self.footprints, *left]))
+                if len(self._tangent_graphs) >= MAX_TANGENT_GRAPHS:
+                    # The oldest goes, but never the one with all furniture in its place.
+                    del self._tangent_graphs[next(key for key in self._tangent_graphs if key)]
+                self._tangent_graphs[displaced] = graph
+            return graph
 
     def shortest_path_m(self, here: Vec2, goal: Vec2) -> float | None:
         """Return the Euclidean path length with all furniture in its place and no obstacle.

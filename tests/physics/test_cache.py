@@ -2,6 +2,7 @@
 
 import contextlib
 import functools
+import hashlib
 import math
 import shutil
 import sqlite3
@@ -62,16 +63,91 @@ def remembering(folder, origin="here", engine=None):
     return CachedEngine(engine or Counting(), ResultCache(folder), origin)
 
 
-@pytest.mark.parametrize("scene", [LONE, PAIR], ids=["lone", "pair"])
-def test_a_later_process_reads_what_was_solved_to_the_last_bit(tmp_path, scene):
+def test_a_later_process_reads_what_was_solved_to_the_last_bit(tmp_path):
     first = remembering(tmp_path)
-    pushed, settled = first.push(scene, FORCE), first.settle(scene)
+    pushed, settled = first.push(LONE, FORCE), first.settle(LONE)
     assert first.engine.asked == 2
     first.result_cache.flush()
     later = remembering(tmp_path)
-    assert later.push(scene, FORCE) == pushed == bullet().push(scene, FORCE)
-    assert later.settle(scene) == settled == bullet().settle(scene)
+    assert later.push(LONE, FORCE) == pushed == bullet().push(LONE, FORCE)
+    assert later.settle(LONE) == settled == bullet().settle(LONE)
     assert later.engine.asked == 0
+
+
+def test_a_push_among_others_is_kept_by_its_process_alone(tmp_path):
+    engine = remembering(tmp_path)
+    pushed = engine.push(PAIR, FORCE)
+    assert engine.push(PAIR, FORCE) is pushed
+    assert engine.engine.asked == 1
+    assert engine.result_cache.count() == 0
+    assert remembering(tmp_path).push(PAIR, FORCE) == pushed
+
+
+def test_memory_of_solutions_is_counted_in_bytes(monkeypatch):
+    monkeypatch.setattr("internav_data.physics.cache._LONE_BYTES", 50_000)
+    engine = CachedEngine(Counting(), None, "here")
+    bodies = [replace(LONE.bodies[0], pose=Pose(0.01 * k, 0.0, 0.0, UPRIGHT)) for k in range(30)]
+    paths = sum(len(engine.push(PhysicsScene((body,)), FORCE).paths[0]) for body in bodies)
+    assert paths > 50_000
+    assert 2 < len(engine._lone) < 50_000 // (paths // 30)  # noqa: SLF001 - entries in memory
+
+
+@pytest.fixture
+def every_key_sampled(monkeypatch):
+    monkeypatch.setattr("internav_data.physics.cache.SAMPLE", 1)
+
+
+@pytest.mark.usefixtures("every_key_sampled")
+def test_a_wrong_solution_is_found_on_use_and_the_cache_dropped(tmp_path):
+    solution = kept(tmp_path)
+    wise = remembering(tmp_path)
+    assert wise.push(LONE, FORCE) == solution
+    assert wise.engine.asked == 1
+    assert wise.result_cache.count() == 1, "what is right stays"
+    liar = Counting()
+    liar.push = lambda scene, spec: replace(bullet().push(scene, spec), seconds=1.0)
+    lying = remembering(tmp_path / "other", engine=liar)
+    lie = lying.push(LONE, FORCE)
+    lying.settle(LONE)
+    lying.result_cache.flush()
+    other = ResultCache(tmp_path / "other")
+    later = remembering(tmp_path / "other")
+    with pytest.warns(UserWarning, match=r"a solution in this cache was wrong.*deleted"):
+        assert later.push(LONE, FORCE) == solution != lie
+    assert later.result_cache.count() == 0
+    key = later._key(repr(FORCE), LONE)  # noqa: SLF001 - the key of a push
+    assert other.get(key) is None, "other processes do not believe it either"
+    other.put(key, b"new")
+    other.flush()
+    assert later.result_cache.get(key) == other.get(key) == b"new"
+
+
+def test_one_key_of_a_thousand_is_sampled(tmp_path):
+    kept(tmp_path)
+    later = remembering(tmp_path)
+    later.push(LONE, FORCE)
+    assert later.engine.asked == 0
+    share = sum(int.from_bytes(hashlib.sha256(b"%d" % k).digest()[-8:]) % 1000 == 0
+                for k in range(100_000))  # fmt: skip
+    assert 50 < share < 150
+
+
+def test_a_value_under_another_key_is_not_believed(tmp_path):
+    first = remembering(tmp_path)
+    wider = PhysicsScene((replace(LONE.bodies[0], pose=Pose(0.5, 0.0, 0.001, UPRIGHT)),))
+    pushed = [first.push(scene, FORCE) for scene in (LONE, wider)]
+    first.result_cache.flush()
+    assert pushed[0] != pushed[1]
+    (one,), (two,) = rows(tmp_path, "SELECT value FROM solutions ORDER BY id")
+    for row, value in ((1, two), (2, one)):
+        rows(tmp_path, "UPDATE solutions SET value = ? WHERE id = ?", (value, row))
+    later = remembering(tmp_path)
+    assert [later.push(scene, FORCE) for scene in (LONE, wider)] == pushed
+    assert later.engine.asked == 2
+    later.result_cache.flush()
+    again = remembering(tmp_path)
+    assert [again.push(scene, FORCE) for scene in (LONE, wider)] == pushed
+    assert again.engine.asked == 0, "what was damaged has been written anew"
 
 
 def test_every_difference_in_what_is_asked_is_another_question(tmp_path):
@@ -90,7 +166,7 @@ def test_every_difference_in_what_is_asked_is_another_question(tmp_path):
         engine.push(scene, spec)
     engine.settle(LONE)
     assert engine.engine.asked == len(asked) + 1
-    assert engine.result_cache.count() == len(asked) + 1
+    assert engine.result_cache.count() == len(asked) + 1 - 2, "those of two bodies stay in memory"
 
 
 def test_other_rules_or_machines_are_not_believed(tmp_path):
@@ -231,11 +307,11 @@ def rows(folder, *question):
 
 def test_a_damaged_value_is_solved_anew(tmp_path):
     solution = kept(tmp_path)
-    [(key, value)] = rows(tmp_path, "SELECT key, value FROM solutions")
+    [(row, value)] = rows(tmp_path, "SELECT id, value FROM solutions")
     for at in (0, 5, len(value) - 1):
         damaged = bytearray(value)
         damaged[at] ^= 1
-        rows(tmp_path, "UPDATE solutions SET value = ? WHERE key = ?", (bytes(damaged), key))
+        rows(tmp_path, "UPDATE solutions SET value = ? WHERE id = ?", (bytes(damaged), row))
         later = remembering(tmp_path)
         assert later.push(LONE, FORCE) == solution
         assert later.engine.asked == 1
@@ -344,6 +420,7 @@ def test_solving_anew_believes_nothing_that_is_kept(tmp_path, monkeypatch):
     lie = replace(get_engine().push(LONE, FORCE), seconds=123.0)
     held.put(held.last, pack_push(lie))
     held.flush()
+    held = ResultCache(tmp_path)
     assert get_engine().push(LONE, FORCE) == lie
     with cache_disabled():
         assert get_engine().push(LONE, FORCE) == bullet().push(LONE, FORCE) != lie

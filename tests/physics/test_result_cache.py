@@ -2,7 +2,7 @@
 
 import contextlib
 import functools
-import itertools
+import hashlib
 import os
 import sqlite3
 import subprocess
@@ -10,23 +10,102 @@ import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from threaded import run_in_threads
 
 from internav_data.physics.result_cache import FILE_NAME, ResultCache, cache_folder
+from internav_data.physics.result_index import RowIndex, prefix_of
 
 
-def test_a_full_file_is_emptied(tmp_path, monkeypatch):
+def digest(number):
+    """Return a key as they are: random to the eye."""
+    return hashlib.sha256(b"%d" % number).digest()
+
+
+def fill(held, numbers, size=3000):
+    for number in numbers:
+        held.put(digest(number), number.to_bytes(4, "little") * (size // 4))
+
+
+def known(held, numbers, size=3000):
+    """Return which numbers are found, and check their values."""
+    found = {number: held.get(digest(number)) for number in numbers}
+    there = {number for number, value in found.items() if value is not None}
+    assert all(found[number] == number.to_bytes(4, "little") * (size // 4) for number in there)
+    return there
+
+
+def test_of_a_full_file_those_go_that_nobody_asked_for_longest(tmp_path, monkeypatch):
     module = sys.modules["internav_data.physics.result_cache"]
-    monkeypatch.setattr(module, "MAX_BYTES", 1_200_000)
-    held, counts = ResultCache(tmp_path), []
-    for k in range(1000):
-        held.put(k.to_bytes(32, "little"), os.urandom(3000))
-        counts.append(held.count())
-    assert max(counts) > 100
-    assert sum(after < before for before, after in itertools.pairwise(counts)) >= 2
-    assert (tmp_path / FILE_NAME).stat().st_size <= 1_200_000
-    held.put(b"later", b"kept")
-    assert held.count() >= 1
-    assert ResultCache(tmp_path).get(b"later") == b"kept"
+    monkeypatch.setattr(module, "MAX_BYTES", 3_000_000)
+    monkeypatch.setattr(module, "_BATCH", 32)
+    writer, reader = ResultCache(tmp_path), ResultCache(tmp_path)
+    asked = set(range(20))
+    for first in range(0, 4000, 100):
+        fill(writer, range(first, first + 100))
+        assert reader.get(digest(first)) is not None  # a new one: the reader looks at the end
+        assert known(reader, asked) == asked, "what is read stays, although it was written first"
+        reader.flush()
+        assert (tmp_path / FILE_NAME).stat().st_size <= 3_000_000
+    writer.flush()
+    left = known(ResultCache(tmp_path), range(4000))
+    assert asked < left
+    others = sorted(left - asked)
+    assert 300 < len(others) < 900
+    assert others == list(range(others[0], 4000)), "the oldest of the others have left"
+
+
+def test_reading_a_file_with_room_writes_nothing(tmp_path):
+    held = ResultCache(tmp_path)
+    fill(held, range(600))
+    held.flush()
+    before = (tmp_path / FILE_NAME).read_bytes()
+    reader = ResultCache(tmp_path)
+    assert len(known(reader, range(600))) == 600
+    reader.flush()
+    assert (tmp_path / FILE_NAME).read_bytes() == before
+
+
+@pytest.mark.skipif(not Path("/proc/self/io").exists(), reason="bytes written are Linux's to tell")
+def test_a_value_is_written_once(tmp_path):
+    """A B-tree of random keys under a rollback journal wrote eight times as much."""
+
+    def written():
+        return int(Path("/proc/self/io").read_text().split("wchar:")[1].split()[0])
+
+    held, before = ResultCache(tmp_path), written()
+    fill(held, range(6400), 1000)
+    held.flush()
+    assert (written() - before) / 6_400_000 < 1.6
+
+
+def test_threads_share_a_cache(tmp_path):
+    held, wrong = ResultCache(tmp_path), []
+
+    def work(thread):
+        fill(held, range(thread * 50, thread * 50 + 700))
+        if not known(held, range(1100)):
+            wrong.append(thread)
+
+    run_in_threads(work, 8)
+    held.flush()
+    assert wrong == []
+    assert known(ResultCache(tmp_path), range(1050)) == set(range(1050))
+
+
+@settings(max_examples=40)
+@given(st.lists(st.lists(st.integers(0, 60), max_size=8), max_size=30), st.integers(1, 12))
+def test_the_index_finds_the_latest_row_of_each_key(batches, most):
+    index, rows, first = RowIndex(), {}, 1
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("internav_data.physics.result_index._RECENT", most)
+        for numbers in batches:
+            index.add([(first, b"".join(prefix_of(digest(n)) for n in numbers))])
+            rows.update({number: first + k for k, number in enumerate(numbers)})
+            first += max(1, len(numbers))
+            assert index.end == first
+    assert all(index.row(digest(number)) == rows.get(number) for number in range(61))
 
 
 def test_values_beyond_any_use_are_not_kept(tmp_path):

@@ -1,4 +1,9 @@
-"""Bullet (Coumans, pybullet) as physics engine: one client per process, one scene per call."""
+"""Bullet (Coumans, pybullet) as physics engine: one client per process, one scene per call.
+
+One thread solves at a time, from the first body of a scene to the last pose. Two threads in one
+world take each other's bodies away, and clients of their own would share Bullet's globals. A lock
+costs nothing that threads could gain: pybullet holds the interpreter while it steps.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +18,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from internav_data.core.locks import ThreadLock
 from internav_data.geometry import centre_of_mass, multiply, rotation_matrix
 from internav_data.physics.engines.bullet_scene import (
     HULL_MARGIN_M,
@@ -48,6 +54,8 @@ CREEP_RAD = REST_SPIN * CREEP_STEPS * STEP_S
 """Angle that a resting body may tremble over `CREEP_STEPS`: 1 mrad."""
 PUSH_LIMIT_S = 5.0
 """Time limit of a push after the release, simulated seconds; a body still rolling is left there."""
+_ENGINE_LOCK = ThreadLock()
+"""Held while a scene is built, stepped and read: by one thread of the process."""
 _ASLEEP = (
     pybullet.ACTIVATION_STATE_ENABLE_SLEEPING
     | pybullet.ACTIVATION_STATE_ENABLE_WAKEUP
@@ -69,6 +77,15 @@ class Bullet:
 
     def settle(self, scene: PhysicsScene) -> SettleSolution:
         """Let the first body fall until it is at rest, for one second at most."""
+        with _ENGINE_LOCK:
+            return self._settle(scene)
+
+    def push(self, scene: PhysicsScene, spec: PushSpec) -> PushSolution:
+        """Push the first body along +x, release it, and step until all bodies are at rest."""
+        with _ENGINE_LOCK:
+            return self._push(scene, spec)
+
+    def _settle(self, scene: PhysicsScene) -> SettleSolution:
         ids = self.builder.build(scene)
         body = scene.bodies[0]
         radius = bounding_radius_m(body.asset)
@@ -93,8 +110,7 @@ class Bullet:
             reach_m=reach,
         )
 
-    def push(self, scene: PhysicsScene, spec: PushSpec) -> PushSolution:
-        """Push the first body along +x, release it, and step until all bodies are at rest."""
+    def _push(self, scene: PhysicsScene, spec: PushSpec) -> PushSolution:
         ids = self.builder.build(scene)
         client = self.builder.client
         moving = [k for k, body in enumerate(scene.bodies) if body.moves]
@@ -178,7 +194,8 @@ def _angle(first: tuple[float, ...], second: tuple[float, ...]) -> float:
 
 def bullet() -> Bullet:
     """Return this process's Bullet, connected at first use; its files are removed at exit."""
-    return _of_process(os.getpid())
+    with _ENGINE_LOCK:
+        return _of_process(os.getpid())
 
 
 @cache  # by process: forked ones would overwrite each other's files
