@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import itertools
 import os
+import re
 import shutil
 import time
 from dataclasses import dataclass
@@ -29,6 +31,7 @@ _ENDING_S = 1.0
 _POLL_S = 0.02
 TEMPORARY = ".tmp"
 """Suffix of unfinished files in a folder; a kill leaves one behind."""
+_TEMPORARY_NAME = re.compile(rf"((?:.*/)?)\.([^/]+)\.\d+{re.escape(TEMPORARY)}")
 
 
 class LockedError(InternavError):
@@ -95,7 +98,14 @@ class Store(Protocol):
         ...
 
     def remove(self, name: str) -> None:
-        """Remove a blob, or all below a name that ends in a slash; nothing if there is none."""
+        """Remove a blob; nothing if there is none."""
+        ...
+
+    def prune(self, prefix: str) -> None:
+        """Remove the folders below a prefix that hold nothing, in a store that has folders.
+
+        Nobody may be about to put something there.
+        """
         ...
 
     def lock(self, busy: str) -> AbstractContextManager[None]:
@@ -119,9 +129,16 @@ def store_of(root: StoreLike) -> Store:
     return root if isinstance(root, Store) else FolderStore(Path(root))
 
 
-def is_temporary(name: str) -> bool:
-    """Return whether a name is that of an unfinished file."""
-    return name.endswith(TEMPORARY) and name.rsplit("/", 1)[-1].startswith(".")
+def temporary_of(name: str) -> str:
+    """Return the name of the unfinished file that this process writes before one of a name."""
+    folder, slash, last = name.rpartition("/")
+    return f"{folder}{slash}.{last}.{os.getpid()}{TEMPORARY}"
+
+
+def final_of(name: str) -> str | None:
+    """Return the name for which a file was being written; None if it is no temporary one."""
+    found = _TEMPORARY_NAME.fullmatch(name)
+    return None if found is None else "".join(found.groups())
 
 
 def exists(store: Store, name: str) -> bool:
@@ -206,12 +223,14 @@ class FolderStore:
         return sorted(path.relative_to(self.root).as_posix() for path in files)
 
     def remove(self, name: str) -> None:
-        """Remove a file, or a folder whose name ends in a slash."""
-        if name.endswith("/"):
-            with contextlib.suppress(FileNotFoundError):
-                shutil.rmtree(self.root / name)
-        else:
-            (self.root / name).unlink(missing_ok=True)
+        """Remove a file; nothing if there is none."""
+        (self.root / name).unlink(missing_ok=True)
+
+    def prune(self, prefix: str) -> None:
+        """Remove the folders below a prefix that hold nothing."""
+        for folder, _, _ in os.walk(self.root / prefix, topdown=False):
+            with contextlib.suppress(OSError):  # it holds something
+                Path(folder).rmdir()
 
     @contextlib.contextmanager
     def lock(self, busy: str) -> Iterator[None]:
@@ -282,7 +301,7 @@ def _make_folders(folder: Path, top: Path) -> None:
 
 
 def _write_atomically(path: Path, data: bytes) -> None:
-    temporary = path.with_name(f".{path.name}.{os.getpid()}{TEMPORARY}")
+    temporary = _new(path, Path.touch)
     try:
         temporary.write_bytes(data)
         sync(temporary)
@@ -299,9 +318,8 @@ def write_folder_atomically(folder: Path, fill: Callable[[Path], object]) -> Non
 
     After an error nothing stays behind.
     """
-    temporary = folder.with_name(f".{folder.name}.{os.getpid()}{TEMPORARY}")
-    shutil.rmtree(temporary, ignore_errors=True)
-    temporary.mkdir(parents=True)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    temporary = _new(folder, Path.mkdir)
     try:
         fill(temporary)
         sync(temporary)
@@ -310,6 +328,17 @@ def write_folder_atomically(folder: Path, fill: Callable[[Path], object]) -> Non
         shutil.rmtree(temporary, ignore_errors=True)
         raise
     sync(folder.parent)
+
+
+def _new(path: Path, make: Callable[..., object]) -> Path:
+    """Make a temporary file or folder beside a path, over none that is there."""
+    for number in itertools.count():
+        name = f"{path.name}.{number}" if number else path.name
+        temporary = path.with_name(temporary_of(name))
+        with contextlib.suppress(FileExistsError):
+            make(temporary, exist_ok=False)
+            return temporary
+    raise AssertionError  # pragma: no cover - numbers do not end
 
 
 def sync(path: Path) -> None:

@@ -2,7 +2,9 @@
 
 from internav_data.dataset.commit import (
     assemble,
+    commit_scenes,
     done_scenes,
+    end_staging,
     identity_of,
     open_staging,
 )
@@ -34,6 +36,7 @@ from internav_data.dataset.staging import (
     SceneState,
     Staging,
     any_staged,
+    clear_staging,
     read_staged_rows,
     stage_quarantine,
     stage_scene,
@@ -67,9 +70,12 @@ __all__ = [
     "TableSpec",
     "any_staged",
     "assemble",
+    "clear_staging",
+    "commit_scenes",
     "compute_stats",
     "dataset_folder",
     "done_scenes",
+    "end_staging",
     "from_table",
     "has_manifest",
     "identity_of",

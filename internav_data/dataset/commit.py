@@ -6,40 +6,47 @@ The order of calls of a generator:
    anything else or another configuration's dataset.
 2. `stage_scene` / `stage_quarantine` for every scene (any process, any order); on resume skip
    `done_scenes(staging)`: scenes in the finished dataset that is being extended, or staged.
-3. `assemble(out, identity, assets, scenes)`: shards go into `data/`, the manifest last; then
-   shards that it does not name and `.work/` are removed. After an interruption anywhere, a second
-   call finishes.
+3. `commit_scenes(staging, identity, assets, scenes)` as often as is wanted: shards go into `data/`,
+   the manifest last; then shards that it does not name are removed.
+4. `assemble(out, identity, assets, scenes)`: the last commit; what is left of the staging goes.
+   After an interruption anywhere, a second call finishes.
 
 When a dataset is extended, the manifest in place stays valid until the next one replaces it: a
-shard that differs has another name (see `shards`).
+shard that differs has another name (see `shards`). Readers may be at work all the while (see
+`snapshot`). Only files whose names a manifest or the journal holds are removed (see `journal`).
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections import Counter
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
-from internav_data.core.storage import Store, StoreLike, exists, is_temporary, store_of
+from internav_data.core.storage import Store, StoreLike, exists, final_of, store_of
+from internav_data.dataset.journal import Journal
 from internav_data.dataset.manifest import (
+    MANIFEST,
     Counts,
     DataFile,
     Manifest,
+    MetadataFile,
     Quarantined,
     has_manifest,
     read_manifest,
     write_manifest,
 )
-from internav_data.dataset.metadata_files import write_metadata
+from internav_data.dataset.metadata_files import metadata_blobs
 from internav_data.dataset.shards import SPLITS, SceneSource, put_shards
 from internav_data.dataset.staging import (
     IDENTITY,
-    STAGING,
     Identity,
     Staging,
+    clear_staging,
     read_identity,
     remove_foreign,
+    remove_scenes,
     staged_scenes,
 )
 from internav_data.dataset.tables import FORMAT_VERSION
@@ -97,7 +104,7 @@ def open_staging(
         _same(place, identity_of(read_manifest(store)), identity, defaults or {})
     if exists(store, IDENTITY):
         _same(place, read_identity(store), identity, defaults or {})
-    elif not has_manifest(store) and any(not name.startswith(STAGING) for name in names):
+    elif not has_manifest(store) and any(final_of(name) != IDENTITY for name in names):
         raise UsageError(f"{place}: holds something that is no dataset: give a new or empty folder")
     store.put(IDENTITY, (json.dumps(asdict(identity), indent=1) + "\n").encode())
     staging = Staging(store, identity.digest())
@@ -143,7 +150,7 @@ def done_scenes(staging: Staging) -> frozenset[int]:
 
 
 def assemble(out: StoreLike, identity: Identity, assets: Sequence[Asset], scenes: int) -> Manifest:
-    """Make the dataset of scenes 0 … scenes - 1 from staged scenes and what is there already.
+    """Make the dataset of scenes 0 … scenes - 1 and end the run: what is staged after them goes.
 
     Raises
     ------
@@ -151,12 +158,30 @@ def assemble(out: StoreLike, identity: Identity, assets: Sequence[Asset], scenes
         A scene is neither in the dataset nor staged, or a file is damaged.
 
     """
-    store = store_of(out)
+    manifest = commit_scenes(Staging(store_of(out), identity.digest()), identity, assets, scenes)
+    end_staging(out)
+    return manifest
+
+
+def commit_scenes(
+    staging: Staging, identity: Identity, assets: Sequence[Asset], scenes: int
+) -> Manifest:
+    """Make the dataset of scenes 0 … scenes - 1 from staged scenes and what is there already.
+
+    Later scenes stay staged, and others may be staged meanwhile.
+
+    Raises
+    ------
+    CorruptDataError
+        A scene is neither in the dataset nor staged, or a file is damaged.
+
+    """
+    store = staging.store
     old = read_manifest(store) if has_manifest(store) else None
-    _remove_stale(store, old)
+    journal = Journal(store)
+    journal.sweep(old)
     first = old.scenes if old else 0
     scenes = max(scenes, first)
-    staging = Staging(store, identity.digest())
     states = staged_scenes(staging, range(first, scenes))
     missing = [k for k in range(first, scenes) if k not in states]
     if missing:
@@ -165,13 +190,38 @@ def assemble(out: StoreLike, identity: Identity, assets: Sequence[Asset], scenes
             f"first {missing[0]}: generate again"
         )
     source = SceneSource(staging, old, states)
-    files = put_shards(store, source, assets)
+    files = put_shards(journal, source, assets)
     manifest = _manifest(identity, scenes, old, states, source, files)
-    write_metadata(store, manifest)
+    manifest = _put_metadata(journal, store, manifest)
+    journal.note(old.paths() if old else ())
+    journal.announce(MANIFEST)
     manifest = write_manifest(store, manifest)
-    _remove_stale(store, manifest)
-    store.remove(STAGING)
+    journal.sweep(manifest)
+    remove_scenes(staging, states)
     return manifest
+
+
+def end_staging(out: StoreLike) -> None:
+    """Remove all that runs staged, and what a commit that was cut off left behind.
+
+    Raises
+    ------
+    CorruptDataError
+        The journal of that commit, or the manifest, is damaged.
+
+    """
+    store = store_of(out)
+    Journal(store).sweep(read_manifest(store) if has_manifest(store) else None)
+    clear_staging(store)
+
+
+def _put_metadata(journal: Journal, store: Store, manifest: Manifest) -> Manifest:
+    """Put the files beside the data and return the manifest that lists them."""
+    files = []
+    for name, data in metadata_blobs(store, manifest).items():
+        journal.put(name, data)
+        files.append(MetadataFile(name, len(data), hashlib.sha256(data).hexdigest()))
+    return replace(manifest, metadata=tuple(files))
 
 
 def _manifest(
@@ -211,12 +261,3 @@ def _manifest(
         tuple(quarantined),
         files,
     )
-
-
-def _remove_stale(store: Store, manifest: Manifest | None) -> None:
-    """Remove shards that the manifest in place does not name, and temporary files."""
-    keep = {f.path for f in manifest.files} if manifest else set()
-    for name in store.names():
-        unnamed = name.startswith("data/") and name.endswith(".parquet") and name not in keep
-        if unnamed or is_temporary(name):
-            store.remove(name)

@@ -68,7 +68,14 @@ def _wrong_files(manifest: Manifest) -> Iterator[str]:
             value = getattr(file, name)
             if not isinstance(value, str) or not _SHA256.fullmatch(value):
                 yield f"file {file.path!r}: {name}: expected 64 hexadecimal digits, got {value!r}"
-    yield from _repeated("files", [file.path for file in manifest.files])
+    for extra in manifest.metadata or ():
+        if not isinstance(extra.sha256, str) or not _SHA256.fullmatch(extra.sha256):
+            yield (
+                f"metadata {extra.path!r}: sha256: expected 64 hexadecimal digits, "
+                f"got {extra.sha256!r}"
+            )
+    paths = [file.path for file in manifest.files]
+    yield from _repeated("files", paths + [extra.path for extra in manifest.metadata or ()])
     if (shared := sum(file.table == _SHARED for file in manifest.files)) != 1:
         yield f"files: expected 1 of {_SHARED}, got {shared}"
 

@@ -47,11 +47,11 @@ def schema_text(schema: dict[str, Any]) -> str:
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
 
-def write_schemas(root: StoreLike, prefix: str = "") -> None:
-    """Write every schema into a folder, below names that begin with `prefix`."""
+def write_schemas(root: StoreLike) -> None:
+    """Write every schema into a folder."""
     store = store_of(root)
     for name, schema in schemas().items():
-        store.put(f"{prefix}{name}", schema_text(schema).encode())
+        store.put(name, schema_text(schema).encode())
 
 
 def schema_folder() -> Path:

@@ -20,7 +20,7 @@ from internav_data.core.storage import OutsideError, Store, StoreLike, exists, s
 from internav_data.dataset.consistency import inconsistencies
 from internav_data.dataset.location import making_command
 from internav_data.dataset.parquet import TableFile, footer_sha256, open_parquet
-from internav_data.dataset.staging import STAGING
+from internav_data.dataset.staging import IDENTITY, STAGING
 from internav_data.dataset.tables import FORMAT_VERSION, TABLES
 from internav_data.records import Split  # noqa: TC001 - as above
 from internav_data.records.errors import CorruptDataError
@@ -72,6 +72,18 @@ class DataFile:
 
 
 @dataclass(frozen=True, slots=True)
+class MetadataFile:
+    """One file beside the data: dataset card, statistics or a schema."""
+
+    path: str
+    """Relative to the dataset's folder, with forward slashes."""
+    bytes: int
+    """Size of the file."""
+    sha256: str
+    """SHA-256 of the file's bytes, 64 hexadecimal digits."""
+
+
+@dataclass(frozen=True, slots=True)
 class Quarantined:
     """A scene that could not be built within the stated bounds."""
 
@@ -111,6 +123,8 @@ class Manifest:
     files: tuple[DataFile, ...]
     requires: tuple[str, ...] = ()
     """Keys and columns that a reader must know; it ignores any other that it does not know."""
+    metadata: tuple[MetadataFile, ...] | None = None
+    """Files beside the data; null in datasets of earlier releases, which do not list them."""
     sha256: str = ""
     """SHA-256 of the canonical text of all other keys (docs/dataset.md), 64 hexadecimal digits;
     filled in when the manifest is written."""
@@ -120,6 +134,11 @@ class Manifest:
         return tuple(
             f for f in self.files if f.table == table and (split is None or f.split == split)
         )
+
+    def paths(self) -> frozenset[str]:
+        """Return the names of all files of the dataset, its own included."""
+        extra = (file.path for file in self.metadata or ())
+        return frozenset({MANIFEST, *extra, *(file.path for file in self.files)})
 
     def to_json(self) -> str:
         """Return the text of the manifest's file."""
@@ -197,13 +216,15 @@ def read_manifest_and_digest(root: StoreLike) -> tuple[Manifest, str]:
         raise CorruptDataError(f"{path}: names more than {_MAX_FILES} files: {_AGAIN}")
     for file in manifest.files:
         _check_entry(path, file)
+    for extra in manifest.metadata or ():
+        _check_metadata_entry(path, extra)
     _check_consistency(path, manifest)
     return manifest, hashlib.sha256(content).hexdigest()
 
 
 def _absence(store: Store) -> str:
     root = Path(store.at(""))
-    if store.names(STAGING):
+    if exists(store, IDENTITY):
         return (
             f"{root}: the dataset is not finished (no {MANIFEST}, but .work/): "
             "run `internav-gen generate` on it again to resume"
@@ -256,6 +277,8 @@ def _parse(path: str, raw: dict[str, Any]) -> Manifest:
         values["quarantined"] = tuple(_made(Quarantined, q) for q in raw["quarantined"])
         values["files"] = tuple(_made(DataFile, f) for f in raw["files"])
         values["requires"] = tuple(map(str, raw.get("requires", ())))
+        if raw.get("metadata") is not None:
+            values["metadata"] = tuple(_made(MetadataFile, m) for m in raw["metadata"])
         manifest = _made(Manifest, values)
     except (TypeError, ValueError, AttributeError, KeyError) as error:
         raise CorruptDataError(f"{path}: not a manifest ({error}): {_AGAIN}") from error
@@ -284,17 +307,8 @@ def known_features() -> frozenset[str]:
 
 def _check_entry(manifest: str, file: DataFile) -> None:
     where = f"{manifest}: file {file.path!r}"
-    pure = PurePosixPath(file.path) if isinstance(file.path, str) else None
-    if (
-        pure is None
-        or pure.is_absolute()
-        or "\\" in file.path
-        or "\0" in file.path
-        or not pure.parts
-        or pure.parts[0] != "data"
-        or ".." in pure.parts
-        or pure.suffix != ".parquet"
-    ):
+    pure = inner_path(file.path)
+    if pure is None or pure.parts[0] != "data" or pure.suffix != ".parquet":
         raise CorruptDataError(f"{where}: expected a Parquet file below data/: {_AGAIN}")
     for name, value, most in (
         ("rows", file.rows, _MAX_ROWS),
@@ -302,6 +316,25 @@ def _check_entry(manifest: str, file: DataFile) -> None:
     ):
         if type(value) is not int or not 0 <= value <= most:
             raise CorruptDataError(f"{where}: {name}: expected 0 … {most}, got {value!r}: {_AGAIN}")
+
+
+def _check_metadata_entry(manifest: str, file: MetadataFile) -> None:
+    where = f"{manifest}: metadata {file.path!r}"
+    pure = inner_path(file.path)
+    if pure is None or pure.parts[0] in {"data", MANIFEST, STAGING.rstrip("/")}:
+        raise CorruptDataError(f"{where}: expected a file beside data/: {_AGAIN}")
+    if type(file.bytes) is not int or not 0 <= file.bytes <= _MAX_FILE_BYTES:
+        raise CorruptDataError(
+            f"{where}: bytes: expected 0 … {_MAX_FILE_BYTES}, got {file.bytes!r}: {_AGAIN}"
+        )
+
+
+def inner_path(path: object) -> PurePosixPath | None:
+    """Return a relative path that stays inside its folder; None for anything else."""
+    if not isinstance(path, str) or {"\\", "\0"} & set(path):
+        return None
+    pure = PurePosixPath(path)
+    return None if pure.is_absolute() or not pure.parts or ".." in pure.parts else pure
 
 
 def open_file(root: StoreLike, file: DataFile, spec: TableSpec[Any]) -> TableFile:

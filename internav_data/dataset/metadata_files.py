@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from internav_data.dataset.card import card_text
 from internav_data.dataset.croissant import croissant
-from internav_data.dataset.jsonschemas import write_schemas
+from internav_data.dataset.jsonschemas import schema_text, schemas
 from internav_data.dataset.stats import stats_of
 
 if TYPE_CHECKING:
@@ -16,11 +16,14 @@ if TYPE_CHECKING:
     from internav_data.dataset.manifest import Manifest
 
 
-def write_metadata(store: Store, manifest: Manifest) -> None:
-    """Write README.md, croissant.json, stats.json and schemas/ beside files already in place."""
+def metadata_blobs(store: Store, manifest: Manifest) -> dict[str, bytes]:
+    """Return README.md, croissant.json, stats.json and schemas/ by name, for files in place."""
     stats = stats_of(store, manifest)
-    store.put("stats.json", (json.dumps(asdict(stats), indent=1) + "\n").encode())
-    store.put("README.md", card_text(manifest, stats).encode())
     description = json.dumps(croissant(manifest), indent=1, ensure_ascii=False) + "\n"
-    store.put("croissant.json", description.encode())
-    write_schemas(store, "schemas/")
+    texts = {
+        "README.md": card_text(manifest, stats),
+        "croissant.json": description,
+        "stats.json": json.dumps(asdict(stats), indent=1) + "\n",
+        **{f"schemas/{name}": schema_text(schema) for name, schema in schemas().items()},
+    }
+    return {name: text.encode() for name, text in texts.items()}

@@ -24,7 +24,7 @@ from internav_data.dataset.tables import ASSETS, EPISODES, SCENES, TableSpec
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from internav_data.core.storage import Store
+    from internav_data.dataset.journal import Journal
     from internav_data.records import Asset, Split
 
 SPLITS: tuple[Split, ...] = ("train", "val", "test")
@@ -39,7 +39,7 @@ class SceneSource:
     def __init__(
         self, staging: Staging, old: Manifest | None, states: Mapping[int, SceneState]
     ) -> None:
-        self._staging, self._store = staging, staging.store
+        self._staging, self.store = staging, staging.store
         self._states = {s.scene_id: s for s in states.values() if not s.quarantined}
         self._old_files = old.files if old else ()
         self._old_digests = {file.path: file.sha256 for file in self._old_files}
@@ -60,7 +60,7 @@ class SceneSource:
     def _read(
         self, file: DataFile, spec: TableSpec[Any], columns: Sequence[str] | None = None
     ) -> pa.Table:
-        with open_file(self._store, file, spec) as opened:
+        with open_file(self.store, file, spec) as opened:
             return opened.read_all(columns)
 
     def in_place(self, path: str, sha256: str) -> bool:
@@ -102,7 +102,9 @@ def _spec(table: str) -> TableSpec[Any]:
     return EPISODES if table == "episodes" else SCENES
 
 
-def put_shards(store: Store, source: SceneSource, assets: Sequence[Asset]) -> tuple[DataFile, ...]:
+def put_shards(
+    journal: Journal, source: SceneSource, assets: Sequence[Asset]
+) -> tuple[DataFile, ...]:
     """Put all files of a dataset below `data/` and return them as they belong in the manifest.
 
     Episodes come in shards of 240 scenes and scenes in shards of 2,400, split by split, in order
@@ -111,13 +113,13 @@ def put_shards(store: Store, source: SceneSource, assets: Sequence[Asset]) -> tu
     files = []
     for spec in (EPISODES, SCENES):
         for split in SPLITS:
-            files += _put_split(store, source, spec, split)
+            files += _put_split(journal, source, spec, split)
     table = to_table(sorted(assets, key=lambda asset: asset.asset_id), ASSETS)
-    return (*files, _put(store, source, table, ASSETS, "assets", None))
+    return (*files, _put(journal, source, table, ASSETS, "assets", None))
 
 
 def _put_split(
-    store: Store, source: SceneSource, spec: TableSpec[Any], split: Split
+    journal: Journal, source: SceneSource, spec: TableSpec[Any], split: Split
 ) -> list[DataFile]:
     scenes, size = source.scenes[split], SCENES_PER_SHARD[spec.name]
     files = []
@@ -125,14 +127,14 @@ def _put_split(
         shard, stem = scenes[start : start + size], f"{spec.name}/{split}-{number:05d}"
         old = source.unchanged(spec.name, shard)
         if old is None:
-            files.append(_put(store, source, source.rows(spec, shard), spec, stem, split))
+            files.append(_put(journal, source, source.rows(spec, shard), spec, stem, split))
         else:
-            files.append(_renamed(store, old, stem))
+            files.append(_renamed(journal, source, old, stem))
     return files
 
 
 def _put(
-    store: Store,
+    journal: Journal,
     source: SceneSource,
     table: pa.Table,
     spec: TableSpec[Any],
@@ -143,16 +145,16 @@ def _put(
     info = file_info(stem, data, table)
     path = _path(stem, info.sha256)
     if not source.in_place(path, info.sha256):
-        store.put(path, data)
+        journal.put(path, data)
     return DataFile(table=spec.name, split=split, **asdict(info) | {"path": path})
 
 
-def _renamed(store: Store, file: DataFile, stem: str) -> DataFile:
+def _renamed(journal: Journal, source: SceneSource, file: DataFile, stem: str) -> DataFile:
     """Return an older file; one of another release's name is put in place under today's."""
-    check_file(store, file)
+    check_file(source.store, file)
     path = _path(stem, file.sha256)
     if path != file.path:
-        store.put(path, store.read(file.path))
+        journal.put(path, source.store.read(file.path))
     return replace(file, path=path)
 
 

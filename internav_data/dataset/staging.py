@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +25,7 @@ import pyarrow as pa
 
 from internav_data.core.files import FileLimits, parse_json
 from internav_data.core.processes import end_if_orphaned
-from internav_data.core.storage import Store, StoreLike, exists, store_of
+from internav_data.core.storage import Store, StoreLike, exists, final_of, store_of
 from internav_data.dataset.encode import to_table
 from internav_data.dataset.tables import EPISODES, SCENES
 from internav_data.records.errors import CorruptDataError, InternavError
@@ -38,8 +39,11 @@ STAGING = ".work/"
 """Prefix of the names of an unfinished dataset's files."""
 IDENTITY = f"{STAGING}identity.json"
 """Name of the file that holds the identity of the run whose scenes are staged."""
-_FILE = FileLimits(remedy=f"remove {STAGING} and start anew")
+_FILE = FileLimits(remedy=f"move {STAGING} away and start anew")
 _SCENES = f"{STAGING}scenes/"
+_NAME = re.compile(
+    rf"{re.escape(IDENTITY)}|{re.escape(_SCENES)}(?:[0-9a-f]{{16}}/)?\d{{6}}/scene-\d{{6}}\.work"
+)
 _MAGIC = b"INWORK02"
 _HEAD = len(_MAGIC) + 32
 _BODY = _HEAD + 32
@@ -87,9 +91,9 @@ def read_identity(root: StoreLike) -> Identity:
     try:
         identity = Identity(**values)
     except TypeError as error:
-        raise _FILE.refusal(place, f"damaged ({error})") from error
+        raise _FILE.refusal(place, f"damaged, or of another program ({error})") from error
     if not isinstance(identity.config, dict):
-        raise _FILE.refusal(place, "damaged (config: expected an object)")
+        raise _FILE.refusal(place, "damaged, or of another program (config: expected an object)")
     return identity
 
 
@@ -160,10 +164,35 @@ def any_staged(root: StoreLike) -> bool:
 
 
 def remove_foreign(staging: Staging) -> None:
-    """Remove staged scenes of other identities."""
+    """Remove staged scenes of other identities; files that are no scenes stay."""
     for name in staging.store.names(_SCENES):
-        if not name.startswith(staging.folder):
+        if is_staging(name) and not name.startswith(staging.folder):
             staging.store.remove(name)
+
+
+def clear_staging(root: StoreLike) -> None:
+    """Remove the staged scenes and the identity that a run put there, and none but its files."""
+    store = store_of(root)
+    try:
+        read_identity(store)
+    except (FileNotFoundError, NotADirectoryError, CorruptDataError):
+        return  # a folder of somebody else's
+    for name in store.names(STAGING):
+        if is_staging(name) and name != IDENTITY:
+            store.remove(name)
+    store.remove(IDENTITY)
+    store.prune(STAGING)
+
+
+def remove_scenes(staging: Staging, scenes: Iterable[int]) -> None:
+    """Remove staged scenes by number, while others may be staged."""
+    for scene in scenes:
+        staging.store.remove(staging.name(scene))
+
+
+def is_staging(name: str) -> bool:
+    """Return whether a name is one under which staging puts files, finished or not."""
+    return _NAME.fullmatch(final_of(name) or name) is not None
 
 
 def stage_scene(

@@ -20,7 +20,9 @@ from internav_data.dataset import (
     Identity,
     any_staged,
     assemble,
+    clear_staging,
     done_scenes,
+    end_staging,
     has_manifest,
     open_staging,
     read_manifest,
@@ -278,7 +280,7 @@ def _assembled(
     if has_manifest(store) and not any_staged(store):
         held = read_manifest(store)
         if held.scenes >= scenes:
-            store.remove(STAGING)
+            end_staging(store)
             return held
     if not has_manifest(store):
         states = staged_scenes(staging)
@@ -294,13 +296,13 @@ def _forget_idle_staging(store: Store) -> None:
     It would bind the folder to that run's config, which the user may just be mending.
     """
     if not has_manifest(store) and not any_staged(store):
-        store.remove(STAGING)
+        clear_staging(store)
 
 
 def _hopeless(store: Store, count: int, reason: str) -> QuarantineError:
     """Return the error for a config by which no scene can be made; remove what it staged."""
     if not has_manifest(store):
-        store.remove(STAGING)
+        clear_staging(store)
     return QuarantineError(f"none of {count} scenes could be made: {reason}; nothing was written")
 
 

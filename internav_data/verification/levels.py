@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from internav_data.core.messages import Failed, Recipe
 from internav_data.core.worker_pool import WorkerPool
 from internav_data.dataset import ASSETS, EPISODES, SCENES, from_table, read_table
+from internav_data.dataset.manifest import MANIFEST
 from internav_data.dataset.parquet import open_parquet
 from internav_data.records import LoaderStream, Purpose, generator
 from internav_data.records.errors import InternavError, UsageError
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     Progress = Callable[[str, int, int], None]
 
 UNTRUE = "schema not as stated: physics not checked"
+MAX_STARTS = 3
+"""Times that a validation begins, again each time that the dataset was extended under it."""
 SCENES_A_UNIT = 10
 """Number of scenes that a worker checks before it reports."""
 
@@ -94,11 +97,39 @@ def validate(
     CorruptDataError
         The folder holds no finished dataset.
     InternavError
-        Some scenes could not be checked: their worker processes died again and again.
+        Some scenes could not be checked: their worker processes died again and again. Or a
+        generator extended the dataset over and over meanwhile.
 
     """
     _check_arguments(level, sample, workers)
-    progress_callback: Progress = progress or (lambda *_: None)
+    for _ in range(MAX_STARTS):
+        before = _version(path)
+        try:
+            findings = _validate_once(path, level, sample, workers, progress or (lambda *_: None))
+        except (InternavError, OSError):
+            if before == _version(path):
+                raise
+            continue
+        if findings.ok or before == _version(path):
+            return findings
+    raise InternavError(
+        f"{path}: a generator extended the dataset {MAX_STARTS} times while it was being "
+        "validated: validate it once the generator has ended"
+    )
+
+
+def _version(path: Path) -> tuple[int, int, int] | None:
+    """Return values that differ once another manifest has been put in place."""
+    try:
+        stat = (path / MANIFEST).stat()
+    except OSError:
+        return None
+    return stat.st_ino, stat.st_mtime_ns, stat.st_size
+
+
+def _validate_once(
+    path: Path, level: Level, sample: int | None, workers: int, progress_callback: Progress
+) -> Findings:
     whole = FindingCollector()
     manifest = check_manifest(path, whole)
     if manifest is None:

@@ -40,10 +40,12 @@ class MemoryStore:
         return sorted(name for name in self.blobs if name.startswith(prefix))
 
     def remove(self, name):
-        gone = self.names(name) if name.endswith("/") else {name} & self.blobs.keys()
-        for each in gone:
-            self._change("remove", each)
-            del self.blobs[each]
+        if name in self.blobs:
+            self._change("remove", name)
+            del self.blobs[name]
+
+    def prune(self, prefix):
+        """Do nothing: there are no folders."""
 
     @contextlib.contextmanager
     def lock(self, busy):  # noqa: ARG002 - a process shares it with none

@@ -76,7 +76,8 @@ def test_a_worker_that_outlives_its_run_revives_no_folder(tmp_path, monkeypatch)
 def test_a_worker_that_outlives_its_run_leaves_another_run_alone(tmp_path, make):
     store = make() if make else FolderStore(tmp_path / "d")
     staging = build(store, range(2))
-    store.remove(".work/")
+    for name in store.names():
+        store.remove(name)
     build(store, range(2), identity=replace(IDENTITY, seed=8))
     before = store.names()
     with pytest.raises(InternavError, match="another run's"):

@@ -48,9 +48,10 @@ def test_blobs_are_put_read_listed_and_removed(store):
             reading("b/e")
     store.remove("b/e")
     store.remove("b/c")
-    store.remove("e/")
+    store.prune("b/")
     assert store.names() == ["a", "b/d"]
-    store.remove("b/")
+    store.remove("b/d")
+    store.prune("b/")
     assert store.names() == ["a"]
 
 

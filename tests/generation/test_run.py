@@ -13,9 +13,9 @@ import pytest
 from scene_stubs import CATALOGUE, stub
 
 from internav_data.core.storage import FolderStore, LockedError
-from internav_data.dataset import read_manifest
+from internav_data.dataset import open_staging, read_manifest
 from internav_data.generation.config import GenerationConfig, load_config
-from internav_data.generation.run import generate
+from internav_data.generation.run import generate, identity_for
 from internav_data.records.errors import (
     CorruptDataError,
     InternavError,
@@ -263,9 +263,21 @@ def test_a_config_that_never_worked_does_not_bind_the_folder(tmp_path):
 
 def test_a_run_killed_before_its_first_scene_does_not_bind_the_folder(tmp_path):
     out = tmp_path / "d"
-    (out / ".work").mkdir(parents=True)
-    (out / ".work" / "identity.json").write_text('{"of": "another"}')
+    open_staging(out, identity_for(load_config(overrides=["seed=5"]), CATALOGUE))
     assert made(out, 3).scenes == 3
+
+
+@pytest.mark.parametrize("identity", [None, '{"of": "another"}'])
+def test_a_work_folder_of_something_else_is_refused_and_left_alone(tmp_path, identity):
+    work = tmp_path / "d" / ".work"
+    work.mkdir(parents=True)
+    (work / "thesis.tex").write_text("precious")
+    if identity:
+        (work / "identity.json").write_text(identity)
+    before = contents(tmp_path / "d")
+    with pytest.raises(InternavError, match=r"no dataset|move \.work/ away"):
+        made(tmp_path / "d", 3)
+    assert contents(tmp_path / "d") == before
 
 
 def test_meshes_that_tip_over_are_named_before_anything_is_written(tmp_path):

@@ -1,0 +1,92 @@
+"""The journal of a commit: names of the files that it puts or replaces, noted before it does.
+
+A kill leaves files behind that no manifest names: shards that were put but not committed, shards
+that were replaced but not yet removed, temporary files. They are told from a stranger's files by
+their names in the journal, which the next commit reads: nothing else is ever removed.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+from internav_data.core.files import FileLimits, parse_json
+from internav_data.core.storage import exists, temporary_of
+from internav_data.dataset.manifest import inner_path
+from internav_data.dataset.staging import STAGING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from internav_data.core.storage import Store
+    from internav_data.dataset.manifest import Manifest
+
+JOURNAL = f"{STAGING}journal.json"
+"""Name of the journal: a list of names, in JSON."""
+_LIMITS = FileLimits(
+    max_bytes=64 << 20,
+    max_values=500_000,
+    remedy="remove it; then what `validate` calls unlisted is yours to remove",
+)
+
+
+class Journal:
+    """Names of the files that commits of a store may have left behind.
+
+    Raises
+    ------
+    CorruptDataError
+        The journal of an earlier commit is damaged.
+
+    """
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._names = set(journal_names(store))
+
+    def put(self, name: str, data: bytes) -> None:
+        """Note a name, then store a blob under it."""
+        self.announce(name)
+        self._store.put(name, data)
+
+    def announce(self, name: str) -> None:
+        """Note a name under which a blob is to be put, and that of its temporary file."""
+        temporary = temporary_of(name)
+        self.note([name] if exists(self._store, temporary) else [name, temporary])
+
+    def note(self, names: Iterable[str]) -> None:
+        """Note names of files that are to be put or removed."""
+        if not self._names.issuperset(names := set(names)):
+            self._names |= names
+            text = json.dumps(sorted(self._names), indent=1) + "\n"
+            self._store.put(JOURNAL, text.encode())
+
+    def sweep(self, manifest: Manifest | None) -> None:
+        """Remove all files that are noted and that the manifest in place does not name."""
+        for name in sorted(self._names - (manifest.paths() if manifest else frozenset())):
+            self._store.remove(name)
+        self._store.remove(JOURNAL)
+        self._names.clear()
+
+
+def journal_names(store: Store) -> tuple[str, ...]:
+    """Return the names that a commit noted which is under way or was cut off; none otherwise.
+
+    Raises
+    ------
+    CorruptDataError
+        The journal is damaged.
+
+    """
+    if not exists(store, JOURNAL):
+        return ()
+    place = store.at(JOURNAL)
+    names = parse_json(store.read(JOURNAL, stop=_LIMITS.max_bytes + 1), place, _LIMITS)
+    if not isinstance(names, list) or not all(map(_inside, names)):
+        raise _LIMITS.refusal(place, "expected a list of names of files of the dataset")
+    return tuple(names)
+
+
+def _inside(name: object) -> bool:
+    pure = inner_path(name)
+    return pure is not None and pure.parts[0] != STAGING.rstrip("/")
