@@ -12,4 +12,4 @@ sys.path.insert(0, str(Path(__file__).parent))
 def _no_waiting_for_the_disk(monkeypatch):
     """A hundred small datasets are written; none of them has to survive a power cut."""
     monkeypatch.setattr("os.fsync", lambda _: None)
-    monkeypatch.setattr("internav_data.dataset.commit.metadata_blobs", lambda *_: {})
+    monkeypatch.setattr("internav_data.dataset.metadata_files.metadata_blobs", lambda *_: {})
