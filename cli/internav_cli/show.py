@@ -20,7 +20,8 @@ Examples:
   internav-gen show --scene 17                              scene-000017.png
   internav-gen show --scene 17 --episode 3                  scene-000017-0003.png
   internav-gen show data/demo --scene 17 --out house.png
-  internav-gen show --seed 7 --scene 3 --rooms 6            a fresh house: no dataset needed""",
+  internav-gen show --seed 7 --scene 3 --rooms 6            a fresh house: no dataset needed
+  internav-gen show --floor-plan plan.toml --out plan.png   your own, furnished""",
 )
 @DATASET
 @click.option("--scene", type=int, default=0, show_default=True, help="Index of the scene.")
@@ -81,7 +82,11 @@ def _stored(dataset: Path, scene: int, episode: int | None) -> tuple[Any, Any, A
 
 
 def _fresh(config: GenerationConfig, scene: int, episode: int | None) -> tuple[Any, Any, Any]:
+    if episode is None:  # episodes take seconds
+        from internav_data.generation import generate_house
+
+        return generate_house(config.seed, scene, config), None, None
     from internav_data.generation.reproduce import made_again
 
     made = made_again(config, scene, episode)
-    return made.house, made.episodes[-1] if episode is not None else None, made.assets
+    return made.house, made.episodes[-1], made.assets
