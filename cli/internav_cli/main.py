@@ -116,8 +116,11 @@ def _unforeseen(error: BaseException, program: str, given: list[str]) -> str:
         where = f" ({error.filename})" if error.filename else ""
         return f"{error.strerror or error}{where}"
     if isinstance(error, ModuleNotFoundError):
-        hint = "install everything with `pip install 'internav-data[all]'`"
-        return f"{error.name} is missing: {hint}; `internav-gen doctor` tells more"
+        from internav_data.core.extras import missing
+
+        return f"{missing(error.name)}; `internav-gen doctor` tells more"
+    if isinstance(error, ImportError):
+        return f"cannot import {error.name}: {error}; `internav-gen doctor` tells what is missing"
     again = shlex.join([program, "--debug", *given])
     return f"{type(error).__name__}: {error}; this is a bug: `{again}` shows where"
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from internav_data.core.extras import install_command, require
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
@@ -56,6 +57,7 @@ def convex_pieces(path: Path, vertices: Floats, faces: Ints, max_parts: int) -> 
             f"{path}: encloses no volume (it is flat: {' x '.join(f'{e:.4g}' for e in extent)} m); "
             "give it at least 1 mm of thickness"
         )
+    require("trimesh")
     import trimesh  # noqa: PLC0415 - only for users with meshes
 
     mesh = trimesh.Trimesh(vertices, faces, process=True)
@@ -81,7 +83,7 @@ def _cut(path: Path, mesh: Any, max_parts: int) -> list[Floats]:  # noqa: ANN401
     except ImportError as error:
         raise UsageError(
             f"{path}: is not convex and cutting it needs coacd; "
-            "pip install 'internav-data[meshes]', or set max_parts = 1"
+            f"{install_command('coacd')}, or set max_parts = 1"
         ) from error
     coacd.set_log_level("error")
     try:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from internav_data.core.extras import require
 from internav_data.geometry import part_corners
 
 if TYPE_CHECKING:
@@ -60,6 +61,7 @@ def part_triangles(part: Part) -> tuple[Floats, Ints]:
 
 def asset_mesh(asset: Asset) -> Any:  # noqa: ANN401 - trimesh is imported when used
     """Return an asset as `trimesh.Trimesh`: its parts side by side, each watertight, coloured."""
+    require("trimesh")
     import trimesh  # noqa: PLC0415 - only for users with meshes
 
     vertices, faces, colours = [], [], []

@@ -16,6 +16,7 @@ import numpy as np
 
 from internav_data.catalog.convex import Piece, convex_pieces
 from internav_data.catalog.user_manifest import MESH_SUFFIXES, MeshNote, read_notes
+from internav_data.core.extras import EXTRAS, missing, require
 from internav_data.records import Asset, Part
 from internav_data.records.errors import UsageError
 
@@ -121,6 +122,7 @@ def _laid_flat(pieces: list[Piece]) -> list[Piece]:
 
     The probabilities are trimesh's (Goldberg et al. 1999), without noise of the centre of mass.
     """
+    require("trimesh")
     import trimesh  # noqa: PLC0415 - only for users with meshes
 
     hull = trimesh.convex.convex_hull(np.vstack([piece.corners for piece in pieces]))
@@ -140,6 +142,7 @@ def _read(path: Path) -> tuple[Floats, NDArray[np.int64], RGB]:
     size = path.stat().st_size
     if not 0 < size <= MAX_BYTES:
         raise UsageError(f"{path}: {size} bytes, expected 1 to {MAX_BYTES}; export fewer triangles")
+    require("trimesh")
     import trimesh  # noqa: PLC0415 - only for users with meshes
 
     suffix, content = path.suffix[1:].lower(), path.read_bytes()
@@ -193,7 +196,7 @@ def _reason(error: Exception, suffix: str, content: bytes) -> str:
             return f"{len(content)} bytes, its header of {count} triangles means {expected}"
     if isinstance(error, ModuleNotFoundError):
         # For text that is no UTF-8, trimesh looks for a library that guesses encodings.
-        return "not UTF-8 text"
+        return "not UTF-8 text" if error.name not in EXTRAS else str(missing(error.name))
     return str(error).splitlines()[0][:120] if str(error) else type(error).__name__
 
 

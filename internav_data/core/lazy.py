@@ -8,6 +8,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from internav_data.core.extras import EXTRAS, missing
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
@@ -27,6 +29,11 @@ def lazy_imports(
     names
         Names by the module that defines them, relative to the package: `{"run": ["generate"]}`.
 
+    Raises
+    ------
+    ModuleNotFoundError
+        By `__getattr__`: a package is missing; of an extra's, the message names the extra.
+
     Examples
     --------
     >>> getattr_, dir_ = lazy_imports("xml", {"dom.minidom": ["parseString"]})
@@ -39,7 +46,12 @@ def lazy_imports(
     def __getattr__(name: str) -> Any:  # noqa: ANN401, N807 - the package's own method
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        return getattr(import_module(f"{package}.{homes[name]}"), name)
+        try:
+            return getattr(import_module(f"{package}.{homes[name]}"), name)
+        except ModuleNotFoundError as error:
+            if error.name in EXTRAS:
+                raise missing(error.name) from error
+            raise
 
     def __dir__() -> list[str]:  # noqa: N807 - the package's own method
         return sorted({*vars(import_module(package)), *homes})

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast, overload
 
 import numpy as np
 
+from internav_data.core.extras import require
 from internav_data.core.lru import LRUCache
 from internav_data.core.storage import Store, StoreLike, store_of
 from internav_data.dataset.decode import from_table
@@ -278,8 +279,15 @@ class Dataset(Generic[E]):
         return table if self._index is None else table.take(self._index)
 
     def to_pandas(self, columns: Sequence[str] | None = None) -> pd.DataFrame:
-        """Return the selected episodes as a pandas frame: scalar columns unless named."""
+        """Return the selected episodes as a pandas frame: scalar columns unless named.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            pandas is not installed.
+        """
         names = columns or self.columns or scalar_columns()
+        require("pandas")
         return self.to_table(names).to_pandas()
 
     def to_torch(self, columns: Sequence[str] | None = None) -> dict[str, Any]:

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from internav_data.core.extras import require
 from internav_data.dataset.decode import one_array
 from internav_data.dataset.nodes import Leaf
 from internav_data.dataset.tables import EPISODES
-from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -20,14 +20,13 @@ def tensors(table: pa.Table) -> dict[str, Any]:
 
     Raises
     ------
-    UsageError
+    ModuleNotFoundError
         torch is not installed.
 
     """
-    try:
-        import torch  # type: ignore[import-not-found,unused-ignore]  # noqa: PLC0415 - optional
-    except ImportError as error:
-        raise UsageError("to_torch needs torch: install it with `pip install torch`") from error
+    require("torch")
+    import torch  # type: ignore[import-not-found,unused-ignore]  # noqa: PLC0415 - optional
+
     leaves = {f.name: f.node for f in EPISODES.node.fields if isinstance(f.node, Leaf)}
     arrays = {name: _numbers(table.column(name), leaves[name]) for name in table.column_names}
     return {name: torch.from_numpy(a) for name, a in arrays.items() if a is not None}

@@ -8,9 +8,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import gymnasium
-
+from internav_data.core.extras import missing
 from internav_data.core.lazy import lazy_imports
+
+try:
+    import gymnasium
+except ModuleNotFoundError as error:
+    raise missing(error.name) from error
 
 if TYPE_CHECKING:
     from internav_data.envs.auxiliary import AuxiliaryStart, auxiliary_starts

@@ -13,26 +13,13 @@ from importlib import metadata, util
 from pathlib import Path
 from typing import Literal
 
+from internav_data.core.extras import DISTRIBUTIONS, EXTRAS, install_command
+
 CheckState = Literal["good", "warning", "bad"]
 """Result of a check."""
 
 WHEELS_UP_TO = (3, 11)
 """pybullet 3.2.7 has wheels up to CPython 3.11; elsewhere it compiles for 5-9 minutes."""
-PACKAGES = {
-    "numpy": "",
-    "pyarrow": "",
-    "click": "generate",
-    "numba": "generate",
-    "networkx": "generate",
-    "opencv-python-headless": "generate",
-    "platformdirs": "generate",
-    "pybullet": "generate",
-    "scipy": "generate",
-    "shapely": "generate",
-    "trimesh": "generate",
-    "coacd": "meshes",
-}
-"""Packages needed, and the extra that brings each; meshes only for assets of your own."""
 BYTES_AN_EPISODE = 1000
 PAPER_EPISODES = 595_500
 GIB = 1 << 30
@@ -54,7 +41,7 @@ def examine(out: Path) -> list[Check]:
     return [
         _python(),
         _platform(),
-        *(_package(name, extra) for name, extra in PACKAGES.items()),
+        *(_package(module, extra) for module, extra in EXTRAS.items()),
         _cores(),
         _memory(),
         _disk(out),
@@ -83,14 +70,21 @@ def _platform() -> Check:
     return Check("platform", "warning", found, "tested on Linux only; use a container or WSL")
 
 
-def _package(name: str, extra: str) -> Check:
-    install = f"pip install 'internav-data[{extra}]'" if extra else "pip install internav-data"
+_USES = {
+    "meshes": "needed only for meshes of your own: ",
+    "train": "needed only for environments, training and evaluation: ",
+    "tensorboard": "needed only for TensorBoard's files: ",
+}
+"""Uses of the extras that generating and validating do without."""
+
+
+def _package(module: str, extra: str) -> Check:
+    name, install = DISTRIBUTIONS.get(module, module), install_command(module)
     try:
         found = metadata.version(name)
     except metadata.PackageNotFoundError:
-        state: CheckState = "warning" if extra == "meshes" else "bad"
-        use = "needed only for meshes of your own: " if extra == "meshes" else ""
-        return Check(name, state, "missing", use + install)
+        state: CheckState = "warning" if extra in _USES else "bad"
+        return Check(name, state, "missing", _USES.get(extra, "") + install)
     wanted = _wanted(name)
     if wanted and _numbers(found) < _numbers(wanted):
         return Check(name, "bad", f"{found}, older than {wanted}", f"{install} --upgrade")

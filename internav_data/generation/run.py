@@ -12,6 +12,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from internav_data.core.extras import require
 from internav_data.core.interrupts import InterruptedRunError, Interrupts
 from internav_data.core.messages import Done, Failed, Recipe
 from internav_data.core.storage import FolderStore
@@ -100,6 +101,8 @@ def generate(
 
     Raises
     ------
+    ModuleNotFoundError
+        A package of the extra `generate` is missing.
     UsageError
         A count or setting out of its bounds, or a folder that holds something else.
     LockedError
@@ -112,6 +115,8 @@ def generate(
         A full or read-only disk; finished scenes are kept.
 
     """
+    # In a worker, what is missing would be a failure of each scene.
+    require("numba", "platformdirs", "pybullet", "scipy")
     progress = progress or GenerationProgress()
     check_scenes(scenes)
     chosen = get_executor(executor, workers) if isinstance(executor, str) else executor

@@ -21,6 +21,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from internav_data.core.extras import missing
 from internav_data.geometry import centre_of_mass
 from internav_data.geometry.obj import obj_text
 from internav_data.physics.scene import AGENT_HEIGHT_M, AGENT_LOW_M
@@ -41,6 +42,8 @@ def _import_quietly() -> ModuleType:
         os.dup2(nowhere.fileno(), 2)
         try:
             return import_module("pybullet")
+        except ModuleNotFoundError as error:
+            raise missing(error.name) from error
         finally:
             os.dup2(kept, 2)
             os.close(kept)
