@@ -21,6 +21,8 @@ COMMANDS = {
     "warmup": "Compile the numba kernels before their first use.",
 }
 INTERRUPTED = 130
+LONGEST_LINE = 1000
+"""Characters of an error: one that quotes a file may be as long as the file."""
 
 
 class LazyGroup(click.Group):
@@ -132,5 +134,9 @@ def _with_help(error: click.ClickException) -> str:
 
 
 def _say(program: str, text: str, code: int) -> int:
-    click.echo(f"{program}: {' '.join(text.split())}", err=True)
+    # Names in files may hold anything: no control characters reach the terminal.
+    line = "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))
+    if len(line) > LONGEST_LINE:
+        line = f"{line[: LONGEST_LINE // 2]} ... {line[-LONGEST_LINE // 2 :]}"
+    click.echo(f"{program}: {line}", err=True)
     return code

@@ -31,7 +31,7 @@ from internav_data.camp.agents.protocol import Agent, State
 from internav_data.camp.config import CampConfig, from_mapping, preset
 from internav_data.camp.stages import check_parts
 from internav_data.core import config as values
-from internav_data.core.files import FileLimits, read_json
+from internav_data.core.files import FileLimits, open_regular, read_json, size_of_regular
 from internav_data.core.storage import file_sha256, sync, write_atomically, write_folder_atomically
 from internav_data.records.errors import CorruptDataError, InternavError, UsageError
 
@@ -49,6 +49,13 @@ _FILE: Final = FileLimits(
 )
 """Limits of the JSON files; the actions of 65,536 environments stay below."""
 _MAX_TENSOR_BYTES: Final = 16_000_000_000
+_MAX_HEADER_BYTES: Final = 10_000_000
+"""Size of a safetensors file's list of tensors, which is read into memory."""
+_DTYPES: Final = {
+    torch.float32: "F32", torch.float64: "F64", torch.float16: "F16", torch.bfloat16: "BF16",
+    torch.int64: "I64", torch.int32: "I32", torch.uint8: "U8", torch.bool: "BOOL",
+}  # fmt: skip
+"""Names of types in safetensors files."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,8 +169,8 @@ def read(path: Path, which: str = "last", *, training: bool = True) -> Checkpoin
             wanted = make_agent(method, config).state_dict()
     except InternavError as error:
         raise CorruptDataError(f"{folder / ABOUT}: {error}") from error
-    shapes = {name: tuple(value.shape) for name, value in wanted.items()}
-    weights = _tensors(folder / WEIGHTS, files, shapes)
+    kinds = {name: (_DTYPES[v.dtype], *v.shape) for name, v in wanted.items()}
+    weights = _tensors(folder / WEIGHTS, files, kinds)
     rest = _tensors(folder / TRAINING, files) if training else {}
     return Checkpoint(method, config, weights, progress, rest)
 
@@ -251,34 +258,49 @@ def _object(value: object, path: Path | str) -> dict[str, Any]:
 
 
 def _tensors(
-    path: Path, files: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...]] | None = None
+    path: Path, files: Mapping[str, Any], kinds: Mapping[str, tuple[str | int, ...]] | None = None
 ) -> dict[str, Tensor]:
-    """Read tensors; their names and shapes are compared before any memory is taken."""
+    """Read tensors; names, types and shapes are compared before any memory is taken."""
     known = files.get(path.name)
     if not isinstance(known, dict):
         raise CorruptDataError(f"{path.parent / ABOUT}: files: {path.name} is missing")
     try:
-        size = path.stat().st_size
+        size = size_of_regular(path)
         if size != known.get("bytes") or size > _MAX_TENSOR_BYTES:
             raise CorruptDataError(
                 f"{path}: {size} bytes, expected {known.get('bytes')}: copy the checkpoint again"
             )
-        with safetensors.safe_open(path, "pt") as opened:
-            found = {name: tuple(opened.get_slice(name).get_shape()) for name in opened.keys()}  # noqa: SIM118 - no mapping
-        shapes = found if shapes is None else shapes
-        for name in sorted({*found, *shapes}):
-            if found.get(name) != shapes.get(name):
+        found = _kinds(path)
+        kinds = found if kinds is None else kinds
+        for name in sorted({*found, *kinds}):
+            if found.get(name) != kinds.get(name):
                 raise CorruptDataError(
-                    f"{path}: {name} has shape {found.get(name)}, the method and sizes of {ABOUT} "
-                    f"want {shapes.get(name)}: these are another agent's weights"
+                    f"{path}: {name} has type and shape {found.get(name)}, the method and sizes of "
+                    f"{ABOUT} want {kinds.get(name)}: these are another agent's weights"
                 )
         if file_sha256(path) != known.get("sha256"):
             raise CorruptDataError(f"{path}: its bytes have changed: copy the checkpoint again")
-        return load_file(path)
+        tensors = load_file(path)
     except OSError as error:
         raise CorruptDataError(f"{path}: {error.strerror or error}") from error
     except safetensors.SafetensorError as error:
         raise CorruptDataError(f"{path}: this is no safetensors file: {error}") from error
+    for name, value in tensors.items():
+        if value.is_floating_point() and not bool(torch.isfinite(value).all()):
+            raise CorruptDataError(
+                f"{path}: {name} holds what is no finite number: take an earlier checkpoint"
+            )
+    return tensors
+
+
+def _kinds(path: Path) -> dict[str, tuple[str | int, ...]]:
+    """Return type and shape of each tensor in a file, by name, without reading the tensors."""
+    with open_regular(path) as file:
+        if int.from_bytes(file.read(8), "little") > _MAX_HEADER_BYTES:
+            raise CorruptDataError(f"{path}: this is no safetensors file: its header is too large")
+    with safetensors.safe_open(path, "pt") as opened:
+        slices = {name: opened.get_slice(name) for name in opened.keys()}  # noqa: SIM118 - no mapping
+        return {name: (part.get_dtype(), *part.get_shape()) for name, part in slices.items()}
 
 
 _OPTIMISER, _STATE, _STARTS, _RANDOM = "optimiser", "state", "starts", "random"
@@ -375,7 +397,8 @@ def unpack(
             continue
         number, _, name = rest.partition("/")
         k = int(number) if number.isdecimal() else len(parameters)
-        if k >= len(parameters) or value.shape not in {parameters[k].shape, torch.Size([])}:
+        fits = k < len(parameters) and value.shape in {parameters[k].shape, torch.Size([])}
+        if not fits or not value.is_floating_point():
             raise CorruptDataError(f"checkpoint: {key} is of no parameter that is trained now")
         moments.setdefault(k, {})[name] = value
     groups = optimiser.state_dict()["param_groups"]

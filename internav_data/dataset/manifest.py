@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from internav_data.core.config import MAX_SEED
 from internav_data.core.files import FileLimits, parse_json
 from internav_data.core.storage import OutsideError, Store, StoreLike, exists, store_of
 from internav_data.dataset.consistency import inconsistencies
@@ -282,6 +283,10 @@ def _parse(path: str, raw: dict[str, Any]) -> Manifest:
         manifest = _made(Manifest, values)
     except (TypeError, ValueError, AttributeError, KeyError) as error:
         raise CorruptDataError(f"{path}: not a manifest ({error}): {_AGAIN}") from error
+    if type(manifest.seed) is not int or not 0 <= manifest.seed <= MAX_SEED:
+        raise CorruptDataError(
+            f"{path}: seed: expected 0 … 2^63 - 1, got {manifest.seed!r}: {_AGAIN}"
+        )
     unknown = sorted(set(manifest.requires) - known_features())
     if unknown:
         raise CorruptDataError(

@@ -36,7 +36,7 @@ def checked_config(config: Mapping[str, Any]) -> CheckedConfig:
     episodes = config.get("episodes")
     values: Mapping[str, Any] = episodes if isinstance(episodes, dict) else {}
     model, gap = values.get("push_model", "force"), values.get("gap_m", GAP_M)
-    if model not in {"force", "kick"}:
+    if model not in ("force", "kick"):
         raise CorruptDataError(
             f"manifest.json: config.episodes.push_model: expected force or kick, got {model!r}; "
             "generate the dataset again"

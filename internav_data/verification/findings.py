@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Literal
 
+from internav_data.records.errors import InternavError
+
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
 Level = Literal["files", "schema", "geometry", "physics"]
 LEVELS: tuple[Level, ...] = ("files", "schema", "geometry", "physics")
@@ -16,6 +19,8 @@ LEVELS: tuple[Level, ...] = ("files", "schema", "geometry", "physics")
 
 MAX_FINDINGS = 1000
 """Findings kept in full; further ones are only counted, so that memory stays bounded."""
+MAX_TEXT = 2_000
+"""Characters of a value in a finding."""
 MAX_SHOWN = 20
 """Findings written out in the summary."""
 
@@ -79,6 +84,11 @@ class Findings:
         return json.dumps({"ok": self.ok, **asdict(self)}, indent=2)
 
 
+def _text(value: object) -> str:
+    text = str(value)
+    return text if len(text) <= MAX_TEXT else f"{text[:MAX_TEXT]}…"
+
+
 class FindingCollector:
     """Collector of the findings of one file or scene."""
 
@@ -100,9 +110,22 @@ class FindingCollector:
         self.by_predicate[predicate] += 1
         if len(self.found) < MAX_FINDINGS:
             self.found.append(
-                Finding(self.file, self.scene, episode, predicate, str(expected), str(got))
+                Finding(self.file, self.scene, episode, predicate, _text(expected), _text(got))
             )
         return False
+
+    @contextmanager
+    def guard(self, predicate: str) -> Iterator[None]:
+        """Turn an error of what runs inside into a finding: hostile values end no validation.
+
+        Errors for users pass: they say what to do.
+        """
+        try:
+            yield
+        except InternavError:
+            raise
+        except Exception as error:  # noqa: BLE001 - whatever such values lead to
+            self.expect(False, predicate, "values that can be checked", repr(error))  # noqa: FBT003
 
     def absorb(self, other: FindingCollector) -> None:
         """Add the findings and counts of another collector."""

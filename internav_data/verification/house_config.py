@@ -64,7 +64,8 @@ def house_request(seed: int, config: Mapping[str, Any]) -> HouseRequest | None:
     if not isinstance(houses, dict) or not {"preset", "rooms"} <= houses.keys():
         return None
     preset, rooms, hall_from = houses["preset"], houses["rooms"], houses.get("hall_from", 0)
-    if preset not in HALL_FROM or not isinstance(rooms, str) or not isinstance(hall_from, int):
+    known = isinstance(preset, str) and preset in HALL_FROM
+    if not known or not isinstance(rooms, str) or not isinstance(hall_from, int):
         raise CorruptDataError(
             "manifest.json: config.house: expected preset paper or realistic, rooms as text and "
             f"hall_from as a number, got {preset!r}, {rooms!r} and {hall_from!r}; generate the "

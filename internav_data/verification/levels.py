@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 UNTRUE = "schema not as stated: physics not checked"
 MAX_STARTS = 3
 """Times that a validation begins, again each time that the dataset was extended under it."""
+CHECKABLE = "geometry.checkable"
+"""Predicate of scenes whose values let a check fail with an error."""
 SCENES_A_UNIT = 10
 """Number of scenes that a worker checks before it reports."""
 
@@ -145,10 +147,10 @@ def _validate_once(
     tables = FindingCollector()
     if level != "files":
         progress_callback("schema", 0, 1)
-        tables = check_tables(path, manifest, damaged)
+        tables, unsafe = check_tables(path, manifest, damaged)
         whole.absorb(tables)
         progress_callback("schema", 1, 1)
-        damaged |= {f.file for f in tables.found if f.predicate == "schema.columns"}
+        damaged |= unsafe
         if WITHOUT_SOLID & set(tables.by_predicate):
             damaged |= {file.path for file in manifest.of("assets")}
     if level in {"geometry", "physics"}:
@@ -284,15 +286,21 @@ _SHAPES: dict[str, Shapes] = {}
 
 def check_unit(unit: Unit) -> FindingCollector:
     """Check the geometry of a unit's scenes, and the physics if the unit asks for it."""
+    reader, reports = _Reader(unit.root), []
+    for shard_ref in unit.shard_refs:
+        file = shard_ref.episodes[0] if shard_ref.episodes else shard_ref.house[0]
+        report = FindingCollector(file, shard_ref.scene_id)
+        with report.guard(CHECKABLE):
+            house, episodes = reader.house(shard_ref), reader.episodes(shard_ref)
+            report.absorb(check_scene(house, episodes, _shapes(unit), file, unit.physics))
+        reports.append(report)
+    return join(reports)
+
+
+def _shapes(unit: Unit) -> Shapes:
     key = unit.assets.sha256
     if key not in _SHAPES:
         _SHAPES.clear()
         table = read_table(unit.root / unit.assets.path, ASSETS)
         _SHAPES[key] = Shapes({a.asset_id: a for a in from_table(table, ASSETS)})
-    reader = _Reader(unit.root)
-    reports = []
-    for shard_ref in unit.shard_refs:
-        file = shard_ref.episodes[0] if shard_ref.episodes else shard_ref.house[0]
-        house, episodes = reader.house(shard_ref), reader.episodes(shard_ref)
-        reports.append(check_scene(house, episodes, _SHAPES[key], file, unit.physics))
-    return join(reports)
+    return _SHAPES[key]

@@ -46,7 +46,8 @@ class Rule:
     pattern: str = ""
 
 
-COORDINATE = Rule(-1e4, 1e4, digits=METRES)
+COORDINATE = Rule(-250.0, 250.0, digits=METRES)
+"""Floor plans of users reach over 200 m at most; a lattice over more takes the memory."""
 ID = Rule(0, 32767)
 ID_OR_NONE = Rule(-1, 32767)
 SIZE = Rule(1e-4, 1e4, digits=METRES)
@@ -160,6 +161,8 @@ ASSET_RULES: Mapping[str, Rule] = {
     **{f"parts.element.rotation.{axis}": TURN for axis in "xyzw"},
     "parts.element.material": Rule(choices=PART_MATERIALS),
 }
+MAX_TEXT = 1000
+"""Characters of a text."""
 RULES = {"episodes": EPISODE_RULES, "scenes": SCENE_RULES, "assets": ASSET_RULES}
 
 
@@ -181,11 +184,20 @@ def _leaves(path: str, array: pa.Array) -> Iterator[tuple[str, pa.Array]]:
         yield path, array
 
 
-def check_ranges(table: pa.Table, name: str, report: FindingCollector) -> None:
-    """Check every value of a table by the rule of its column."""
+def check_ranges(table: pa.Table, name: str, report: FindingCollector) -> bool:
+    """Check every value of a table by the rule of its column.
+
+    Returns
+    -------
+    bool
+        Whether all floats are as they should be: geometry of others may take any time and memory.
+
+    """
+    sound = True
     rules = RULES[name]
     turns: dict[str, list[np.ndarray[Any, Any]]] = {}
     for path, array in leaves(table):
+        before = report.by_predicate.total()
         if pa.types.is_floating(array.type):
             values = array.to_numpy(zero_copy_only=False)
             _none(report, f"schema.{name}.{path}", "finite numbers", values[~np.isfinite(values)])
@@ -194,17 +206,23 @@ def check_ranges(table: pa.Table, name: str, report: FindingCollector) -> None:
                 turns.setdefault(stem, []).append(values)
         if path in rules:
             _check_leaf(array, rules[path], f"schema.{name}.{path}", report)
+        if pa.types.is_floating(array.type):
+            sound &= before == report.by_predicate.total()
     for stem, parts in turns.items():
         # One chunk gives x, y, z and w in a row.
         for k in range(0, len(parts), 4):
             length = np.sqrt(sum(part * part for part in parts[k : k + 4]))
             wrong = length[np.abs(length - 1.0) > UNIT]
             _none(report, f"schema.{name}.{stem}", "a unit quaternion", wrong)
+            sound &= len(wrong) == 0
+    return sound
 
 
 def _check_leaf(array: pa.Array, rule: Rule, predicate: str, report: FindingCollector) -> None:
     if pa.types.is_string(array.type):
         words = array.unique().to_pylist()
+        long = [word[:MAX_TEXT] for word in words if len(word) > MAX_TEXT]
+        _none(report, predicate, f"at most {MAX_TEXT} characters", long)
         if rule.choices:
             wrong = [word for word in words if word not in rule.choices]
             _none(report, predicate, f"one of {rule.choices}", wrong)

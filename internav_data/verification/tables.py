@@ -6,6 +6,8 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from internav_data.dataset import ASSETS, EPISODES, SCENES, TABLES, from_table, read_table
 from internav_data.records import OUTSIDE
 from internav_data.records.errors import InternavError
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
     from internav_data.records import House
     from internav_data.verification.house_config import RoomPlan
 
+_MAX_DIGITS = 12
+"""Digits of a scene's number."""
 SPLIT_PERIOD = 120
 """Period of the splits: of every 120 scenes number 0 is val, 1 is test, the others are train."""
 
@@ -57,26 +61,34 @@ def split_of(scene: int) -> str:
 def number_of(scene_id: str) -> int:
     """Return a scene's number, -1 if the id has none."""
     digits = scene_id.rpartition("-")[2]
-    return int(digits) if digits.isdecimal() else -1
+    return int(digits) if digits.isdecimal() and len(digits) <= _MAX_DIGITS else -1
 
 
-def check_tables(root: Path, manifest: Manifest, damaged: frozenset[str]) -> FindingCollector:
-    """Check all tables of a dataset but for damaged files."""
+def check_tables(
+    root: Path, manifest: Manifest, damaged: frozenset[str]
+) -> tuple[FindingCollector, frozenset[str]]:
+    """Check all tables of a dataset but for damaged files.
+
+    Also return the paths of files with values out of their range, of which no geometry can be
+    derived in bounded time and memory.
+    """
     whole = FindingCollector()
+    unsafe: set[str] = set()
     keys = DatasetKeys()
     for name in ("assets", "scenes", "episodes"):
         for file in manifest.of(name):
             if file.path not in damaged:
-                whole.absorb(_check_table(root, manifest, file, keys))
+                whole.absorb(_check_table(root, manifest, file, keys, unsafe))
     if not damaged:
         _check_counts(manifest, keys, whole)
-    return whole
+    return whole, frozenset(unsafe)
 
 
 def _check_table(
-    root: Path, manifest: Manifest, file: DataFile, keys: DatasetKeys
+    root: Path, manifest: Manifest, file: DataFile, keys: DatasetKeys, unsafe: set[str]
 ) -> FindingCollector:
     report = FindingCollector(file.path)
+    unsafe.add(file.path)  # until its values are known
     spec = next(spec for spec in TABLES if spec.name == file.table)
     try:
         table = read_table(root / file.path, spec)
@@ -84,13 +96,16 @@ def _check_table(
         report.expect(False, "schema.columns", f"the columns of {file.table}", error)  # noqa: FBT003
         return report
     report.expect(table.schema.equals(spec.schema), "schema.columns", spec.schema, table.schema)
-    check_ranges(table, file.table, report)
-    if file.table == "assets":
-        _check_assets(table, keys, report)
-    elif file.table == "scenes":
-        _check_scenes(table, manifest, file, keys, report)
-    else:
-        _check_episodes(table, manifest, file, keys, report)
+    with report.guard("schema.checkable"), np.errstate(all="ignore"):
+        if check_ranges(table, file.table, report):
+            unsafe.discard(file.path)
+    with report.guard("schema.checkable"):
+        if file.table == "assets":
+            _check_assets(table, keys, report)
+        elif file.table == "scenes":
+            _check_scenes(table, manifest, file, keys, report)
+        else:
+            _check_episodes(table, manifest, file, keys, report)
     return report
 
 

@@ -7,10 +7,12 @@ import struct
 import pytest
 
 torch = pytest.importorskip("torch")
+from safetensors.torch import load_file, save_file  # noqa: E402
 
 from internav_data.camp import checkpoint as checkpoints  # noqa: E402
 from internav_data.camp.agents import LEARNERS, make_agent  # noqa: E402
 from internav_data.camp.checkpoint import Checkpoint, find, load_agent, read, save  # noqa: E402
+from internav_data.core.storage import file_sha256  # noqa: E402
 from internav_data.records.errors import CorruptDataError, UsageError  # noqa: E402
 
 
@@ -212,3 +214,42 @@ def test_a_pointer_leads_nowhere_else(kept):
 def test_a_folder_without_one_says_what_is_expected(tmp_path):
     with pytest.raises(UsageError, match="expected the folder of a run"):
         read(tmp_path)
+
+
+def written_again(folder, name, change):
+    """Write a file of tensors with one of them changed, and its size and digest."""
+    path = folder / name
+    tensors = load_file(path)
+    first = min(key for key, value in tensors.items() if value.is_floating_point())
+    save_file(tensors | {first: change(tensors[first])}, path)
+    files = json.loads((folder / checkpoints.ABOUT).read_bytes())["files"]
+    files[name] = {"bytes": path.stat().st_size, "sha256": file_sha256(path)}
+    edit(folder, files=files)
+
+
+@pytest.mark.parametrize("name", [checkpoints.WEIGHTS, checkpoints.TRAINING])
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_numbers_that_are_not_finite_are_refused(kept, name, value):
+    run, folder = kept
+    written_again(folder, name, lambda tensor: torch.full_like(tensor, value))
+    with pytest.raises(CorruptDataError, match="no finite number"):
+        read(run)
+
+
+@pytest.mark.parametrize("change", [torch.Tensor.double, torch.Tensor.half, torch.Tensor.long])
+def test_weights_of_another_type_are_refused(kept, change):
+    run, folder = kept
+    written_again(folder, checkpoints.WEIGHTS, change)
+    with pytest.raises(CorruptDataError, match=r"type and shape.*another agent's weights"):
+        read(run)
+
+
+def test_an_oversize_header_is_not_read(kept):
+    run, folder = kept
+    path = folder / checkpoints.WEIGHTS
+    with path.open("wb") as file:
+        file.write(struct.pack("<Q", 90_000_000) + b"{")
+        file.truncate(100_000_000)
+    edit(folder, files={checkpoints.WEIGHTS: {"bytes": 100_000_000}})
+    with pytest.raises(CorruptDataError, match="header is too large"):
+        read(run)
