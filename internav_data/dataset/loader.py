@@ -51,7 +51,8 @@ def load_dataset(
         Folder that `internav-gen generate` wrote; not given: the folder that the environment
         variable INTERNAV_DATASET names, else `internav-dataset` in the current directory.
     split : str, optional
-        train, val or test; all of them if not given.
+        train, val or test; all of them if not given. The files of other splits need not be there,
+        nor the assets until a house is asked for.
     filters : list of (column, operator, value), optional
         Episodes to keep, on top-level columns, as in `[("room_count", ">=", 4)]`: all must hold.
         A list of such lists is a choice between them. Operators: = == != < > <= >= in, not in;
@@ -92,15 +93,15 @@ class Dataset(Generic[E]):
         with_manifest(self.store, self._open_checked)
 
     def _open_checked(self, manifest: Manifest, digest: str) -> None:
-        """Open the manifest in place, whose files are all there."""
+        """Open the manifest in place, whose files are all there, or all of the split's own."""
         if self.split is not None and self.split not in manifest.counts:
             raise UsageError(
                 f"split: expected one of {sorted(manifest.counts)}, got {self.split!r}"
             )
         if self.columns is not None:
             check_columns(self.columns, EPISODES)
-        for table in ("episodes", "scenes", "assets"):
-            for file in manifest.of(table, self.split if table == "episodes" else None):
+        for file in manifest.files:
+            if self.split in {None, file.split}:
                 check_file(self.store, file)
         self._open(manifest, digest)
 
@@ -246,7 +247,7 @@ class Dataset(Generic[E]):
 
     @functools.cached_property
     def _scenes(self) -> tuple[RowGroupCache, dict[str, int]]:
-        files = self.manifest.of("scenes")
+        files = self.manifest.of("scenes", self.split)
         cache = RowGroupCache(self.store, files, SCENES, extra=lambda: {"assets": self.assets})
         ids = read_columns(self.store, files, SCENES, ["scene_id"])["scene_id"].to_pylist()
         return cache, {scene_id: row for row, scene_id in enumerate(ids)}
@@ -263,12 +264,13 @@ class Dataset(Generic[E]):
         Raises
         ------
         UsageError
-            No such scene in the dataset.
+            No such scene in the split.
 
         """
         cache, rows = self._scenes
         if scene_id not in rows:
-            raise UsageError(f"{self.path}: no scene {scene_id!r} (ids look like scene-000017)")
+            place = f"{self.path}: split {self.split}" if self.split else self.path
+            raise UsageError(f"{place}: no scene {scene_id!r} (ids look like scene-000017)")
         return self._houses.get(scene_id, lambda: cast("House", cache.row(rows[scene_id])))
 
     def to_table(self, columns: Sequence[str] | None = None) -> pa.Table:

@@ -13,7 +13,7 @@ from internav_data.dataset import EPISODES, load_dataset, locate, read_manifest
 from internav_data.dataset import from_table as records_of
 from internav_data.dataset.select import condition
 from internav_data.records import Episode, House
-from internav_data.records.errors import UsageError
+from internav_data.records.errors import CorruptDataError, UsageError
 
 
 @pytest.fixture(scope="module")
@@ -263,3 +263,40 @@ def test_numbers_of_a_row_are_plain_python(ds):
     assert type(episode.sealed) is bool
     assert type(episode.obstacles[0].quaternion) is tuple
     assert type(episode.expert.actions[0]) is int
+
+
+@pytest.mark.parametrize("split", ["train", "val", "test"])
+def test_a_split_needs_no_file_of_another_one(damaged_folder, split):
+    whole = load_dataset(damaged_folder)
+    episodes = [episode for episode in whole if episode.split == split]
+    houses = {e.scene_id: whole.scene(e.scene_id) for e in episodes[::40]}
+    for file in whole.manifest.files:
+        if file.split not in {None, split}:
+            (damaged_folder / file.path).unlink()
+    ds = load_dataset(damaged_folder, split)
+    assert list(ds) == episodes
+    assert {scene_id: ds.scene(scene_id) for scene_id in houses} == houses
+    assert {e.scene_id for e in ds} == set(ds.scene_ids)
+    assert len(load_dataset(damaged_folder, split, [("room_count", ">", 0)])) == len(episodes)
+    with pytest.raises(CorruptDataError, match="missing"):
+        load_dataset(damaged_folder)
+    other = "scene-000001" if split != "test" else "scene-000000"
+    with pytest.raises(UsageError, match=f"split {split}: no scene '{other}'"):
+        ds.scene(other)
+
+
+def test_assets_are_needed_for_houses_alone(damaged_folder):
+    (file,) = load_dataset(damaged_folder).manifest.of("assets")
+    (damaged_folder / file.path).unlink()
+    ds = load_dataset(damaged_folder, "train")
+    assert len(list(ds)) == len(ds)
+    with pytest.raises(CorruptDataError, match=f"{file.path}.*missing"):
+        ds.scene(ds[0].scene_id)
+
+
+def test_a_missing_file_of_the_split_itself_is_noticed_on_loading(damaged_folder):
+    file = load_dataset(damaged_folder).manifest.of("scenes", "val")[0]
+    (damaged_folder / file.path).unlink()
+    with pytest.raises(CorruptDataError, match=f"{file.path}.*missing"):
+        load_dataset(damaged_folder, "val")
+    assert load_dataset(damaged_folder, "test")[0].split == "test"
