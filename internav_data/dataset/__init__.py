@@ -30,6 +30,7 @@ from internav_data.dataset.manifest import (
 )
 from internav_data.dataset.outcome_stats import refused_share
 from internav_data.dataset.parquet import FileInfo, read_table, write_parquet
+from internav_data.dataset.repair import Damage, find_damage, repair_files
 from internav_data.dataset.staging import (
     STAGING,
     Identity,
@@ -59,6 +60,7 @@ __all__ = [
     "SCENES",
     "STAGING",
     "TABLES",
+    "Damage",
     "DataFile",
     "Dataset",
     "FileInfo",
@@ -76,6 +78,7 @@ __all__ = [
     "dataset_folder",
     "done_scenes",
     "end_staging",
+    "find_damage",
     "from_table",
     "has_manifest",
     "identity_of",
@@ -87,6 +90,7 @@ __all__ = [
     "read_staged_rows",
     "read_table",
     "refused_share",
+    "repair_files",
     "schema_folder",
     "schema_text",
     "schemas",

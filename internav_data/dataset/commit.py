@@ -18,26 +18,24 @@ shard that differs has another name (see `shards`). Readers may be at work all t
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections import Counter
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
-from internav_data.core.storage import Store, StoreLike, exists, final_of, store_of
+from internav_data.core.storage import StoreLike, exists, final_of, store_of
 from internav_data.dataset.journal import Journal
 from internav_data.dataset.manifest import (
     MANIFEST,
     Counts,
     DataFile,
     Manifest,
-    MetadataFile,
     Quarantined,
     has_manifest,
     read_manifest,
     write_manifest,
 )
-from internav_data.dataset.metadata_files import metadata_blobs
+from internav_data.dataset.metadata_files import put_metadata
 from internav_data.dataset.shards import SPLITS, SceneSource, put_shards
 from internav_data.dataset.staging import (
     IDENTITY,
@@ -192,7 +190,7 @@ def commit_scenes(
     source = SceneSource(staging, old, states)
     files = put_shards(journal, source, assets)
     manifest = _manifest(identity, scenes, old, states, source, files)
-    manifest = _put_metadata(journal, store, manifest)
+    manifest = put_metadata(journal, store, manifest)
     journal.note(old.paths() if old else ())
     journal.announce(MANIFEST)
     manifest = write_manifest(store, manifest)
@@ -213,15 +211,6 @@ def end_staging(out: StoreLike) -> None:
     store = store_of(out)
     Journal(store).sweep(read_manifest(store) if has_manifest(store) else None)
     clear_staging(store)
-
-
-def _put_metadata(journal: Journal, store: Store, manifest: Manifest) -> Manifest:
-    """Put the files beside the data and return the manifest that lists them."""
-    files = []
-    for name, data in metadata_blobs(store, manifest).items():
-        journal.put(name, data)
-        files.append(MetadataFile(name, len(data), hashlib.sha256(data).hexdigest()))
-    return replace(manifest, metadata=tuple(files))
 
 
 def _manifest(

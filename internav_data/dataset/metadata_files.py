@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
 from internav_data.dataset.card import card_text
 from internav_data.dataset.croissant import croissant
 from internav_data.dataset.jsonschemas import schema_text, schemas
+from internav_data.dataset.manifest import MetadataFile
 from internav_data.dataset.stats import stats_of
 
 if TYPE_CHECKING:
     from internav_data.core.storage import Store
+    from internav_data.dataset.journal import Journal
     from internav_data.dataset.manifest import Manifest
 
 
@@ -27,3 +30,12 @@ def metadata_blobs(store: Store, manifest: Manifest) -> dict[str, bytes]:
         **{f"schemas/{name}": schema_text(schema) for name, schema in schemas().items()},
     }
     return {name: text.encode() for name, text in texts.items()}
+
+
+def put_metadata(journal: Journal, store: Store, manifest: Manifest) -> Manifest:
+    """Put the files beside the data and return the manifest that lists them."""
+    files = []
+    for name, data in metadata_blobs(store, manifest).items():
+        journal.put(name, data)
+        files.append(MetadataFile(name, len(data), hashlib.sha256(data).hexdigest()))
+    return replace(manifest, metadata=tuple(files))

@@ -114,8 +114,12 @@ def put_shards(
     for spec in (EPISODES, SCENES):
         for split in SPLITS:
             files += _put_split(journal, source, spec, split)
-    table = to_table(sorted(assets, key=lambda asset: asset.asset_id), ASSETS)
-    return (*files, _put(journal, source, table, ASSETS, "assets", None))
+    return (*files, _put(journal, source, assets_table(assets), ASSETS, "assets", None))
+
+
+def assets_table(assets: Sequence[Asset]) -> pa.Table:
+    """Return assets as rows, in order of their ids."""
+    return to_table(sorted(assets, key=lambda asset: asset.asset_id), ASSETS)
 
 
 def _put_split(

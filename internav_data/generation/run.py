@@ -24,9 +24,11 @@ from internav_data.dataset import (
     clear_staging,
     done_scenes,
     end_staging,
+    find_damage,
     has_manifest,
     open_staging,
     read_manifest,
+    repair_files,
     stage_quarantine,
     staged_scenes,
 )
@@ -42,7 +44,12 @@ from internav_data.generation.scenes import (
 )
 from internav_data.houses.quota import room_count
 from internav_data.records import Pose
-from internav_data.records.errors import InternavError, QuarantineError, UsageError
+from internav_data.records.errors import (
+    CorruptDataError,
+    InternavError,
+    QuarantineError,
+    UsageError,
+)
 from internav_data.records.splits import split_of_scene
 from internav_data.records.version import __version__
 
@@ -134,6 +141,7 @@ def generate(
             queue = _SceneQueue(config, scenes, tuple(k for k in range(scenes) if k not in done))
             recipe = Recipe(setup, ScenePayload(config, assets, staging))
             with Interrupts() as stop:
+                _repair(chosen, recipe, progress, stop)
                 _make(chosen, recipe, queue, progress, stop)
                 if stop():
                     raise InterruptedRunError(_interruption(out, progress), stop.signum)
@@ -272,6 +280,38 @@ def _make(
             if isinstance(result, Failed) and none_made and progress.scenes >= MAX_FIRST_FAILURES:
                 raise _hopeless(staging.store, progress.scenes, result.reason)
     progress.end()
+
+
+def _repair(
+    executor: Executor, recipe: Recipe, progress: GenerationProgress, stop: Interrupts
+) -> None:
+    """Make missing and damaged files of the dataset again, from their scenes made again."""
+    staging: Staging = recipe.payload.staging
+    damage = find_damage(staging.store)
+    if damage is None:
+        return
+    wanted = damage.all_scenes()
+    staged = staged_scenes(staging, wanted)
+    todo = [k for k in wanted if k not in staged]
+    progress.log(
+        f"missing or damaged: {', '.join(damage.paths)}; making {len(todo)} scenes again for them"
+    )
+    results = executor.run(recipe, todo, lambda: not stop())
+    with contextlib.closing(results):
+        for result in results:
+            if isinstance(result, Failed):
+                raise CorruptDataError(
+                    f"{staging.store.at('')}: {', '.join(damage.paths)}: missing or damaged, and "
+                    f"scene {result.task} could not be made again ({result.reason}): restore the "
+                    "files from where the dataset came, or generate it anew in another folder"
+                )
+    if stop():
+        raise InterruptedRunError(
+            f"interrupted while damaged files of {staging.store.at('')} were made again: run the "
+            "same command again to continue",
+            stop.signum,
+        )
+    repair_files(staging, damage, tuple(recipe.payload.assets.assets.values()))
 
 
 def _assembled(

@@ -26,12 +26,12 @@ from internav_data.records.errors import (
 CONFIG = load_config(overrides=["episodes_per_scene=3"])
 
 
-def made(out, scenes, workers=1, config=CONFIG, **orders):
+def made(out, scenes, workers=1, config=CONFIG, progress=None, **orders):
     """Generate stub scenes; the journal lists every scene begun since the last call."""
     out.parent.mkdir(parents=True, exist_ok=True)
     (out.parent / "stub.json").write_text(json.dumps(orders))
     (out.parent / "journal").write_text("")
-    return generate(out, config, scenes, workers, assets=CATALOGUE, setup=stub)
+    return generate(out, config, scenes, workers, progress, assets=CATALOGUE, setup=stub)
 
 
 @pytest.fixture(scope="module")
