@@ -6,6 +6,7 @@ import importlib
 import shlex
 import sys
 import traceback
+import warnings
 
 import click
 
@@ -83,6 +84,10 @@ def launch(command: click.Command, program: str, arguments: list[str] | None = N
     """Run a command line and exit with its code; every error becomes one line."""
     given = sys.argv[1:] if arguments is None else arguments
     debug = bool(given) and given[0] == "--debug"
+    # A warning is a line for the user, not a place in the source.
+    warnings.showwarning = lambda message, *_, **_k: click.echo(
+        _line(program, f"warning: {message}"), err=True
+    )
     try:
         result = command.main(given, prog_name=program, standalone_mode=False)
         sys.stdout.flush()
@@ -134,9 +139,13 @@ def _with_help(error: click.ClickException) -> str:
 
 
 def _say(program: str, text: str, code: int) -> int:
+    click.echo(_line(program, text), err=True)
+    return code
+
+
+def _line(program: str, text: str) -> str:
     # Names in files may hold anything: no control characters reach the terminal.
     line = "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))
     if len(line) > LONGEST_LINE:
         line = f"{line[: LONGEST_LINE // 2]} ... {line[-LONGEST_LINE // 2 :]}"
-    click.echo(f"{program}: {line}", err=True)
-    return code
+    return f"{program}: {line}"

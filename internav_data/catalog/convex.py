@@ -61,20 +61,71 @@ def convex_pieces(path: Path, vertices: Floats, faces: Ints, max_parts: int) -> 
     import trimesh  # noqa: PLC0415 - only for users with meshes
 
     mesh = trimesh.Trimesh(vertices, faces, process=True)
-    solid = (
-        bool(mesh.is_watertight) and abs(float(mesh.volume)) >= _CONVEX_SHARE * hull_piece.volume
-    )
-    if solid or max_parts == 1:
+    if _is_convex(mesh, hull_piece) or max_parts == 1:
         return [hull_piece]
-    pieces = [
-        piece for points in _cut(path, mesh, max_parts) if (piece := _piece(points)) is not None
-    ]
+    pieces = _pieces(path, mesh, max_parts)
     total = sum(piece.volume for piece in pieces)
     if total <= 0.0:
         raise UsageError(f"{path}: encloses no volume; close its surface or give it thickness")
     large = [piece for piece in pieces if piece.volume >= _MIN_SHARE * total]
     large.sort(key=lambda piece: (-piece.volume, piece.corners.min(axis=0).tolist()))
     return large[:max_parts]
+
+
+def enclosed_volume(vertices: Floats, faces: Ints) -> float | None:
+    """Return the volume that a mesh's bodies enclose, each by itself, m³; None if one is open.
+
+    `vertices` is (n, 3) float64 in metres, `faces` (m, 3) int64.
+    """
+    import trimesh  # noqa: PLC0415 - only for users with meshes
+
+    bodies = _bodies(trimesh.Trimesh(vertices, faces, process=True))
+    if not bodies or not all(body.is_watertight for body in bodies):
+        return None
+    return sum(abs(float(body.volume)) for body in bodies)
+
+
+def _bodies(mesh: Any) -> list[Any]:  # noqa: ANN401 - trimesh
+    """Return the connected surfaces of a mesh as meshes, in the order of their faces."""
+    import trimesh  # noqa: PLC0415 - only for users with meshes
+
+    groups = trimesh.graph.connected_components(
+        mesh.face_adjacency, nodes=np.arange(len(mesh.faces)), min_len=1
+    )
+    ordered = sorted((np.sort(group) for group in groups), key=lambda group: int(group[0]))
+    return list(mesh.submesh(ordered, append=False, repair=False))
+
+
+def _is_convex(mesh: Any, hull: Piece) -> bool:  # noqa: ANN401 - trimesh
+    closed = bool(mesh.is_watertight)
+    return closed and abs(float(mesh.volume)) >= _CONVEX_SHARE * hull.volume
+
+
+def _pieces(path: Path, mesh: Any, max_parts: int) -> list[Piece]:  # noqa: ANN401 - trimesh
+    """Cut a mesh body by body: coacd fills the space between solids that touch.
+
+    What is open, or has more bodies than pieces are allowed, is cut at once.
+    """
+    bodies = _bodies(mesh)
+    hulls = [_piece(np.asarray(body.vertices)) for body in bodies]
+    solid = all(body.is_watertight for body in bodies) and None not in hulls
+    if not solid or len(bodies) > max_parts:
+        return _hulls(_cut(path, mesh, max_parts))
+    pieces: list[Piece] = []
+    left = max_parts
+    for k, (body, hull) in enumerate(zip(bodies, hulls, strict=True)):
+        most = left - (len(bodies) - 1 - k)  # each later body needs a piece at least
+        if hull is not None and (_is_convex(body, hull) or most == 1):
+            found = [hull]
+        else:
+            found = _hulls(_cut(path, body, most))
+        pieces += found
+        left -= len(found)
+    return pieces
+
+
+def _hulls(cut: list[Floats]) -> list[Piece]:
+    return [piece for points in cut if (piece := _piece(points)) is not None]
 
 
 def _cut(path: Path, mesh: Any, max_parts: int) -> list[Floats]:  # noqa: ANN401 - trimesh

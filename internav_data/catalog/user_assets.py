@@ -1,22 +1,27 @@
 """A user's own meshes: read by trimesh, cut into convex parts by coacd, fitted to the frame.
 
-Every error names the file and says what to do. Files are bounded before they are read, and
+Every error names the file and says what to do. A mesh that cannot be used is left out with a
+warning that names it, and the others are used. Files are bounded before they are read, and
 nothing outside the folder is opened: materials and textures a mesh names are not looked up.
 """
 
 from __future__ import annotations
 
+import codecs
 import io
 import math
 import re
+import warnings
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from internav_data.catalog.convex import Piece, convex_pieces
+from internav_data.catalog.convex import Piece, convex_pieces, enclosed_volume
+from internav_data.catalog.glb import check_glb
 from internav_data.catalog.user_manifest import MESH_SUFFIXES, MeshNote, read_notes
 from internav_data.core.extras import EXTRAS, missing, require
+from internav_data.core.files import FileLimits, read_file
 from internav_data.records import Asset, Part
 from internav_data.records.errors import UsageError
 
@@ -31,6 +36,10 @@ if TYPE_CHECKING:
 MAX_BYTES = 64_000_000
 MAX_FACES = 400_000
 MAX_FILES = 5_000
+MAX_GROUPS = 1_000
+"""Largest number of materials, groups and objects of an OBJ file."""
+MAX_VOLUME_DIFFERENCE = 0.1
+"""Share by which the volume of the parts may differ from the mesh's without a warning."""
 MAX_SIZE_M, MIN_SIZE_M = 5.0, 0.01
 _DENSITY_KG_M3 = 200.0
 _GREY: RGB = (168, 164, 156)
@@ -56,8 +65,40 @@ def load_user_assets(directory: Path) -> tuple[Asset, ...]:
     Raises
     ------
     UsageError
-        Names the file that cannot be used, why, and what to do.
+        No mesh can be used; it names the first one, why, and what to do.
+
+    Warns
+    -----
+    UserWarning
+        For each mesh that is left out, and for each whose convex parts have another volume.
+
     """
+    paths = _meshes(directory)
+    notes = read_notes(directory, tuple(path.name for path in paths))
+    assets: dict[str, tuple[Asset, Path]] = {}
+    refused: list[UsageError] = []
+    for path in paths:
+        if notes[path.name].ignore:
+            continue
+        try:
+            asset = _asset(path, notes[path.name])
+        except UsageError as error:
+            refused.append(error)
+            continue
+        if asset.asset_id in assets:
+            other = assets[asset.asset_id][1].name
+            name = f"{asset.asset_id!r}, as {other} is"
+            refused.append(UsageError(f"{path}: would be named {name}; rename one of them"))
+        else:
+            assets[asset.asset_id] = (asset, path)
+    if refused and not assets:
+        raise refused[0]
+    for complaint in refused:
+        warnings.warn(f"{complaint}; it is left out", stacklevel=2)
+    return tuple(assets[asset_id][0] for asset_id in sorted(assets))
+
+
+def _meshes(directory: Path) -> list[Path]:
     if not directory.is_dir():
         raise UsageError(f"{directory}: not a folder; --assets wants a folder of meshes")
     paths = sorted(p for p in directory.iterdir() if p.suffix.lower() in MESH_SUFFIXES)
@@ -65,19 +106,7 @@ def load_user_assets(directory: Path) -> tuple[Asset, ...]:
         raise UsageError(f"{directory}: holds no mesh; put {', '.join(MESH_SUFFIXES)} files there")
     if len(paths) > MAX_FILES:
         raise UsageError(f"{directory}: {len(paths)} meshes, at most {MAX_FILES}; split it")
-    notes = read_notes(directory, tuple(path.name for path in paths))
-    assets: dict[str, tuple[Asset, Path]] = {}
-    for path in paths:
-        if notes[path.name].ignore:
-            continue
-        asset = _asset(path, notes[path.name])
-        if asset.asset_id in assets:
-            raise UsageError(
-                f"{path}: would be named {asset.asset_id!r}, as "
-                f"{assets[asset.asset_id][1].name} is; rename one of them"
-            )
-        assets[asset.asset_id] = (asset, path)
-    return tuple(assets[asset_id][0] for asset_id in sorted(assets))
+    return paths
 
 
 def _asset(path: Path, note: MeshNote) -> Asset:
@@ -100,6 +129,7 @@ def _asset(path: Path, note: MeshNote) -> Asset:
         pieces = _laid_flat(pieces)
     parts, size = _fitted(path, pieces, colour)
     volume = sum(piece.volume for piece in pieces)
+    _compare_volumes(path, enclosed_volume(points, faces), volume)
     mass = note.mass_kg if note.mass_kg is not None else max(0.01, _DENSITY_KG_M3 * volume)
     stem = re.sub(r"[^A-Za-z0-9]+", "_", path.stem).strip("_") or "mesh"
     type_ = note.type or "".join(word[:1].upper() + word[1:] for word in stem.split("_"))
@@ -115,6 +145,16 @@ def _asset(path: Path, note: MeshNote) -> Asset:
         blocks=True,
         parts=parts,
     )
+
+
+def _compare_volumes(path: Path, enclosed: float | None, parts: float) -> None:
+    """Warn where convex parts enclose another volume than the mesh, and so weigh another mass."""
+    if enclosed and abs(parts / enclosed - 1.0) > MAX_VOLUME_DIFFERENCE:
+        warnings.warn(
+            f"{path}: its convex parts have {parts / enclosed:.2g} times its volume; raise "
+            "max_parts in assets.toml, or give mass_kg",
+            stacklevel=4,
+        )
 
 
 def _laid_flat(pieces: list[Piece]) -> list[Piece]:
@@ -137,15 +177,10 @@ def _laid_flat(pieces: list[Piece]) -> list[Piece]:
 
 def _read(path: Path) -> tuple[Floats, NDArray[np.int64], RGB]:
     """Read vertices (n, 3) float64, triangles (m, 3) int64 and a mean colour, size-limited."""
-    if path.is_symlink() or not path.is_file():
-        raise UsageError(f"{path}: not a plain file; copy the mesh itself into the folder")
-    size = path.stat().st_size
-    if not 0 < size <= MAX_BYTES:
-        raise UsageError(f"{path}: {size} bytes, expected 1 to {MAX_BYTES}; export fewer triangles")
     require("trimesh")
+    suffix, content = path.suffix[1:].lower(), _content(path)
     import trimesh  # noqa: PLC0415 - only for users with meshes
 
-    suffix, content = path.suffix[1:].lower(), path.read_bytes()
     try:
         # From memory and without a resolver: nothing that the file refers to is opened.
         loaded: Any = trimesh.load(
@@ -168,6 +203,25 @@ def _read(path: Path) -> tuple[Floats, NDArray[np.int64], RGB]:
     if not finite:
         raise UsageError(f"{path}: has corners that are not numbers; export it again")
     return vertices, faces, _mean_colour(mesh)
+
+
+def _content(path: Path) -> bytes:
+    """Read a mesh's file: a bounded one in a format that takes bounded time to read."""
+    if path.name.startswith("._"):
+        raise UsageError(f"{path}: notes of macOS beside a file, no mesh; remove it")
+    if path.is_symlink() or not path.is_file():
+        raise UsageError(f"{path}: not a plain file; copy the mesh itself into the folder")
+    limits = FileLimits(error=UsageError, remedy="export fewer triangles", max_bytes=MAX_BYTES)
+    content = read_file(path, limits).removeprefix(codecs.BOM_UTF8)
+    if not content:
+        raise UsageError(f"{path}: 0 bytes; export it again")
+    if path.suffix.lower() == ".glb":
+        check_glb(path, content, MAX_FACES)
+    elif path.suffix.lower() == ".obj":
+        groups = sum(map(content.count, (b"\nusemtl", b"\no ", b"\ng ")))
+        if groups > MAX_GROUPS:
+            raise UsageError(f"{path}: {groups} groups, at most {MAX_GROUPS}; join them")
+    return content
 
 
 def _processed(loaded: Any, suffix: str) -> bool:  # noqa: ANN401 - trimesh is imported when used

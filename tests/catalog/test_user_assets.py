@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import shutil
 import struct
 import sys
@@ -80,7 +81,7 @@ def test_a_table_is_cut_into_parts_the_same_each_time(tmp_path):
     where = folder(tmp_path, mesh=mesh)
     (first,), (second,) = load_user_assets(where), load_user_assets(where)
     assert first == second
-    assert 4 <= len(first.parts) <= 12
+    assert len(first.parts) == 5
     check(first)
 
 
@@ -171,8 +172,8 @@ def test_no_folder_and_no_mesh(tmp_path):
 
 def test_two_files_of_one_name(tmp_path):
     folder(tmp_path)
-    with pytest.raises(UsageError, match="rename"):
-        load_user_assets(folder(tmp_path, "thing.stl"))
+    with pytest.warns(UserWarning, match=r"thing\.stl: would be named .*rename.*left out"):
+        assert len(load_user_assets(folder(tmp_path, "thing.stl"))) == 1
 
 
 def objects(count):
@@ -210,3 +211,94 @@ def test_lay_flat_turns_a_mesh_onto_its_broadest_face(tmp_path):
     (asset,) = load_user_assets(folder(tmp_path, toml="[default]\nlay_flat = true\n", mesh=slab))
     check(asset)
     assert asset.size[2] == pytest.approx(0.05, abs=1e-3)
+
+
+def boxes(*each):
+    import trimesh
+
+    return trimesh.util.concatenate(
+        [trimesh.creation.box(size).apply_translation(at) for size, at in each]
+    )
+
+
+TABLE = (
+    ((1.0, 0.6, 0.05), (0.0, 0.0, 0.725)),
+    *(((0.06, 0.06, 0.7), (x, y, 0.35)) for x in (-0.45, 0.45) for y in (-0.25, 0.25)),
+)
+"""A table of five boxes that touch."""
+
+
+def test_bodies_that_touch_are_cut_apart_and_weigh_what_they_enclose(tmp_path):
+    (asset,) = load_user_assets(folder(tmp_path, mesh=boxes(*TABLE)))
+    check(asset)
+    assert len(asset.parts) == 5
+    volume = sum(np.prod(size) for size, _ in TABLE)
+    assert asset.mass_kg == pytest.approx(200.0 * volume, rel=0.01)
+
+
+def test_parts_of_another_volume_are_named(tmp_path):
+    import trimesh
+
+    ring = trimesh.creation.annulus(0.4, 0.5, 0.2)
+    with pytest.warns(UserWarning, match=r"thing\.obj: its convex parts have .* times its volume"):
+        load_user_assets(folder(tmp_path, mesh=ring, toml="[default]\nmax_parts = 1\n"))
+
+
+def test_each_mesh_that_cannot_be_used_is_named_and_the_others_are_used(tmp_path):
+    folder(tmp_path)
+    (tmp_path / "link.obj").symlink_to(tmp_path / "thing.obj")
+    (tmp_path / "._thing.obj").write_bytes(b"\0\5\26\7")
+    nan = b"v nan 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 2 3 4\n"
+    (tmp_path / "nan.obj").write_bytes(nan)
+    for name in ("\u0441\u0442\u0443\u043b.obj", "\u0441\u0442\u043e\u043b.obj"):
+        shutil.copy(tmp_path / "thing.obj", tmp_path / name)
+    with pytest.warns(UserWarning, match="left out") as caught:
+        assets = load_user_assets(tmp_path)
+    assert [asset.asset_id for asset in assets] == ["Mesh_user_mesh", "Thing_user_thing"]
+    told = [str(each.message) for each in caught]
+    assert len(told) == 4
+    for words in ("macOS", "plain file", "not numbers", "rename"):
+        assert sum(words in line for line in told) == 1
+
+
+def test_byte_order_marks_are_read(tmp_path):
+    folder(tmp_path)
+    content = (tmp_path / "thing.obj").read_bytes()
+    (tmp_path / "thing.obj").write_bytes(b"\xef\xbb\xbf" + content)
+    (tmp_path / "assets.toml").write_bytes(b'\xef\xbb\xbf["thing.obj"]\nmass_kg = 3\n')
+    (asset,) = load_user_assets(tmp_path)
+    assert asset.mass_kg == 3.0
+
+
+def glb(**scene):
+    text = json.dumps({"asset": {"version": "2.0"}, **scene}).encode()
+    text += b" " * (-len(text) % 4)
+    chunk = struct.pack("<I", len(text)) + b"JSON" + text
+    return b"glTF" + struct.pack("<II", 2, 12 + len(chunk)) + chunk
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        ({"meshes": [{"primitives": [{}] * 20_000}]}, "20000 primitives, at most 1000"),
+        (
+            {"meshes": [{"primitives": [{}] * 9}], "nodes": [{"mesh": 0}] * 500},
+            "4500 primitives, at most 1000",
+        ),
+        ({"accessors": [{"count": 10**9}]}, "1000000000 corners"),
+        ({"meshes": 3}, "no glTF"),
+        ({"meshes": [{"primitives": [{}]}], "nodes": [{"mesh": 7}]}, "no glTF"),
+        ({"extras": [[]] * 200_000}, "holds too much"),
+    ],
+)
+def test_a_glb_that_takes_minutes_or_memory_is_refused_at_once(tmp_path, scene, words):
+    started = time.process_time()
+    with pytest.raises(UsageError, match=words):
+        load_user_assets(folder(tmp_path, "thing.glb", mesh=glb(**scene)))
+    assert time.process_time() - started < 5
+
+
+def test_an_obj_of_many_groups_is_refused(tmp_path):
+    many = b"".join(b"\nusemtl m%d" % k for k in range(2000))
+    with pytest.raises(UsageError, match="2000 groups, at most 1000"):
+        load_user_assets(folder(tmp_path, mesh=many))
