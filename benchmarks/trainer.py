@@ -112,7 +112,7 @@ def lived(
         count,
         episodes,
         size,
-        autoreset=False,
+        autoreset_mode="Disabled",
         copy=False,
         sensors=agent.sensors,
         max_steps=MAX_STEPS,

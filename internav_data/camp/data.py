@@ -111,7 +111,8 @@ class TrainingData:
 
         env: Any = make_vector(
             len(local), self.episodes_of(stage),
-            min(config.run.workers, len(local)), autoreset=False, copy=False, sensors=sensors,
+            min(config.run.workers, len(local)),
+            autoreset_mode="Disabled", copy=False, sensors=sensors,
             task=stage.tasks[local.start : local.stop] or "interactive",
             image_size=config.network.image_size, max_steps=config.run.max_steps,
             failed_done_reward=config.data.failed_done_reward,

@@ -16,7 +16,7 @@ from internav_data.dataset.decode import from_table
 from internav_data.dataset.location import dataset_folder
 from internav_data.dataset.manifest import Manifest, check_file
 from internav_data.dataset.row_group_cache import RowGroupCache
-from internav_data.dataset.select import Filters, check_columns, matching_rows, read_columns
+from internav_data.dataset.select import Filters, check_columns, joined, matching_rows, read_columns
 from internav_data.dataset.snapshot import read_shard, with_manifest
 from internav_data.dataset.stream import EpisodeStream
 from internav_data.dataset.tables import ASSETS, EPISODES, SCENES
@@ -68,7 +68,7 @@ def load_dataset(
         An unknown split, column or operator.
 
     """
-    store = path if isinstance(path, Store) else store_of(dataset_folder(path))
+    store = path if isinstance(path, Store) else dataset_folder(path)
     return Dataset(store, split, filters, columns)
 
 
@@ -87,7 +87,8 @@ class Dataset(Generic[E]):
         filters: Filters | None = None,
         columns: Sequence[str] | None = None,
     ) -> None:
-        self.store = store_of(path)
+        # Files are opened when they are first read: the folder must be found then too.
+        self.store = path if isinstance(path, Store) else store_of(Path(path).absolute())
         self.split, self.filters = split, filters
         self.columns = None if columns is None else tuple(columns)
         with_manifest(self.store, self._open_checked)
@@ -132,7 +133,7 @@ class Dataset(Generic[E]):
 
     @property
     def path(self) -> Path:
-        """Folder of the dataset, as it was given."""
+        """Folder of the dataset, absolute."""
         return Path(self.store.at(""))
 
     @property
@@ -180,6 +181,25 @@ class Dataset(Generic[E]):
 
     def _row(self, number: int) -> int:
         return number if self._index is None else int(self._index[number])
+
+    def select(self, split: str | None = None, filters: Filters | None = None) -> Dataset[E]:
+        """Return the episodes among these that are of a split and for which filters hold.
+
+        Raises
+        ------
+        UsageError
+            These are another split's, or there is no such split, column or operator.
+
+        """
+        if split is not None and self.split not in {None, split}:
+            raise UsageError(
+                f"split: expected {self.split!r} (or none), as the dataset was loaded with it, "
+                f"got {split!r}: load the dataset with that split"
+            )
+        if split in {None, self.split} and filters is None:
+            return self
+        both = filters if self.filters is None else joined(self.filters, filters)
+        return Dataset(self.store, split or self.split, both, self.columns)
 
     def row_numbers(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the rows, among all of the split's files, of selected episodes: (n,) int64."""
@@ -275,7 +295,7 @@ class Dataset(Generic[E]):
 
     def to_table(self, columns: Sequence[str] | None = None) -> pa.Table:
         """Return the selected episodes as an Arrow table of the given (or all) columns."""
-        names = columns or self.columns or EPISODES.schema.names
+        names = _first(columns, self.columns, EPISODES.schema.names)
         check_columns(names, EPISODES)
         table = read_columns(self.store, self._files, EPISODES, names)
         return table if self._index is None else table.take(self._index)
@@ -288,7 +308,7 @@ class Dataset(Generic[E]):
         ModuleNotFoundError
             pandas is not installed.
         """
-        names = columns or self.columns or scalar_columns()
+        names = _first(columns, self.columns, scalar_columns())
         require("pandas")
         return self.to_table(names).to_pandas()
 
@@ -300,8 +320,13 @@ class Dataset(Generic[E]):
         """
         from internav_data.dataset.tensors import tensors  # noqa: PLC0415 - torch when used
 
-        names = columns or self.columns or scalar_columns()
+        names = _first(columns, self.columns, scalar_columns())
         return tensors(self.to_table([name for name in names if name in scalar_columns()]))
+
+
+def _first(*choices: Sequence[str] | None) -> Sequence[str]:
+    """Return the first choice of columns that was made; an empty one is one."""
+    return next(choice for choice in choices if choice is not None)
 
 
 def scalar_columns() -> tuple[str, ...]:

@@ -124,6 +124,13 @@ def matching_rows(store: Store, files: Sequence[DataFile], filters: Filters) -> 
     return numbers
 
 
+def joined(one: Filters, other: Filters | None) -> Filters:
+    """Return filters that hold where both do; None holds everywhere."""
+    if other is None:
+        return one
+    return [[*a, *b] for a in _groups(one) for b in _groups(other)]
+
+
 def _null_column(name: str) -> str:
     return f"{name} is null"
 

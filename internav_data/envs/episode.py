@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from internav_data.envs.tasks import InteractiveNavigation, TaskConfig, TaskStep
 from internav_data.records.errors import UsageError
@@ -16,6 +18,22 @@ if TYPE_CHECKING:
     from internav_data.envs.tasks import Task
     from internav_data.records import Asset, Episode
     from internav_data.world import StepResult
+
+
+def check_actions(actions: Sequence[Any]) -> list[int]:
+    """Return actions as integers; none is taken before all are known to exist.
+
+    Raises
+    ------
+    UsageError
+        One is no whole number, or there is no such action.
+    """
+    for action in actions:
+        if not isinstance(action, int | np.integer) or not Action.WAIT <= action < ACTION_COUNT:
+            raise UsageError(
+                f"step: expected an action of 0 … {ACTION_COUNT - 1}, or -1 to wait; got {action!r}"
+            )
+    return [int(action) for action in actions]
 
 
 class EpisodeRun:
@@ -110,10 +128,7 @@ class EpisodeRun:
         """
         if self.done:
             raise UsageError("step: the episode is over; call reset() first")
-        if not Action.WAIT <= action < ACTION_COUNT:
-            raise UsageError(
-                f"step: expected an action of 0 … {ACTION_COUNT - 1}, or -1 to wait; got {action}"
-            )
+        check_actions([action])
         self.last = result = self.world.step(action)
         self.actions.append(action)
         if result.success and result.action.changes_picture:

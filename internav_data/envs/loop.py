@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class Environments(Protocol):
-    """Vector environment made with `autoreset=False`; it may overwrite its observations."""
+    """Vector environment that resets nothing by itself; it may overwrite its observations."""
 
     num_envs: int
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from internav_data.envs.tasks import TaskConfig
 from internav_data.envs.vector import InterNavVectorEnv
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ def make_vector(
     num_envs: int,
     dataset: str | Path | Dataset[Episode],
     workers: int = 0,
+    max_episode_steps: int | None = None,
     **arguments: Any,  # noqa: ANN401 - those of `InterNavVectorEnv`
 ) -> VectorEnv[Any, Any, Any]:
     """Make a vector environment: in this process, or (workers > 0) in that many others.
@@ -29,7 +31,13 @@ def make_vector(
         Arguments of `InterNavVectorEnv`.
     workers
         Number of processes.
+    max_episode_steps
+        Gymnasium's name for a limit of steps: the smaller of it and `max_steps` holds.
     """
+    if max_episode_steps is not None:
+        arguments["max_steps"] = min(
+            max_episode_steps, arguments.get("max_steps", TaskConfig().max_steps)
+        )
     if workers:
         from internav_data.envs.processes import InterNavProcesses  # noqa: PLC0415 - when asked for
 

@@ -13,16 +13,18 @@ import weakref
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from gymnasium.vector import VectorEnv
+from gymnasium.vector import AutoresetMode, VectorEnv
 
 from internav_data.core.main_module import dumped, loaded
 from internav_data.core.processes import GRACE_S, Child
+from internav_data.envs.copies import PlainSpec, lasting
 from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.envs.slot import EpisodeSnapshot, check_options, task_names
 from internav_data.envs.spaces import buffer_shapes
 from internav_data.envs.vector import (
     OPTIONS,
     InterNavVectorEnv,
+    checked_batch,
     declare_spaces,
     reset_choices,
     split_seeds,
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from internav_data.core.typing import Bools
     from internav_data.dataset import Dataset
     from internav_data.envs.sensors import Sensor
     from internav_data.envs.types import Observations, Stepped
@@ -96,7 +99,8 @@ def serve(pipe: Connection[Any, Any]) -> None:
                 pipe.send((False, error))
                 continue
             # Observations lie in the shared memory already: only the rest goes through the pipe.
-            pipe.send((True, answer if name == "state" else answer[1:]))
+            moved = name in {"reset", "step", "restore"}
+            pipe.send((True, (*answer[1:], env.done.copy()) if moved else answer))
     except (EOFError, BrokenPipeError, ConnectionResetError):
         raise
     except Exception as error:  # noqa: BLE001 - the parent raises it
@@ -148,14 +152,14 @@ def concatenate_infos(parts: Sequence[dict[str, Any]], counts: Sequence[int]) ->
     return whole
 
 
-class InterNavProcesses(VectorEnv[Any, Any, Any]):
+class InterNavProcesses(PlainSpec, VectorEnv[Any, Any, Any]):
     """N environments stepped in several processes, each an `InterNavVectorEnv` of its share.
 
     Results are those of one `InterNavVectorEnv` of all, to the last bit.
 
     Parameters
     ----------
-    num_envs, dataset, image_size, autoreset, copy, sensors, **arguments
+    num_envs, dataset, image_size, autoreset_mode, render_mode, copy, sensors, **arguments
         Arguments of `InterNavVectorEnv`; a loaded dataset is opened again in each process.
     workers
         Number of processes, at most one for each environment.
@@ -173,16 +177,23 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
         workers: int = 2,
         image_size: int = 64,
         *,
-        autoreset: bool = True,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        render_mode: str | None = None,
         copy: bool = True,
         sensors: Sequence[str | Sensor] = DEFAULT_SENSORS,
         **arguments: Any,  # noqa: ANN401 - those of `InterNavVectorEnv`
     ) -> None:
         if not 1 <= workers <= num_envs:
             raise UsageError(f"workers: expected 1 … {num_envs} (num_envs), got {workers}")
-        declare_spaces(self, num_envs, image_size, sensors, autoreset=autoreset)
-        self._copy = copy
-        given = dict(arguments, dataset=dataset, image_size=image_size, autoreset=autoreset)
+        self._mode = declare_spaces(
+            self, num_envs, image_size, sensors, autoreset_mode=autoreset_mode,
+            render_mode=render_mode,
+        )  # fmt: skip
+        self._copy, self._done = copy, np.zeros(num_envs, np.bool_)
+        given = dict(
+            arguments, dataset=lasting(dataset), image_size=image_size,
+            autoreset_mode=self._mode, render_mode=render_mode,
+        )  # fmt: skip
         given["sensors"], tasks = sensors, task_names(arguments, num_envs)
         bounds = [num_envs * k // workers for k in range(workers + 1)]
         self._rows = list(itertools.pairwise(bounds))
@@ -233,6 +244,8 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
                 asked.append(k)
         answers = dict(zip(asked, self._answers(asked), strict=True))
         infos = [answers[k][0] if k in answers else {} for k in range(len(self._rows))]
+        for k, (_, done) in answers.items():
+            self._done[slice(*self._rows[k])] = done
         return self._observations(), concatenate_infos(infos, self._counts)
 
     def step(self, actions: NDArray[np.int64] | Sequence[int]) -> Stepped:
@@ -241,14 +254,13 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
         Raises
         ------
         UsageError
-            The number of actions is not `num_envs`, or an action is unknown.
+            As `InterNavVectorEnv.step`; no environment of any process has taken a step then.
         """
-        asked = np.asarray(actions)
-        if asked.shape != (self.num_envs,):
-            raise UsageError(f"step: expected {self.num_envs} actions, got shape {asked.shape}")
+        asked = checked_batch(actions, self._done, self._mode)
         for k, (low, high) in enumerate(self._rows):
             self._ask(k, "step", asked[low:high])
-        rewards, terminated, truncated, infos = zip(*self._answers(), strict=True)
+        rewards, terminated, truncated, infos, done = zip(*self._answers(), strict=True)
+        self._done = np.concatenate(done)
         return (
             self._observations(),
             np.concatenate(rewards),
@@ -257,11 +269,19 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
             concatenate_infos(infos, self._counts),
         )
 
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Return each agent's view, N of (300, 300, 3) uint8; None without a render mode."""
+        if self.render_mode is None:
+            return None
+        return tuple(picture for pictures in self._ask_all("render") for picture in pictures)
+
+    def action_masks(self) -> Bools:
+        """Return which actions could succeed now, (N, 12) bool: `internav_data.world.masks`."""
+        return np.concatenate(self._ask_all("action_masks"))
+
     def state(self) -> tuple[EpisodeSnapshot, ...]:
         """Return a snapshot of each environment."""
-        for k in range(len(self._processes)):
-            self._ask(k, "state")
-        return tuple(state for states in self._answers() for state in states)
+        return tuple(state for states in self._ask_all("state") for state in states)
 
     def restore(self, states: Sequence[EpisodeSnapshot]) -> tuple[Observations, dict[str, Any]]:
         """Become the environments of snapshots; return observations, arrays (N, …) by sensor.
@@ -275,8 +295,15 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
             raise UsageError(f"restore: expected {self.num_envs} states, got {len(states)}")
         for k, (low, high) in enumerate(self._rows):
             self._ask(k, "restore", list(states[low:high]))
-        infos = [answer[0] for answer in self._answers()]
+        infos, done = zip(*self._answers(), strict=True)
+        self._done = np.concatenate(done)
         return self._observations(), concatenate_infos(infos, self._counts)
+
+    def __getstate__(self) -> dict[str, Any]:
+        raise UsageError(
+            "InterNav: environments in processes cannot be copied or pickled: make others with the "
+            "same arguments, and restore() there what state() returns here"
+        )
 
     def close_extras(self, **_: Any) -> None:  # noqa: ANN401 - Gymnasium's signature
         """Stop the processes."""
@@ -285,6 +312,12 @@ class InterNavProcesses(VectorEnv[Any, Any, Any]):
         for process in self._processes:
             process.end(GRACE_S)
         self._end()
+
+    def _ask_all(self, name: str) -> list[Any]:
+        """Return every process's answer to a question without arguments."""
+        for k in range(len(self._processes)):
+            self._ask(k, name)
+        return self._answers()
 
     def _ask(self, k: int, name: str, *given: Any, **named: Any) -> None:  # noqa: ANN401 - of any method
         self._processes[k].send((name, (given, named)))

@@ -7,12 +7,20 @@ from typing import TYPE_CHECKING, Any, Unpack
 import gymnasium
 import numpy as np
 
+from internav_data.envs.copies import Rebuilt, lasting
 from internav_data.envs.sensors import DEFAULT_SENSORS
-from internav_data.envs.slot import Arguments, EnvSlot, EpisodeSnapshot, check_options, step_info
-from internav_data.envs.spaces import ObservationBuffer, observation_space
-from internav_data.records.errors import UsageError
+from internav_data.envs.slot import (
+    Arguments,
+    EnvSlot,
+    EpisodeSnapshot,
+    check_options,
+    check_render_mode,
+    step_info,
+)
+from internav_data.envs.spaces import RENDER_SIZE, ObservationBuffer, observation_space
 from internav_data.render.camera import Camera
 from internav_data.world import ACTION_COUNT, Action
+from internav_data.world.masks import action_mask
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,15 +28,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from internav_data.core.typing import Bools
     from internav_data.dataset import Dataset
     from internav_data.envs.sensors import Sensor
     from internav_data.records import Episode
 
-RENDER_SIZE = 300
-"""Size of the pictures that `render` returns, pixels a side: the paper's."""
 
-
-class InterNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
+class InterNavEnv(Rebuilt, gymnasium.Env[dict[str, Any], np.int64]):
     """Interactive navigation: an agent walks to a goal, and pushes or carries obstacles aside.
 
     `docs/environment.md` describes actions, observations, rewards, start, end and arguments.
@@ -65,9 +71,13 @@ class InterNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
         sensors: Sequence[str | Sensor] = DEFAULT_SENSORS,
         **arguments: Unpack[Arguments],
     ) -> None:
-        if render_mode not in {None, "rgb_array"}:
-            raise UsageError(f"render_mode: expected None or 'rgb_array', got {render_mode!r}")
+        check_render_mode(render_mode)
         self.render_mode = render_mode
+        dataset = lasting(dataset)
+        self._arguments = dict(
+            arguments, dataset=dataset, image_size=image_size, render_mode=render_mode,
+            sensors=sensors,
+        )  # fmt: skip
         self.observation_space = observation_space(image_size, sensors)
         self.action_space = gymnasium.spaces.Discrete(ACTION_COUNT)
         (self._slot,) = EnvSlot.make(1, dataset, arguments)
@@ -110,14 +120,11 @@ class InterNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
             The episode has ended, or there is no such action.
         """
         run = self._slot.run
-        step = run.step(int(action))
-        return (
-            self._observation(),
-            step.reward,
-            step.terminated,
-            step.truncated,
-            step_info(run, step),
-        )
+        # `item` makes numbers of arrays of one; what is no number is refused by the run.
+        step = run.step(action.item() if isinstance(action, np.generic | np.ndarray) else action)
+        # Metrics at every step: a wrapper as TimeLimit may make any step the last one.
+        info = {**step_info(run, step), "metrics": run.task.metrics()}
+        return self._observation(), step.reward, step.terminated, step.truncated, info
 
     def wait(self) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Let a step pass, for options that hand control back."""
@@ -140,6 +147,19 @@ class InterNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
             self._large = Camera(RENDER_SIZE)
         picture: NDArray[np.uint8] = self._large.render([self._slot.run.view()]).rgb[0]
         return picture
+
+    def action_masks(self) -> Bools:
+        """Return which actions could succeed now, (12,) bool; see `internav_data.world.masks`."""
+        return action_mask(self._slot.run.world)
+
+    def snapshots(self) -> list[EpisodeSnapshot | None]:
+        """Return the snapshot of the episode under way, if any, as a list of one."""
+        return [self._slot.state() if self._slot.has_episode else None]
+
+    def restore_snapshots(self, snapshots: Sequence[EpisodeSnapshot | None]) -> None:
+        """Restore what `snapshots` returned."""
+        if snapshots[0] is not None:
+            self._slot.restore(snapshots[0])
 
     def _observation(self) -> dict[str, Any]:
         self._buffer.write(0, self._slot.run)

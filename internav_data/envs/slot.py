@@ -36,7 +36,11 @@ class Arguments(TypedDict, total=False):
     house_cache_size: int
 
 
-_RENAMED: Final = {"houses_kept": "house_cache_size", "ids": "sensors, 'ids' among them"}
+_RENAMED: Final = {
+    "houses_kept": "house_cache_size",
+    "ids": "sensors, 'ids' among them",
+    "autoreset": "autoreset_mode, 'Disabled' for False",
+}
 """Arguments of earlier versions, and their names today."""
 _MAX_ACTIONS: Final = 100_000
 """Number of actions of a snapshot that are read: more are no episode."""
@@ -147,7 +151,7 @@ class EnvSlot:
         LOADED_HOUSES.capacity = max(LOADED_HOUSES.capacity, kept)
         source = open_source(dataset, arguments.get("split"), arguments.get("filters"))
         config = TaskConfig(
-            arguments.get("max_steps", 500),
+            arguments.get("max_steps", TaskConfig().max_steps),
             arguments.get("failed_done_reward", 0.0),
             arguments.get("push_model", source.push_model),
         )
@@ -162,6 +166,11 @@ class EnvSlot:
     def ordered(self) -> bool:
         """Whether the slot has an order of episodes."""
         return self._order is not None
+
+    @property
+    def has_episode(self) -> bool:
+        """Whether an episode is under way or over."""
+        return self._current is not None
 
     @property
     def run(self) -> EpisodeRun:
@@ -272,6 +281,18 @@ def step_info(run: EpisodeRun, step: TaskStep) -> dict[str, Any]:
     if step.terminated or step.truncated:
         info["metrics"] = run.task.metrics()
     return info
+
+
+def check_render_mode(render_mode: str | None) -> None:
+    """Refuse what `render` cannot do.
+
+    Raises
+    ------
+    UsageError
+        It is neither None nor "rgb_array".
+    """
+    if render_mode not in {None, "rgb_array"}:
+        raise UsageError(f"render_mode: expected None or 'rgb_array', got {render_mode!r}")
 
 
 def check_options(options: Mapping[str, Any] | None, known: tuple[str, ...]) -> dict[str, Any]:

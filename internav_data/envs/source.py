@@ -196,6 +196,8 @@ def open_source(
 ) -> Source:
     """Open a dataset, or return the one that this process has open already.
 
+    A split and filters choose among the episodes of a loaded dataset, too.
+
     Raises
     ------
     CorruptDataError
@@ -204,7 +206,12 @@ def open_source(
         An unknown split, column or operator, or nothing selected.
     """
     if not isinstance(dataset, str | Path):
-        return Source(dataset)
+        if dataset.columns is not None:
+            raise UsageError(
+                f"{dataset!r}: loaded with columns={list(dataset.columns)}: environments need "
+                "episodes: load it without columns"
+            )
+        return Source(dataset.select(split, filters))
     path = Path(dataset)
     if not (path / MANIFEST).exists():
         load_dataset(path)  # raises with what is wrong there

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from gymnasium import spaces
@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from internav_data.envs.episode import EpisodeRun
     from internav_data.envs.sensors import Sensor
     from internav_data.render.camera import Camera
+
+
+RENDER_SIZE: Final = 300
+"""Size of the pictures that `render` returns, pixels a side: the paper's."""
 
 
 def observation_space(size: int, sensors: Sequence[str | Sensor]) -> spaces.Dict:
@@ -105,6 +109,6 @@ class ObservationBuffer:
         """Return copies of all buffers: arrays (n, …) by sensor."""
         return {name: buffer.copy() for name, buffer in self.buffers.items()}
 
-    def one(self) -> dict[str, Any]:
-        """Return a copy of the first row, as one environment's observation."""
-        return {name: buffer[0].copy() for name, buffer in self.buffers.items()}
+    def one(self, row: int = 0) -> dict[str, Any]:
+        """Return a copy of a row, as one environment's observation."""
+        return {name: buffer[row].copy() for name, buffer in self.buffers.items()}

@@ -8,12 +8,22 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from internav_data.envs.copies import Rebuilt, lasting
+from internav_data.envs.episode import check_actions
 from internav_data.envs.sensors import DEFAULT_SENSORS
-from internav_data.envs.slot import Arguments, EnvSlot, EpisodeSnapshot, check_options, step_info
-from internav_data.envs.spaces import ObservationBuffer, observation_space
+from internav_data.envs.slot import (
+    Arguments,
+    EnvSlot,
+    EpisodeSnapshot,
+    check_options,
+    check_render_mode,
+    step_info,
+)
+from internav_data.envs.spaces import RENDER_SIZE, ObservationBuffer, observation_space
 from internav_data.records.errors import UsageError
 from internav_data.render.camera import Camera
 from internav_data.world import ACTION_COUNT
+from internav_data.world.masks import action_mask
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,6 +37,8 @@ if TYPE_CHECKING:
     from internav_data.envs.types import Observations, Stepped
     from internav_data.records import Episode
 
+_RARE = ("episode_id", "metrics", "final_obs", "final_info")
+"""Keys of infos that few steps have."""
 OPTIONS = ("episode_id", "actions", "start", "reset_mask")
 
 
@@ -36,18 +48,53 @@ def declare_spaces(
     size: int,
     sensors: Sequence[str | Sensor],
     *,
-    autoreset: bool,
-) -> None:
-    """Set the spaces and the autoreset mode of a vector environment."""
+    autoreset_mode: AutoresetMode | str,
+    render_mode: str | None,
+) -> AutoresetMode:
+    """Set spaces and metadata of a vector environment; return its autoreset mode.
+
+    Raises
+    ------
+    UsageError
+        There is no such mode.
+    """
     from gymnasium import spaces  # noqa: PLC0415 - a short name in a short place
 
+    modes = {each.value: each for each in AutoresetMode}
+    mode = modes.get(autoreset_mode) if isinstance(autoreset_mode, str) else autoreset_mode
+    if not isinstance(mode, AutoresetMode):
+        raise UsageError(f"autoreset_mode: expected one of {list(modes)}, got {autoreset_mode!r}")
+    check_render_mode(render_mode)
+    env.render_mode = render_mode
     env.num_envs = count
     env.single_observation_space = observation_space(size, sensors)
     env.single_action_space = spaces.Discrete(ACTION_COUNT)
     env.observation_space = batch_space(env.single_observation_space, count)
     env.action_space = batch_space(env.single_action_space, count)
-    mode = AutoresetMode.NEXT_STEP if autoreset else AutoresetMode.DISABLED
-    env.metadata = {"autoreset_mode": mode, "render_modes": []}
+    env.metadata = {"autoreset_mode": mode, "render_modes": ["rgb_array"], "render_fps": 4}
+    return mode
+
+
+def checked_batch(
+    actions: NDArray[np.int64] | Sequence[int], done: Bools, mode: AutoresetMode
+) -> list[int]:
+    """Return the actions of a batch, all of which can be taken: (N,).
+
+    Raises
+    ------
+    UsageError
+        The shape is not (N,), an action is unknown, or an environment is done and waits for a
+        reset.
+    """
+    if np.shape(actions) != done.shape:
+        raise UsageError(f"step: expected {len(done)} actions, got shape {np.shape(actions)}")
+    asked = check_actions(np.asarray(actions).tolist())
+    if done.any() and mode == AutoresetMode.DISABLED:
+        raise UsageError(
+            f"step: environment {int(np.argmax(done))} is done; reset it by "
+            "options={'reset_mask': …}"
+        )
+    return asked
 
 
 def split_seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
@@ -67,20 +114,23 @@ def split_seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int
     return list(seed)
 
 
-class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
+class InterNavVectorEnv(Rebuilt, VectorEnv[Any, Any, Any]):
     """N environments stepped in one process.
 
-    Environment k is `InterNavEnv` reset with seed + k, to the last bit. After an episode's last
-    step the next `step` begins another episode; it ignores that action and pays 0.
+    Environment k is `InterNavEnv` reset with seed + k, to the last bit, except that infos have
+    metrics at an episode's end alone.
 
     Parameters
     ----------
     num_envs
         Number of environments, N.
-    dataset, image_size, sensors, **arguments
+    dataset, image_size, render_mode, sensors, **arguments
         Arguments of `InterNavEnv`; `task` may name a task for each environment.
-    autoreset
-        False: an environment that is done must be reset by `options={"reset_mask": …}`.
+    autoreset_mode : gymnasium.vector.AutoresetMode, or its value
+        "NextStep": after an episode's last step the next `step` begins another; it ignores that
+        action and pays 0. "SameStep": the last step itself begins another, and infos have its own
+        observation and info as `final_obs` and `final_info`. "Disabled": an environment that is
+        done must be reset by `options={"reset_mask": …}`.
     copy
         False: return the buffers that the next step overwrites, not copies.
     buffers : dict of arrays
@@ -100,21 +150,32 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         dataset: str | Path | Dataset[Episode],
         image_size: int = 64,
         *,
-        autoreset: bool = True,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        render_mode: str | None = None,
         copy: bool = True,
         sensors: Sequence[str | Sensor] = DEFAULT_SENSORS,
         buffers: Observations | None = None,
         **arguments: Unpack[Arguments],
     ) -> None:
+        dataset = lasting(dataset)
+        self._arguments = dict(
+            arguments, num_envs=num_envs, dataset=dataset, image_size=image_size,
+            autoreset_mode=autoreset_mode, render_mode=render_mode, copy=copy, sensors=sensors,
+        )  # fmt: skip
         self.slots = EnvSlot.make(num_envs, dataset, arguments)
-        declare_spaces(self, num_envs, image_size, sensors, autoreset=autoreset)
+        self._mode = declare_spaces(
+            self, num_envs, image_size, sensors, autoreset_mode=autoreset_mode,
+            render_mode=render_mode,
+        )  # fmt: skip
         camera = Camera(image_size)
         if buffers is None:
             self._buffer = ObservationBuffer.of(camera, num_envs, sensors)
         else:
             self._buffer = ObservationBuffer(camera, sensors, buffers)
-        self._autoreset, self._copy = autoreset, copy
-        self._done = np.zeros(num_envs, np.bool_)
+        self._copy = copy
+        self._large: Camera | None = None
+        self.done = np.zeros(num_envs, np.bool_)
+        """Environments whose episode is over, (N,) bool."""
 
     def reset(
         self,
@@ -164,28 +225,52 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         Raises
         ------
         UsageError
-            The shape is not (N,), an action is unknown, or an environment is done and `autoreset`
-            is False.
+            The shape is not (N,), an action is unknown, or an environment is done and nothing
+            resets it; then no environment has taken a step.
         """
-        asked = np.asarray(actions).tolist()
+        asked = checked_batch(actions, self.done, self._mode)
         count = self.num_envs
-        if np.shape(actions) != (count,):
-            raise UsageError(f"step: expected {count} actions, got shape {np.shape(actions)}")
         rewards = np.zeros(count)
         terminated, truncated = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
         stepped: list[tuple[int, dict[str, Any]]] = []
         for k, action in enumerate(asked):
-            if self._done[k]:  # next-step autoreset: this action is ignored
-                stepped.append((k, self._autoreset_slot(k)))
+            if self.done[k]:  # next-step autoreset: this action is ignored
+                stepped.append((k, self._begin(k)))
                 continue
             run = self.slots[k].run
-            step = run.step(int(action))
+            step = run.step(action)
             rewards[k], terminated[k], truncated[k] = step
             self._buffer.write(k, run)
-            stepped.append((k, step_info(run, step)))
-        self._done = terminated | truncated
+            info = step_info(run, step)
+            self.done[k] = run.done
+            if run.done and self._mode == AutoresetMode.SAME_STEP:
+                last = {"final_obs": self._buffer.one(k), "final_info": info}
+                info = {**last, **self._begin(k)}
+            stepped.append((k, info))
         infos = self._joined(stepped)
         return self._observations(), rewards, terminated, truncated, infos
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Return each agent's view, N of (300, 300, 3) uint8; None without a render mode."""
+        if self.render_mode is None:
+            return None
+        if self._large is None:
+            self._large = Camera(RENDER_SIZE)
+        return tuple(self._large.render([slot.run.view()]).rgb[0] for slot in self.slots)
+
+    def action_masks(self) -> Bools:
+        """Return which actions could succeed now, (N, 12) bool: `internav_data.world.masks`."""
+        return np.stack([action_mask(slot.run.world) for slot in self.slots])
+
+    def snapshots(self) -> list[EpisodeSnapshot | None]:
+        """Return a snapshot of each environment, None where no episode has begun."""
+        return [slot.state() if slot.has_episode else None for slot in self.slots]
+
+    def restore_snapshots(self, snapshots: Sequence[EpisodeSnapshot | None]) -> None:
+        """Restore what `snapshots` returned."""
+        for k, state in enumerate(snapshots):
+            if state is not None:
+                self._restore_slot(k, state)
 
     def state(self) -> tuple[EpisodeSnapshot, ...]:
         """Return a snapshot of each environment."""
@@ -202,19 +287,15 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         if len(states) != self.num_envs:
             raise UsageError(f"restore: expected {self.num_envs} states, got {len(states)}")
         infos: dict[str, Any] = {}
-        for k, (slot, state) in enumerate(zip(self.slots, states, strict=True)):
-            run = slot.restore(state)
-            self._done[k] = run.done
-            self._buffer.write(k, run)
+        for k, state in enumerate(states):
+            self._restore_slot(k, state)
             infos = self._add_info(infos, {"episode_id": state.episode_id}, k)
         return self._observations(), infos
 
-    def _autoreset_slot(self, k: int) -> dict[str, Any]:
-        if not self._autoreset:
-            raise UsageError(
-                f"step: environment {k} is done; reset it by options={{'reset_mask': …}}"
-            )
-        return self._begin(k)
+    def _restore_slot(self, k: int, state: EpisodeSnapshot) -> None:
+        run = self.slots[k].restore(state)
+        self.done[k] = run.done
+        self._buffer.write(k, run)
 
     def _begin(
         self,
@@ -224,7 +305,7 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
         start: Sequence[int] | None = None,
     ) -> dict[str, Any]:
         run = self.slots[k].begin(episode_id, actions, start)
-        self._done[k] = run.done
+        self.done[k] = run.done
         self._buffer.write(k, run)
         return {"episode_id": run.episode.episode_id}
 
@@ -245,9 +326,7 @@ class InterNavVectorEnv(VectorEnv[Any, Any, Any]):
                 column = np.array([info.get(name, empty) for _, info in parts], dtype=kind)
                 infos[name], infos[f"_{name}"] = column, mask.copy()
         for k, info in parts:
-            rest: dict[str, Any] = {
-                key: info[key] for key in ("episode_id", "metrics") if key in info
-            }
+            rest: dict[str, Any] = {key: info[key] for key in _RARE if key in info}
             if rest:
                 infos = self._add_info(infos, rest, k)
         return infos

@@ -143,7 +143,7 @@ def evaluate(
     count = min(settings.batch, len(numbers))
     env = make_vector(
         count, dataset, min(settings.workers, count), image_size=policy.image_size,
-        sensors=policy.sensors, autoreset=False, copy=False, max_steps=settings.max_steps,
+        sensors=policy.sensors, autoreset_mode="Disabled", copy=False, max_steps=settings.max_steps,
     )  # fmt: skip
     try:
         policy.begin(count, settings.seed)

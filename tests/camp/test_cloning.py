@@ -232,7 +232,7 @@ def test_the_datasets_experts_reach_their_goals_hand_backs_and_all(houses, confi
     from internav_data.dataset import load_dataset
     from internav_data.envs.vector import InterNavVectorEnv
 
-    env = InterNavVectorEnv(2, houses, image_size=16, autoreset=False)
+    env = InterNavVectorEnv(2, houses, image_size=16, autoreset_mode="Disabled")
     ends, waits = [], []
 
     class Watched:

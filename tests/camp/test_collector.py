@@ -137,7 +137,7 @@ def test_a_real_environment_is_lived_in(houses, config):
             4,
             houses,
             image_size=16,
-            autoreset=False,
+            autoreset_mode="Disabled",
             copy=copied,
             max_steps=15,
             sensors=tuple(SENSORS),

@@ -132,6 +132,12 @@ def test_an_error_of_filters_states_the_expected_form(ds, filters):
         load_dataset(ds.path, filters=filters)
 
 
+def test_an_empty_choice_of_columns_gives_none(ds):
+    assert ds.to_table([]).column_names == []
+    assert list(ds.to_pandas([]).columns) == []
+    assert ds.to_torch(["obstacles"]) == {}
+
+
 def test_unknown_split_and_column(ds):
     with pytest.raises(UsageError, match="training"):
         load_dataset(ds.path, split="training")

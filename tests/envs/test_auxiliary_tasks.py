@@ -24,7 +24,14 @@ def tasks(scenes):
     def make(names=NAMES, seed=0, **arguments):
         data = load_dataset(scenes, "train")
         env = InterNavVectorEnv(
-            len(names), data, 16, autoreset=False, copy=False, max_steps=40, task=names, **arguments
+            len(names),
+            data,
+            16,
+            autoreset_mode="Disabled",
+            copy=False,
+            max_steps=40,
+            task=names,
+            **arguments,
         )
         env.reset(seed=seed)
         made.append(env)
@@ -154,7 +161,7 @@ def test_a_damaged_snapshot_is_refused(tasks, damage):
 def test_processes_have_the_same_tasks(scenes, tasks):
     whole = tasks(seed=2)
     two = InterNavProcesses(
-        6, load_dataset(scenes, "train"), 2, 16, autoreset=False, max_steps=40, task=NAMES
+        6, load_dataset(scenes, "train"), 2, 16, autoreset_mode="Disabled", max_steps=40, task=NAMES
     )
     try:
         seen, _ = two.reset(seed=2)

@@ -54,6 +54,17 @@ def same(one, other):
         assert np.asarray(one).dtype == np.asarray(other).dtype
 
 
+def same_ends(one, other):
+    """Compare infos of two vectors, metrics where an episode ended."""
+    one, other = dict(one), dict(other)
+    mine, mask = other.pop("metrics"), other.pop("_metrics")
+    theirs = one.pop("metrics")
+    assert one.pop("_metrics")[mask].all()
+    same(one, other)
+    for name in mine:
+        same(np.asarray(theirs[name])[mask], np.asarray(mine[name])[mask])
+
+
 def trajectory(env, seed, count=120):
     out = [env.reset(seed=seed)]
     for action in actions(seed, count).tolist():
@@ -298,8 +309,11 @@ def test_many_are_the_same_as_each_alone(small):
     # Episodes end by Done or are cut off, the latter however the actions are drawn.
     ended = 0
     for one, other in zip(steps_of(alone, 8, 150), steps_of(together, 8, 150), strict=True):
+        # One environment has metrics at every step, as any may be the last under a wrapper.
+        if len(one) > 2 and not (one[2] | one[3]).any():
+            del one[4]["metrics"], one[4]["_metrics"]
         for a, b in zip(one, other, strict=True):
-            same(a, b)
+            same(a, b) if not isinstance(a, dict) or "metrics" not in a else same_ends(a, b)
         ended += "metrics" in other[-1]
     assert ended >= 3, "episodes ended and began again"
 
@@ -350,7 +364,7 @@ def test_gymnasiums_own_processes(small):
 
 
 def test_a_vector_without_autoreset_waits(small):
-    env = many(small, 2, autoreset=False)
+    env = many(small, 2, autoreset_mode="Disabled")
     env.reset(seed=0)
     *_, terminated, _, infos = env.step([Action.DONE, Action.WAIT])
     assert terminated.tolist() == [True, False]
@@ -415,3 +429,105 @@ def test_memory_stays_flat(small):
         if k % 1000 == 999:
             sizes.append(psutil.Process().memory_info().rss / 2**20)
     assert sizes[-1] - sizes[2] < 10.0, sizes
+
+
+@pytest.mark.parametrize("wrapped", [False, True])
+def test_a_time_limit_keeps_the_metrics_in_the_last_info(small, wrapped):
+    limit = {} if wrapped else {"max_episode_steps": 5}
+    env = make(small, **limit)
+    if wrapped:
+        env = gymnasium.wrappers.TimeLimit(env, 5)
+    env.reset(seed=0)
+    *_, truncated, info = [env.step(1) for _ in range(5)][-1]
+    assert truncated
+    assert info["metrics"]["steps"] == 5
+    assert info["metrics"]["success"] is False
+
+
+@pytest.fixture(scope="module")
+def same_step_vectors(small):
+    """Three environments in this process, and in two others."""
+    arguments = {"autoreset_mode": "SameStep", "max_episode_steps": 7, "render_mode": "rgb_array"}
+    envs = [many(small, 3, max_steps=9, workers=n, **arguments) for n in (0, 2)]
+    yield envs
+    for env in envs:
+        env.close()
+
+
+def test_same_step_autoreset_is_gymnasiums_own(small, same_step_vectors):
+    same_step = gymnasium.vector.AutoresetMode.SAME_STEP
+    theirs = many(small, 3, "sync", vector_kwargs={"autoreset_mode": same_step}, max_steps=7)
+    ours = same_step_vectors
+    assert {env.metadata["autoreset_mode"] for env in ours} == {same_step}
+    first = [env.reset(seed=6)[0] for env in (theirs, *ours)]
+    same(first[0], first[1])
+    same(first[0], first[2])
+    ends = 0
+    for row in actions(3, 20, 3):
+        one, *others = [env.step(row) for env in (theirs, *ours)]
+        ended = np.flatnonzero(one[2] | one[3])
+        ends += len(ended)
+        for other in others:
+            for a, b in zip(one[:4], other[:4], strict=True):
+                same(a, b)
+            for k in ended:
+                same(one[4]["episode_id"][k], other[4]["episode_id"][k])
+                same(one[4]["final_obs"][k], other[4]["final_obs"][k])
+                for name, values in one[4]["final_info"]["metrics"].items():
+                    assert values[k] == other[4]["final_info"]["metrics"][name][k]
+                assert other[4]["final_info"]["metrics"]["steps"][k] <= 7, "max_episode_steps"
+    assert ends > 3
+    with pytest.raises(UsageError, match="autoreset_mode"):
+        many(small, 2, autoreset_mode="never")
+    with pytest.raises(UsageError, match="autoreset is now called autoreset_mode"):
+        many(small, 2, autoreset=False)
+
+
+def test_no_action_of_a_batch_is_taken_unless_all_can_be(small, same_step_vectors):
+    for env in same_step_vectors:
+        env.reset(seed=0)
+        before = env.state()
+        for batch in ([0, 0, 12], [0, -2, 0], [0, 0, 1.5], [0], [0, 0, np.nan]):
+            with pytest.raises(UsageError, match="step: expected"):
+                env.step(batch)
+        assert env.state() == before
+    env = make(small)
+    env.reset(seed=0)
+    for action in (12, 1.7, "0", None):
+        with pytest.raises(UsageError, match="step: expected"):
+            env.unwrapped.step(action)
+    waiting = many(small, 2, autoreset_mode="Disabled")
+    waiting.reset(seed=0)
+    waiting.step([1, Action.DONE])
+    before = waiting.state()
+    with pytest.raises(UsageError, match="environment 1 is done"):
+        waiting.step([0, 1])
+    assert waiting.state() == before
+
+
+def test_a_vector_renders_and_masks_as_each_alone(small, same_step_vectors):
+    alone = [make(small, render_mode="rgb_array") for _ in range(3)]
+    for k, env in enumerate(alone):
+        env.reset(seed=3 + k)
+    for env in same_step_vectors:
+        env.reset(seed=3)
+        pictures, masks = env.render(), env.action_masks()
+        assert masks.shape == (3, ACTION_COUNT)
+        for k, one in enumerate(alone):
+            same(pictures[k], one.render())
+            same(masks[k], one.unwrapped.action_masks())
+    assert many(small, 1).render() is None
+    with pytest.raises(UsageError, match="render_mode"):
+        many(small, 1, render_mode="human")
+
+
+def test_a_vector_passes_gymnasiums_checks_of_its_parts(small):
+    env = many(small, 2, render_mode="rgb_array")
+    seen, _ = env.reset(seed=0)
+    assert env.observation_space.contains(seen)
+    assert env.action_space.contains(env.action_space.sample())
+    wrapped = gymnasium.wrappers.vector.RecordEpisodeStatistics(env)
+    wrapped.reset(seed=0)
+    for row in actions(1, 30, 2):
+        seen, *_ = wrapped.step(row)
+    assert env.observation_space.contains(seen)
