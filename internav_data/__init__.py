@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from internav_data.core.compile_cache import ensure_compile_cache
 from internav_data.core.lazy import lazy_imports
 
 if TYPE_CHECKING:
@@ -34,6 +35,9 @@ __all__ = [
     "load_agent",
     "load_dataset",
 ]
+
+# Before anything imports numba.
+ensure_compile_cache()
 
 __getattr__, __dir__ = lazy_imports(
     __name__,

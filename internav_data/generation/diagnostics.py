@@ -9,10 +9,11 @@ import shutil
 import sys
 import time
 from dataclasses import dataclass
-from importlib import metadata, util
+from importlib import metadata
 from pathlib import Path
 from typing import Literal
 
+from internav_data.core import compile_cache
 from internav_data.core.extras import DISTRIBUTIONS, EXTRAS, install_command
 
 CheckState = Literal["good", "warning", "bad"]
@@ -140,20 +141,16 @@ def _disk(out: Path) -> Check:
 
 def _numba_cache() -> Check:
     name = "numba cache"
-    chosen = os.environ.get("NUMBA_CACHE_DIR")
-    spec = util.find_spec("internav_data")
-    places = list(spec.submodule_search_locations or ()) if spec else []
-    folder = Path(chosen) if chosen else Path(places[0]) / "geometry"
-    while not folder.exists():
-        folder = folder.parent
-    if os.access(folder, os.W_OK):
-        return Check(name, "good", "writable", "")
-    return Check(
-        name,
-        "warning",
-        f"{folder} cannot be written: kernels may be compiled again in every run",
-        "set NUMBA_CACHE_DIR to a folder of yours, then run `internav-gen warmup`",
-    )
+    chosen = os.environ.get(compile_cache.VARIABLE, "")
+    remedy = "set NUMBA_CACHE_DIR to a folder of yours, then run `internav-gen warmup`"
+    if not any(compile_cache.is_writable(each) for each in compile_cache.own_choices()):
+        return Check(name, "bad", "no folder can be written: kernels cannot be compiled", remedy)
+    if chosen and not compile_cache.is_writable(Path(chosen)):
+        return Check(name, "warning", f"NUMBA_CACHE_DIR: {chosen} cannot be written", remedy)
+    if Path(chosen).name.startswith(compile_cache.TEMPORARY_PREFIX):
+        found = f"neither the package nor a home can be written: kernels are kept in {chosen}"
+        return Check(name, "warning", found, remedy)
+    return Check(name, "good", "writable", "")
 
 
 def _result_cache() -> list[Check]:
