@@ -37,7 +37,8 @@ Examples:
   internav-gen generate --print-config > mine.toml            all settings, to be changed
 
 Run again on an unfinished folder it continues; a kill loses nothing but the scenes
-under way. Any number of workers gives the same bytes.""",
+under way. The first scenes can be read while others are being made. Any number of
+workers gives the same bytes.""",
 )
 @click.option(
     "--out",
@@ -72,6 +73,11 @@ under way. Any number of workers gives the same bytes.""",
     type=click.Choice(["force", "kick"]),
     help="200 N up to 2 m/s, or 2 m/s at once for every mass.  [default: force]",
 )
+@click.option(
+    "--retry-quarantined",
+    is_flag=True,
+    help="Try all quarantined scenes again; without it, those whose workers died.",
+)
 @click.option("--dry-run", is_flag=True, help="Tell time and size; write nothing.")
 @click.option("--print-config", is_flag=True, help="Print all settings as TOML and stop.")
 @click.option("--scene", type=int, help="Make this scene only and print it as JSON.")
@@ -87,6 +93,7 @@ def command(
     unseen_assets: bool | None,
     keep_unsolvable: bool | None,
     push_model: str | None,
+    retry_quarantined: bool,
     dry_run: bool,
     print_config: bool,
     scene: int | None,
@@ -127,7 +134,15 @@ def command(
     from internav_data.generation import generate
 
     folder = dataset_folder(out)
-    report = generate(folder, config, scenes, workers or 0, progress(), executor=executor)
+    report = generate(
+        folder,
+        config,
+        scenes,
+        workers or 0,
+        progress(),
+        executor=executor,
+        retry_quarantined=retry_quarantined,
+    )
     return _print_report(report, as_json=as_json)
 
 
@@ -140,6 +155,12 @@ def _print_report(report: Report, *, as_json: bool) -> int:
     if len(report.quarantined) > MAX_NAMED_SCENES:
         rest = len(report.quarantined) - MAX_NAMED_SCENES
         click.echo(f"and {rest} more quarantined: manifest.json names them", err=True)
+    if report.died:
+        click.echo(
+            f"the workers of {report.died} quarantined scenes died, perhaps for lack of memory: "
+            "the same command tries these scenes again (with fewer --workers each has more)",
+            err=True,
+        )
     if as_json:
         click.echo(json.dumps(report.plain()))
     return report.exit_code

@@ -54,12 +54,14 @@ class Done:
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """Result of a task that would fail in the same way if it were done again."""
+    """Result of a task that was given up."""
 
     task: Any
     reason: str
     attempts: int
     """Number of tries."""
+    died: bool = False
+    """Whether the processes that did it died; otherwise it would fail in the same way again."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,6 +26,8 @@ MAX_CRASHES = 3
 """Crashes of its workers after which a task is given up."""
 MAX_FALSE_STARTS = 3
 """Workers that die in a row before they are ready, after which none can start."""
+FINISH_S = 1.0
+"""Seconds that workers have to finish their tasks after an interruption, which a user waits for."""
 TICK_S = 0.25
 """Longest time between two calls of `tick`, seconds."""
 
@@ -84,9 +86,11 @@ class WorkerPool:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """End all workers: kindly when all is well, at once after an error."""
+        """End all workers: kindly when all is well and they wait for a task, else at once."""
         for worker in self._workers:
             worker.pipe.close()  # an idle worker sees this and ends
+            if worker.busy or not worker.ready:
+                worker.process.kill()
         deadline = time.monotonic() + (GRACE_S if kind is None else 0.0)
         for worker in self._workers:
             worker.end(deadline - time.monotonic())
@@ -104,7 +108,7 @@ class WorkerPool:
         """Yield the result of each task, in the order in which they end.
 
         `tick` is called a few times a second. Once it returns False no further task begins, those
-        under way have `GRACE_S` to end, and the iterator ends early.
+        under way have `FINISH_S` to end, and the iterator ends early.
 
         Raises
         ------
@@ -165,11 +169,11 @@ class WorkerPool:
                 todo.appendleft(worker.task)
             else:
                 reason = f"{message.cause}, {MAX_CRASHES} times"
-                yield Failed(worker.task, reason, MAX_CRASHES)
+                yield Failed(worker.task, reason, MAX_CRASHES, died=True)
 
     def _drain(self) -> Iterator[Done | Failed]:
         """Wait for the tasks under way, so that they need not be done again."""
-        deadline = time.monotonic() + GRACE_S
+        deadline = time.monotonic() + FINISH_S
         while any(worker.busy for worker in self._workers) and time.monotonic() < deadline:
             busy = {worker.pipe: worker for worker in self._workers if worker.busy}
             for pipe in wait(list(busy), timeout=TICK_S):

@@ -1,6 +1,7 @@
 """Datasets on disk: schemas, shards, manifest, loader, statistics and dataset card."""
 
 from internav_data.dataset.commit import (
+    Retry,
     assemble,
     commit_scenes,
     done_scenes,
@@ -67,6 +68,7 @@ __all__ = [
     "Identity",
     "Manifest",
     "Quarantined",
+    "Retry",
     "SceneState",
     "Staging",
     "TableSpec",

@@ -21,7 +21,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from internav_data.core.storage import StoreLike, exists, final_of, store_of
 from internav_data.dataset.journal import Journal
@@ -55,6 +55,10 @@ if TYPE_CHECKING:
 
     from internav_data.dataset.staging import SceneState
     from internav_data.records import Asset
+
+
+Retry = Literal["none", "died", "all"]
+"""Quarantined scenes that are tried again: none, those whose processes died, or all."""
 
 
 def identity_of(manifest: Manifest) -> Identity:
@@ -139,12 +143,22 @@ def _first_difference(old: Any, new: Any, path: str) -> str:  # noqa: ANN401 - J
     return "" if old == new else f"{path}: there {old!r}, asked for {new!r}"
 
 
-def done_scenes(staging: Staging) -> frozenset[int]:
-    """Return the numbers of all scenes that need not be built again, quarantined ones included."""
-    done = set(staged_scenes(staging))
+def done_scenes(staging: Staging, retry: Retry = "none") -> frozenset[int]:
+    """Return the numbers of all scenes that need not be built again.
+
+    Quarantined ones are among them, but for those that are to be tried again.
+    """
+    states = staged_scenes(staging)
+    done = {k for k, s in states.items() if not s.quarantined or not _again(s.died, retry)}
     if has_manifest(staging.store):
-        done.update(range(read_manifest(staging.store).scenes))
+        manifest = read_manifest(staging.store)
+        again = {entry.scene for entry in manifest.quarantined if _again(entry.died, retry)}
+        done.update(k for k in range(manifest.scenes) if k not in again)
     return frozenset(done)
+
+
+def _again(died: bool, retry: Retry) -> bool:
+    return retry == "all" or (retry == "died" and died)
 
 
 def assemble(out: StoreLike, identity: Identity, assets: Sequence[Asset], scenes: int) -> Manifest:
@@ -166,7 +180,17 @@ def commit_scenes(
 ) -> Manifest:
     """Make the dataset of scenes 0 … scenes - 1 from staged scenes and what is there already.
 
-    Later scenes stay staged, and others may be staged meanwhile.
+    Later scenes stay staged, and others may be staged meanwhile. The files of a dataset do not
+    depend on how many smaller ones were made on the way.
+
+    Parameters
+    ----------
+    staging, identity
+        Staged scenes and their identity.
+    assets
+        All assets of the catalogue.
+    scenes
+        Number of scenes; all of them when the dataset holds more already.
 
     Raises
     ------
@@ -180,7 +204,8 @@ def commit_scenes(
     journal.sweep(old)
     first = old.scenes if old else 0
     scenes = max(scenes, first)
-    states = staged_scenes(staging, range(first, scenes))
+    given_up = [entry.scene for entry in old.quarantined] if old else []
+    states = staged_scenes(staging, [*given_up, *range(first, scenes)])
     missing = [k for k in range(first, scenes) if k not in states]
     if missing:
         raise CorruptDataError(
@@ -222,12 +247,13 @@ def _manifest(
     files: tuple[DataFile, ...],
 ) -> Manifest:
     redraws = Counter(old.redraws if old else {})
-    quarantined = list(old.quarantined if old else ())
-    for state in states.values():
+    quarantined = {entry.scene: entry for entry in old.quarantined} if old else {}
+    for scene, state in states.items():
         redraws.update(state.redraws)
+        quarantined.pop(scene, None)
         if state.quarantined:
-            quarantined.append(
-                Quarantined(state.scene, state.scene_id, state.attempts, state.quarantined)
+            quarantined[scene] = Quarantined(
+                scene, state.scene_id, state.attempts, state.quarantined, state.died
             )
     counts: dict[str, Counts] = {
         split: Counts(
@@ -247,6 +273,6 @@ def _manifest(
         counts,
         scenes,
         dict(sorted(redraws.items())),
-        tuple(quarantined),
+        tuple(entry for _, entry in sorted(quarantined.items())),
         files,
     )

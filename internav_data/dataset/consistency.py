@@ -87,6 +87,7 @@ def _wrong_quarantine(manifest: Manifest) -> Iterator[str]:
             or entry.scene_id != f"scene-{entry.scene:06d}"
             or not _is_count(entry.attempts)
             or not isinstance(entry.reason, str)
+            or not isinstance(entry.died, bool)
         ):
             yield f"quarantined: {entry.scene_id!r}: expected its scene, attempts and reason"
         elif _is_count(manifest.scenes) and entry.scene >= manifest.scenes:

@@ -11,7 +11,7 @@ import json
 from typing import TYPE_CHECKING
 
 from internav_data.core.files import FileLimits, parse_json
-from internav_data.core.storage import exists, temporary_of
+from internav_data.core.storage import exists, final_of, temporary_of
 from internav_data.dataset.manifest import inner_path
 from internav_data.dataset.staging import STAGING
 
@@ -66,6 +66,9 @@ class Journal:
         for name in sorted(self._names - (manifest.paths() if manifest else frozenset())):
             self._store.remove(name)
         self._store.remove(JOURNAL)
+        for name in self._store.names(STAGING):
+            if final_of(name) == JOURNAL:  # its own temporary file, after a kill
+                self._store.remove(name)
         self._names.clear()
 
 

@@ -92,6 +92,9 @@ class Quarantined:
     scene_id: str
     attempts: int
     reason: str
+    died: bool = False
+    """Whether the processes that made it died: the scene may be fine, and the next run tries it
+    again."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,9 @@ manifest in place names is ever written over.
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -22,7 +23,7 @@ from internav_data.dataset.staging import SceneState, Staging, read_staged_rows
 from internav_data.dataset.tables import ASSETS, EPISODES, SCENES, TableSpec
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from internav_data.dataset.journal import Journal
     from internav_data.records import Asset, Split
@@ -31,6 +32,15 @@ SPLITS: tuple[Split, ...] = ("train", "val", "test")
 SCENES_PER_SHARD = {"episodes": 240, "scenes": 2400}
 _DIGITS = 8
 """Hexadecimal digits of a shard's sha256 in its name."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Span:
+    """Rows start … end - 1 of a file."""
+
+    file: DataFile
+    start: int
+    end: int
 
 
 class SceneSource:
@@ -44,18 +54,27 @@ class SceneSource:
         self._old_files = old.files if old else ()
         self._old_digests = {file.path: file.sha256 for file in self._old_files}
         self._held: dict[str, list[str]] = {}
-        self._home: dict[tuple[str, str], DataFile] = {}
+        self._home: dict[tuple[str, str], _Span] = {}
         self._last: tuple[str, pa.Table] | None = None
         self.scenes: dict[Split, list[str]] = {split: [] for split in SPLITS}
         for file in self._old_files:
             if file.table != "assets":
-                column = self._read(file, _spec(file.table), ["scene_id"])["scene_id"]
-                self._held[file.path] = pc.unique(column).to_pylist()
-                self._home |= {(file.table, name): file for name in self._held[file.path]}
+                self._find_scenes(file)
             if file.table == "scenes" and file.split is not None:
                 self.scenes[file.split] += self._held[file.path]
         for state in self._states.values():
             self.scenes[state.split].append(state.scene_id)
+        for scenes in self.scenes.values():
+            scenes.sort()  # by number, of six digits: a scene may be made long after its neighbours
+
+    def _find_scenes(self, file: DataFile) -> None:
+        """Note which rows of a file are a scene's: they stand together."""
+        column = self._read(file, _spec(file.table), ["scene_id"])["scene_id"]
+        runs, end = pc.value_counts(column).to_pylist(), 0
+        self._held[file.path] = [run["values"] for run in runs]
+        for run in runs:
+            start, end = end, end + run["counts"]
+            self._home[file.table, run["values"]] = _Span(file, start, end)
 
     def _read(
         self, file: DataFile, spec: TableSpec[Any], columns: Sequence[str] | None = None
@@ -80,22 +99,30 @@ class SceneSource:
         with ThreadPoolExecutor() as threads:
             new = [scene_id for scene_id in scenes if scene_id in self._states]
             read = dict(zip(new, threads.map(partial(self._new_rows, spec), new), strict=True))
-        rows = (read[k] if k in read else self._old_rows(spec, k) for k in scenes)
-        tables = [spec.schema.empty_table(), *rows]
+        tables = [spec.schema.empty_table()]
+        for is_new, run in groupby(scenes, key=read.__contains__):
+            group = list(run)
+            tables += [read[k] for k in group] if is_new else self._old_rows(spec, group)
         return pa.concat_tables(tables).combine_chunks()
 
     def _new_rows(self, spec: TableSpec[Any], scene_id: str) -> pa.Table:
         scene = self._states[scene_id].scene
         return read_staged_rows(self._staging, scene, house=spec is SCENES)
 
-    def _old_rows(self, spec: TableSpec[Any], scene_id: str) -> pa.Table:
-        file = self._home.get((spec.name, scene_id))
-        if file is None:
-            return spec.schema.empty_table()  # a scene without episodes
-        if self._last is None or self._last[0] != file.path:
-            self._last = (file.path, self._read(file, spec))
-        table = self._last[1]
-        return table.filter(pc.equal(table["scene_id"], scene_id))
+    def _old_rows(self, spec: TableSpec[Any], scenes: Sequence[str]) -> Iterator[pa.Table]:
+        """Yield the rows of older scenes, those that stand together in a file as one table."""
+        spans: list[_Span] = []
+        for scene_id in scenes:
+            home = self._home.get((spec.name, scene_id))
+            if home is None:
+                continue  # a scene without episodes
+            if spans and (spans[-1].file.path, spans[-1].end) == (home.file.path, home.start):
+                home = _Span(home.file, spans.pop().start, home.end)
+            spans.append(home)
+        for span in spans:
+            if self._last is None or self._last[0] != span.file.path:
+                self._last = (span.file.path, self._read(span.file, spec))
+            yield self._last[1].slice(span.start, span.end - span.start)
 
 
 def _spec(table: str) -> TableSpec[Any]:

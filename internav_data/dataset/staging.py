@@ -147,6 +147,8 @@ class SceneState:
     attempts: int
     quarantined: str
     """Reason for which the scene was given up; empty when it is good."""
+    died: bool = False
+    """Whether it was given up because the processes that made it died."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,15 +223,20 @@ def stage_scene(
 
 
 def stage_quarantine(
-    staging: Staging,
-    scene: int,
-    reason: str,
-    *,
-    split: Split,
-    attempts: int,
-    redraws: Mapping[str, int] | None = None,
+    staging: Staging, scene: int, reason: str, *, split: Split, attempts: int, died: bool = False
 ) -> None:
     """Store a scene that was given up; its reason becomes data and must not name the machine.
+
+    Parameters
+    ----------
+    staging
+        Staging of the run.
+    scene, split
+        Number and split of the scene.
+    reason, attempts
+        Reason of the last of so many failures.
+    died
+        Whether the processes that made it died: it may be fine, and is tried again.
 
     Raises
     ------
@@ -237,8 +244,8 @@ def stage_quarantine(
         The folder was removed or is another run's.
 
     """
-    counts = dict(sorted((redraws or {}).items()))
-    state = SceneState(scene, f"scene-{scene:06d}", split, 0, counts, attempts, reason or "unknown")
+    scene_id = f"scene-{scene:06d}"
+    state = SceneState(scene, scene_id, split, 0, {}, attempts, reason or "unknown", died)
     _write(staging, StagedScene(state, to_table([], SCENES), to_table([], EPISODES)))
 
 

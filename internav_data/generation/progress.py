@@ -20,6 +20,8 @@ class GenerationProgress(ProgressLine):
         self.scenes = self.scenes_before = self.scenes_total = 0
         self.episodes = self.episodes_left = 0
         self.quarantined = 0
+        self.readable = 0
+        """Number of first scenes that can be read already."""
 
     def begin(self, scenes: int, done: int, episodes_left: int) -> None:
         """Begin a run of `scenes` scenes, of which `done` were made before."""
@@ -51,6 +53,8 @@ class GenerationProgress(ProgressLine):
             parts.append("compiling for the first run, about a minute")
         if self.quarantined:
             parts.append(f"{self.quarantined} quarantined")
+        if self.readable:
+            parts.append(f"the first {self.readable} can be read")
         return ", ".join(parts)
 
     def tick(self) -> None:

@@ -35,6 +35,8 @@ class Report:
     """Wall time of the run."""
     quarantined: tuple[tuple[str, str], ...]
     """Scenes of the dataset that could not be made: id and reason."""
+    died: int
+    """Those of them whose workers died: the next run tries them again."""
     redraws: Mapping[str, int]
     """Number of redraws of the dataset, by reason."""
     refused_share: float
@@ -60,6 +62,7 @@ def report_of(out: Path, manifest: Manifest, progress: GenerationProgress) -> Re
         new_episodes=progress.episodes,
         seconds=progress.seconds,
         quarantined=tuple((entry.scene_id, entry.reason) for entry in manifest.quarantined),
+        died=sum(entry.died for entry in manifest.quarantined),
         redraws=dict(manifest.redraws),
         refused_share=refused_share(manifest),
     )

@@ -1,8 +1,9 @@
 """Runs: from a config to a finished dataset, through kills and resumes.
 
 Every scene is a pure function of the config and its index. Workers stage each finished scene as one
-file; scenes are put together in order of their index once all are there. So neither the executor,
-the number of workers and the order in which they end, nor any kill and resume, changes a byte.
+file; scenes are put together in order of their index, the first ones as soon as they fill a shard.
+So neither the executor, the number of workers and the order in which they end, nor any kill and
+resume, changes a byte.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from internav_data.dataset import (
     any_staged,
     assemble,
     clear_staging,
+    commit_scenes,
     done_scenes,
     end_staging,
     find_damage,
@@ -32,6 +34,7 @@ from internav_data.dataset import (
     stage_quarantine,
     staged_scenes,
 )
+from internav_data.generation.commits import PrefixCommits
 from internav_data.generation.config import GenerationConfig
 from internav_data.generation.executors import DEFAULT_EXECUTOR, Executor, get_executor
 from internav_data.generation.progress import GenerationProgress
@@ -59,7 +62,7 @@ if TYPE_CHECKING:
 
     from internav_data.catalog import Catalogue
     from internav_data.core.storage import Store
-    from internav_data.dataset import Manifest, Staging
+    from internav_data.dataset import Manifest, Retry, Staging
     from internav_data.records import Asset
 
 GENERATOR = "internav-gen"
@@ -84,8 +87,13 @@ def generate(
     assets: Catalogue | None = None,
     executor: str | Executor = DEFAULT_EXECUTOR,
     setup: Callable[[ScenePayload], Callable[[int], int]] = scene_maker,
+    *,
+    retry_quarantined: bool = False,
 ) -> Report:
     """Make a dataset of scenes 0 to scenes - 1, continue an unfinished one, or extend one.
+
+    The first scenes can be read while the others are being made. Quarantined scenes whose workers
+    died are tried again.
 
     Parameters
     ----------
@@ -105,6 +113,8 @@ def generate(
         Name in `EXECUTORS`, or an executor, which then has its own number of workers.
     setup
         Recipe of the workers; tests pass stubs.
+    retry_quarantined
+        Whether to try all quarantined scenes again, those too that failed by themselves.
 
     Raises
     ------
@@ -115,7 +125,8 @@ def generate(
     LockedError
         Another generator is at work in the folder.
     InterruptedRunError
-        A signal ended the run; finished scenes are kept, the same call continues.
+        A signal ended the run; the first scenes can be read, all finished ones are kept, and the
+        same call continues.
     QuarantineError
         Not one scene could be made.
     InternavError
@@ -137,13 +148,16 @@ def generate(
         with store.lock(BUSY):
             _forget_idle_staging(store)
             staging = open_staging(store, identity, GenerationConfig().identity(assets.digest))
-            done = _done_before(staging, scenes)
+            done = _done_before(staging, scenes, "all" if retry_quarantined else "died")
+            commits = PrefixCommits(staging, identity, _all_of(assets), done, progress)
+            scenes = max(scenes, commits.held)
             queue = _SceneQueue(config, scenes, tuple(k for k in range(scenes) if k not in done))
             recipe = Recipe(setup, ScenePayload(config, assets, staging))
             with Interrupts() as stop:
                 _repair(chosen, recipe, progress, stop)
-                _make(chosen, recipe, queue, progress, stop)
+                _make(chosen, recipe, queue, commits, progress, stop)
                 if stop():
+                    commits.commit_all()
                     raise InterruptedRunError(_interruption(out, progress), stop.signum)
             manifest = _assembled(staging, identity, assets, scenes, progress)
     return report_of(out, manifest, progress)
@@ -213,11 +227,15 @@ def identity_for(config: GenerationConfig, assets: Catalogue) -> Identity:
     )
 
 
-def _done_before(staging: Staging, scenes: int) -> frozenset[int]:
-    done, store = done_scenes(staging), staging.store
+def _all_of(assets: Catalogue) -> tuple[Asset, ...]:
+    return tuple(assets.assets.values())
+
+
+def _done_before(staging: Staging, scenes: int, retry: Retry) -> frozenset[int]:
+    done, store = done_scenes(staging, retry), staging.store
     held = read_manifest(store).scenes if has_manifest(store) else 0
     most = max(done, default=-1) + 1
-    if scenes < most and most > held:
+    if held < scenes < most:
         raise UsageError(
             f"{store.at('')}: scenes up to {most - 1} are finished there and would be lost: ask "
             f"for --scenes {most} or more, or remove {store.at(STAGING)} first"
@@ -254,6 +272,7 @@ def _make(
     executor: Executor,
     recipe: Recipe,
     queue: _SceneQueue,
+    commits: PrefixCommits,
     progress: GenerationProgress,
     stop: Interrupts,
 ) -> None:
@@ -273,12 +292,12 @@ def _make(
             episodes = result.value if isinstance(result, Done) else 0
             if isinstance(result, Failed):
                 progress.log(f"scene-{scene:06d} is quarantined: {result.reason}")
-                split, attempts = split_of_scene(scene), result.attempts
-                stage_quarantine(staging, scene, result.reason, split=split, attempts=attempts)
+                _stage_failure(staging, result)
             progress.scene(episodes, expected=queue.expected(scene))
             none_made = not before and progress.quarantined == progress.scenes
             if isinstance(result, Failed) and none_made and progress.scenes >= MAX_FIRST_FAILURES:
                 raise _hopeless(staging.store, progress.scenes, result.reason)
+            commits.add(scene)
     progress.end()
 
 
@@ -311,7 +330,18 @@ def _repair(
             "same command again to continue",
             stop.signum,
         )
-    repair_files(staging, damage, tuple(recipe.payload.assets.assets.values()))
+    repair_files(staging, damage, _all_of(recipe.payload.assets))
+
+
+def _stage_failure(staging: Staging, failed: Failed) -> None:
+    stage_quarantine(
+        staging,
+        failed.task,
+        failed.reason,
+        split=split_of_scene(failed.task),
+        attempts=failed.attempts,
+        died=failed.died,
+    )
 
 
 def _assembled(
@@ -322,17 +352,17 @@ def _assembled(
     progress: GenerationProgress,
 ) -> Manifest:
     store = staging.store
-    if has_manifest(store) and not any_staged(store):
-        held = read_manifest(store)
-        if held.scenes >= scenes:
+    staged = staged_scenes(staging)
+    if has_manifest(store) and min(staged, default=scenes) >= scenes:
+        if not staged:
             end_staging(store)
-            return held
-    if not has_manifest(store):
-        states = staged_scenes(staging)
-        if all(state.quarantined for state in states.values()):
-            raise _hopeless(store, len(states), next(iter(states.values())).quarantined)
+        return read_manifest(store)
+    if not has_manifest(store) and all(state.quarantined for state in staged.values()):
+        raise _hopeless(store, len(staged), next(iter(staged.values())).quarantined)
     progress.log(f"writing {scenes} scenes into {store.at('')}")
-    return assemble(store, identity, tuple(assets.assets.values()), scenes)
+    if max(staged) >= scenes:  # they stay for a run that asks for them
+        return commit_scenes(staging, identity, _all_of(assets), scenes)
+    return assemble(store, identity, _all_of(assets), scenes)
 
 
 def _forget_idle_staging(store: Store) -> None:
@@ -353,8 +383,11 @@ def _hopeless(store: Store, count: int, reason: str) -> QuarantineError:
 
 def _interruption(out: Path, progress: GenerationProgress) -> str:
     done = progress.scenes_before + progress.scenes
+    readable = (
+        f"the first {progress.readable} can be read" if progress.readable else "they are kept"
+    )
     return (
-        f"interrupted after {done} of {progress.scenes_total} scenes; they are kept in {out}: "
+        f"interrupted after {done} of {progress.scenes_total} scenes; {readable} in {out}: "
         "run the same command again to continue"
     )
 

@@ -48,7 +48,8 @@ def whole(tmp_path_factory):
 
 
 def journal(out):
-    return sorted(int(line) for line in (out.parent / "journal").read_text().split())
+    path = out.parent / "journal"
+    return sorted(int(line) for line in path.read_text().split()) if path.exists() else []
 
 
 def contents(out):
@@ -79,7 +80,8 @@ def test_scenes_that_cannot_be_made_are_named(tmp_path):
     assert report.exit_code == 4
     assert report.scenes == 8
     assert report.episodes == 5 * 3 + 1
-    assert [q.scene for q in read_manifest(tmp_path / "d").quarantined] == [2, 5]
+    quarantined = read_manifest(tmp_path / "d").quarantined
+    assert [(q.scene, q.died) for q in quarantined] == [(2, True), (5, False)]
 
 
 def test_nothing_at_all_is_an_error(tmp_path):
@@ -113,7 +115,6 @@ def killed(out, signum, scenes=60):
 def test_workers_that_outlive_a_killed_run_spoil_no_other(tmp_path):
     out, other = tmp_path / "d", load_config(overrides=["episodes_per_scene=2", "seed=3"])
     made(tmp_path / "clean" / "d", 4, config=other)
-    (tmp_path / "journal").write_text("")
     process = started(out, 60, seconds=4.0, outlives=True)
     while len(journal(out)) < 2:
         time.sleep(0.02)
@@ -146,8 +147,10 @@ def test_finished_scenes_stay_after_a_kill(tmp_path, signum, whole):
     code = killed(out, signum)
     assert code == (-signal.SIGKILL if signum == signal.SIGKILL else 128 + signum)
     finished = {int(path.stem[-6:]) for path in out.rglob("scene-*.work")}
+    assert (out / "manifest.json").exists() == (signum != signal.SIGKILL)
+    if signum != signal.SIGKILL:
+        finished |= set(range(read_manifest(out).scenes))
     assert 5 <= len(finished) < 60
-    assert not (out / "manifest.json").exists()
     report = made(out, 60)
     assert set(journal(out)) == set(range(60)) - finished
     assert report.new_scenes == 60 - len(finished)
@@ -167,6 +170,18 @@ def test_a_damaged_manifest_is_not_extended(tmp_path):
         with pytest.raises(CorruptDataError, match="damaged or edited"):
             made(out, 5)
         assert contents(out) == before
+
+
+def test_an_interrupt_is_answered_at_once(tmp_path):
+    out = tmp_path / "d"
+    process = started(out, 60, seconds=60.0)
+    while len(journal(out)) < 2:
+        time.sleep(0.02)
+    began = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    assert process.wait(timeout=60) == 128 + signal.SIGINT
+    assert time.monotonic() - began < 5.0, "2 s, and more on a busy machine"
+    assert not any(map(runs, (tmp_path / "workers").read_text().split()))
 
 
 def test_more_scenes_extend(tmp_path, whole):

@@ -1,0 +1,86 @@
+"""Commits of a run under way: readers have its first scenes while others are being made."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from internav_data.dataset import (
+    commit_scenes,
+    has_manifest,
+    read_manifest,
+    shards,
+    staged_scenes,
+)
+from internav_data.records.splits import split_of_scene
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Sequence
+
+    from internav_data.dataset import Identity, Staging
+    from internav_data.generation.progress import GenerationProgress
+    from internav_data.records import Asset
+
+
+class PrefixCommits:
+    """Commits the scenes before the first one that is missing, a full training shard at a time.
+
+    More often would write the same rows again and again: a shard that is not full is replaced.
+
+    Parameters
+    ----------
+    staging, identity, assets
+        Staged scenes of the run, its identity, and all assets of its catalogue.
+    done
+        Numbers of the scenes that need not be made.
+    progress
+        Reporter, told how many scenes can be read.
+
+    """
+
+    def __init__(
+        self,
+        staging: Staging,
+        identity: Identity,
+        assets: Sequence[Asset],
+        done: Collection[int],
+        progress: GenerationProgress,
+    ) -> None:
+        self._staging, self._identity, self._assets = staging, identity, assets
+        self._progress = progress
+        self.held = read_manifest(staging.store).scenes if has_manifest(staging.store) else 0
+        """Number of scenes that can be read."""
+        self._ended = {*done, *range(self.held)}
+        self._first_missing = self._full = self._train = 0
+        progress.readable = self.held
+        self._advance()
+
+    def add(self, scene: int) -> None:
+        """Note that a scene is staged; commit if a shard is full by now."""
+        self._ended.add(scene)
+        self._advance()
+        self._commit(self._full)
+
+    def commit_all(self) -> None:
+        """Commit all scenes before the first one that is missing."""
+        self._commit(self._first_missing)
+
+    def _advance(self) -> None:
+        while self._first_missing in self._ended:
+            train = split_of_scene(self._first_missing) == "train"
+            self._first_missing += 1
+            self._train += train
+            if train and self._train % shards.SCENES_PER_SHARD["episodes"] == 0:
+                self._full = self._first_missing
+
+    def _commit(self, scenes: int) -> None:
+        if scenes <= self.held or not self._any_good(scenes):
+            return
+        commit_scenes(self._staging, self._identity, self._assets, scenes)
+        self.held = self._progress.readable = scenes
+
+    def _any_good(self, scenes: int) -> bool:
+        """Return whether a dataset of the first scenes would hold one: none was ever refused."""
+        if self.held:
+            return True
+        states = staged_scenes(self._staging, range(scenes))
+        return any(not state.quarantined for state in states.values())
