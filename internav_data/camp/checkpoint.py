@@ -3,7 +3,8 @@
 Nothing is unpickled. A checkpoint is a folder: `weights.safetensors` (the agent's, enough to
 act), `training.safetensors` (the optimiser's moments, hidden states, random numbers) and
 `checkpoint.json`, which has the sizes and digests of both. A run keeps its last checkpoint and its
-best; `checkpoints.json` names them, and is replaced only when a new one is on the disk.
+best; `checkpoints.json` names them, and takes a new one in only when it is on the disk. It notes
+as `leftovers` what a kill would leave behind; no other folder is ever removed.
 
 `TrainState`, `pack` and `unpack` turn training between two updates into counters and tensors by
 name, and back.
@@ -11,8 +12,10 @@ name, and back.
 
 from __future__ import annotations
 
+import itertools
 import json
 import platform
+import re
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -32,7 +35,14 @@ from internav_data.camp.config import CampConfig, from_mapping, preset
 from internav_data.camp.stages import check_parts
 from internav_data.core import config as values
 from internav_data.core.files import FileLimits, open_regular, read_json, size_of_regular
-from internav_data.core.storage import file_sha256, sync, write_atomically, write_folder_atomically
+from internav_data.core.storage import (
+    file_sha256,
+    final_of,
+    sync,
+    temporary_of,
+    write_atomically,
+    write_folder_atomically,
+)
 from internav_data.records.errors import CorruptDataError, InternavError, UsageError
 
 if TYPE_CHECKING:
@@ -41,6 +51,8 @@ if TYPE_CHECKING:
 FORMAT: Final = 2
 FOLDER: Final = "checkpoints"
 POINTER: Final = "checkpoints.json"
+_SERIAL: Final = re.compile(r"\d{6,}")
+"""Name of a checkpoint's folder in a run."""
 ABOUT, WEIGHTS, TRAINING = "checkpoint.json", "weights.safetensors", "training.safetensors"
 _EXPORTED: Final = ("environment_steps", "cloned_frames", "training_s", "dataset")
 """Progress that goes with an agent alone: evaluations show it."""
@@ -84,20 +96,48 @@ def save(run: Path, checkpoint: Checkpoint, *, score: float | None = None) -> Pa
     score
         Validation score, if there is one; the checkpoint becomes the best unless another is better.
     """
-    known = _pointer(run)
-    serial = int(known.get("serial", 0)) + 1
-    folder = run / FOLDER / f"{serial:06d}"
-    shutil.rmtree(folder, ignore_errors=True)  # left by a run that was killed
+    known = _swept(run, _pointer(run))
+    folder = _next_folder(run, known)
+    # Noted before they are written, so that what a kill leaves is told from a stranger's folders.
+    leftovers = [folder.name, temporary_of(folder.name)]
+    _write_pointer(run, known | {"leftovers": leftovers})
     _write_folder(folder, checkpoint)
-    pointer = {**known, "format": FORMAT, "serial": serial, "last": folder.name}
+    pointer = {**known, "format": FORMAT, "serial": int(folder.name), "last": folder.name}
     best = best_score(run)
     if score is not None and (best is None or score >= best):
         pointer |= {"best": folder.name, "best_score": score}
-    write_atomically(run / POINTER, (json.dumps(pointer, indent=1) + "\n").encode())
-    for other in (run / FOLDER).iterdir():
-        if other.name not in {pointer["last"], pointer.get("best")}:
-            shutil.rmtree(other, ignore_errors=True)
+    replaced = {known.get("last"), known.get("best")} - {pointer["last"], pointer.get("best")}
+    _write_pointer(run, pointer | {"leftovers": sorted(filter(None, replaced))})
+    _swept(run, _pointer(run))
     return folder
+
+
+def _next_folder(run: Path, known: Mapping[str, Any]) -> Path:
+    """Return the first folder after the last checkpoint's that nobody has made."""
+    for serial in itertools.count(int(known.get("serial", 0)) + 1):
+        folder = run / FOLDER / f"{serial:06d}"
+        if not folder.exists():
+            return folder
+    raise AssertionError  # pragma: no cover - numbers do not end
+
+
+def _swept(run: Path, pointer: dict[str, Any]) -> dict[str, Any]:
+    """Remove the folders that are noted as leftovers; return the pointer without them."""
+    rest = {key: value for key, value in pointer.items() if key != "leftovers"}
+    if found := pointer.get("leftovers"):
+        for name in filter(_is_ours, found):
+            if name not in {rest.get("last"), rest.get("best")}:
+                shutil.rmtree(run / FOLDER / name, ignore_errors=True)
+        _write_pointer(run, rest)
+    return rest
+
+
+def _is_ours(name: object) -> bool:
+    return isinstance(name, str) and bool(_SERIAL.fullmatch(final_of(name) or name))
+
+
+def _write_pointer(run: Path, pointer: Mapping[str, Any]) -> None:
+    write_atomically(run / POINTER, (json.dumps(pointer, indent=1) + "\n").encode())
 
 
 def best_score(run: Path) -> float | None:
@@ -108,7 +148,7 @@ def best_score(run: Path) -> float | None:
 
 def has_checkpoint(run: Path) -> bool:
     """Return whether a folder is a checkpoint, or a run with one."""
-    return (run / POINTER).is_file() or (run / ABOUT).is_file()
+    return "last" in _pointer(run) or (run / ABOUT).is_file()
 
 
 def find(path: Path, which: str = "last") -> Path:

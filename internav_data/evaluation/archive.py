@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 from dataclasses import asdict, dataclass, fields
@@ -119,9 +120,14 @@ def folder_name(name: str) -> str:
 
 
 def forget_evaluations(folder: Path) -> None:
-    """Remove the JSON files of the evaluations in a folder, so that new ones replace them."""
+    """Remove the JSON files of the evaluations in a folder, so that new ones replace them.
+
+    Files of this name that are no evaluations stay.
+    """
     for path in folder.glob(f"*/{ABOUT}"):
-        path.unlink()
+        with contextlib.suppress(CorruptDataError):
+            _about(path)
+            path.unlink()
 
 
 def find_evaluations(path: Path) -> list[Path]:

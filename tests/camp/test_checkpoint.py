@@ -118,9 +118,38 @@ def test_no_temporary_folder_is_taken_for_a_checkpoint(kept, made):
     left = folder.with_name(".000002.1.tmp")
     left.mkdir()
     (left / checkpoints.ABOUT).write_text("{")
+    noted = json.loads((run / checkpoints.POINTER).read_text()) | {"leftovers": [left.name]}
+    (run / checkpoints.POINTER).write_text(json.dumps(noted))
     assert read(run).progress["updates"] == 1
     save(run, made(number=2))
     assert not left.exists()
+
+
+def test_a_strangers_folders_survive_all_checkpoints(kept, made):
+    run, folder = kept
+    theirs = [
+        folder.with_name(name) / "thesis.tex"
+        for name in ("mine", ".000002.1.tmp", "000002", "000004", ".000009.7.tmp")
+    ]
+    for path in theirs:
+        path.parent.mkdir()
+        path.write_text("precious")
+    noted = json.loads((run / checkpoints.POINTER).read_text())
+    outside = {"leftovers": ["mine", "../../x", "", ".", "..", 7, folder.name]}
+    (run / checkpoints.POINTER).write_text(json.dumps(noted | outside))
+    for number in range(2, 6):
+        save(run, made(number=number))
+        assert read(run).progress["updates"] == number
+    assert all(path.read_text() == "precious" for path in theirs)
+    names = {path.name for path in (run / checkpoints.FOLDER).iterdir()}
+    assert names == {path.parent.name for path in theirs} | {find(run).name}
+
+
+def test_a_run_killed_at_its_first_checkpoint_has_none(tmp_path, made, monkeypatch):
+    monkeypatch.setattr(checkpoints, "_write_folder", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        save(tmp_path, made(number=1))
+    assert not checkpoints.has_checkpoint(tmp_path)
 
 
 @pytest.mark.parametrize("name", [checkpoints.WEIGHTS, checkpoints.TRAINING, checkpoints.ABOUT])

@@ -102,6 +102,16 @@ def test_evaluations_are_found_below_a_folder(tmp_path, row):
         find_evaluations(tmp_path / "run")
 
 
+def test_a_strangers_file_of_the_same_name_is_not_forgotten(tmp_path, row):
+    write_evaluation(tmp_path / "camp", CAMP, [row()])
+    theirs = tmp_path / "mine" / ABOUT
+    theirs.parent.mkdir()
+    theirs.write_text('{"format": "mine"}')
+    forget_evaluations(tmp_path)
+    assert theirs.read_text() == '{"format": "mine"}'
+    assert not (tmp_path / "camp" / ABOUT).exists()
+
+
 def test_names_become_folders():
     assert folder_name("camp --intent none") == "camp-intent-none"
     assert folder_name("../../etc/x") == "etc-x"
