@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from internav_data.evaluation.evaluator import EvaluationConfig, Note, Policy
     from internav_data.records import Episode
 
-_CHECKPOINT: Final = "internav_data.camp.checkpoint"
-
 _NAMES: Final = {
     len(names): names
     for names in (("Navigate", "Push", "Pick", "Done"), tuple(action.label for action in ACTIONS))
@@ -155,7 +153,9 @@ def candidate(
             f"{who}: neither a run's folder nor a reference policy; expected what `camp-train` "
             f"wrote, or some of {', '.join(REFERENCE_POLICIES)} with commas between them"
         )
-    agent = _loaded(Path(who))
+    from internav_data.camp.checkpoint import load_agent  # noqa: PLC0415 - torch
+
+    agent = load_agent(who)
     about = replace(_facts(agent, about), greedy=greedy, without_intent=without_intent)
     about = replace(about, name=row_name(about))
     size = agent_config(agent, "network", "image_size", 64)
@@ -184,21 +184,6 @@ def row_name(about: About) -> str:
 def agent_config(agent: object, part: str, name: str, default: Any) -> Any:  # noqa: ANN401
     """Return a value of an agent's config; the default where it has none."""
     return getattr(getattr(getattr(agent, "config", None), part, None), name, default)
-
-
-def _loaded(run: Path) -> Any:  # noqa: ANN401 - an Agent, with what its checkpoint says of it
-    from importlib import import_module  # noqa: PLC0415
-
-    try:
-        module = import_module(_CHECKPOINT)
-    except ModuleNotFoundError as error:
-        if error.name != _CHECKPOINT:
-            raise
-        raise UsageError(
-            f"{run}: this version cannot read trained runs; "
-            f"evaluate {', '.join(REFERENCE_POLICIES)}"
-        ) from None
-    return module.load_agent(run)
 
 
 def _facts(agent: object, about: About) -> About:

@@ -10,7 +10,7 @@ torch = pytest.importorskip("torch")
 from safetensors.torch import load_file, save_file  # noqa: E402
 
 from internav_data.camp import checkpoint as checkpoints  # noqa: E402
-from internav_data.camp.agents import LEARNERS, make_agent  # noqa: E402
+from internav_data.camp.agents import AGENTS, make_agent  # noqa: E402
 from internav_data.camp.checkpoint import Checkpoint, find, load_agent, read, save  # noqa: E402
 from internav_data.core.storage import file_sha256  # noqa: E402
 from internav_data.records.errors import CorruptDataError, UsageError  # noqa: E402
@@ -66,7 +66,7 @@ def test_what_is_read_is_what_was_written(kept, made):
     assert not read(folder, training=False).training
 
 
-@pytest.mark.parametrize("method", LEARNERS)
+@pytest.mark.parametrize("method", AGENTS)
 def test_an_agent_comes_back_knowing_what_it_is(tmp_path, made, method):
     written = made(method)
     save(tmp_path, written)

@@ -8,7 +8,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from internav_data.camp.agents import LEARNERS, make_agent  # noqa: E402
+from internav_data.camp.agents import AGENTS, make_agent  # noqa: E402
 from internav_data.camp.agents.hierarchy import (  # noqa: E402
     DONE,
     NAVIGATE,
@@ -169,7 +169,7 @@ def test_frames_begin_where_episodes_do(experts, config):
         assert batch.record.choice[:, k].tolist() == right
 
 
-@pytest.mark.parametrize("method", LEARNERS)
+@pytest.mark.parametrize("method", AGENTS)
 def test_experts_are_learnt_by_every_learner(experts, config, method):
     agent = make_agent(method, config(network={"hidden": 32}))
     optimiser = torch.optim.Adam(agent.optimised(), 1e-3)

@@ -5,7 +5,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from internav_data.camp.agents import LEARNERS, make_agent  # noqa: E402
+from internav_data.camp.agents import AGENTS, make_agent  # noqa: E402
 from internav_data.camp.rollout import Collector, orders_of, uniforms_of  # noqa: E402
 
 
@@ -34,7 +34,7 @@ def diary(fake):
     return Diary
 
 
-@pytest.mark.parametrize("method", LEARNERS)
+@pytest.mark.parametrize("method", AGENTS)
 def test_cuts_are_valued_before_the_reset_and_ends_are_not(diary, config, method):
     """Values come from the last observations and the hidden states after them, step by step."""
     env, agent = diary(), make_agent(method, config(agent={"initial_done_probability": 0.05}))

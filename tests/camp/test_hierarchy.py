@@ -7,7 +7,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from internav_data.camp.agents import AGENTS, LEARNERS, make_agent  # noqa: E402
+from internav_data.camp.agents import AGENTS, make_agent  # noqa: E402
 from internav_data.camp.agents.hierarchy import (  # noqa: E402
     ACTIONS_OF,
     DONE,
@@ -307,7 +307,7 @@ def test_hrl_decides_at_every_step_and_its_interactions_never_hand_back(collecte
         assert (record.choice[acting] != DONE).all()
 
 
-@pytest.mark.parametrize("method", LEARNERS)
+@pytest.mark.parametrize("method", AGENTS)
 @pytest.mark.parametrize("chance", [0.01, 0.05])
 def test_every_learner_ends_an_episode_with_the_same_chance(fake, config, method, chance):
     env = fake()
@@ -386,7 +386,7 @@ def test_ones_own_agent_joins_by_entry_point(config, monkeypatch):
 
     from internav_data.camp import agents
 
-    point = EntryPoint("mine", "internav_data.camp.agents.flat:RandomAgent", agents.GROUP)
+    point = EntryPoint("mine", "internav_data.camp.agents.flat:PPOAgent", agents.GROUP)
     monkeypatch.setattr(agents, "entry_points", lambda **_: [point])
     assert isinstance(make_agent("mine", config()), Agent)
     assert agents.agent_names()[-1] == "mine"

@@ -14,7 +14,7 @@ torch = pytest.importorskip("torch")
 
 from small_worlds import SIZE, Cue, Mixed  # noqa: E402
 
-from internav_data.camp.agents import LEARNERS, make_agent  # noqa: E402
+from internav_data.camp.agents import AGENTS, make_agent  # noqa: E402
 from internav_data.camp.agents.flat import PPOAgent  # noqa: E402
 from internav_data.camp.ppo import set_rate, update  # noqa: E402
 from internav_data.camp.rollout import Collector, orders_of, uniforms_of  # noqa: E402
@@ -59,7 +59,7 @@ def rollouts_needed(agent, env, settings):
     return pytest.fail(f"success never reached {ENOUGH}; every 20th rollout: {shares[::20]}")
 
 
-@pytest.mark.parametrize("method", LEARNERS)
+@pytest.mark.parametrize("method", AGENTS)
 def test_a_box_is_pushed_a_thing_picked_up_and_a_block_gone_round(method, settings):
     """Nine of ten of the last 300 episodes: no kind can be left out, each is a third of them."""
     agent = make_agent(method, settings)

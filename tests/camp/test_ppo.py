@@ -8,7 +8,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from internav_data.camp.agents import LEARNERS, make_agent  # noqa: E402
+from internav_data.camp.agents import AGENTS, make_agent  # noqa: E402
 from internav_data.camp.agents.hierarchy import AuxiliaryAgent  # noqa: E402
 from internav_data.camp.ppo import explained_variance, set_rate, update  # noqa: E402
 from internav_data.camp.rollout import (  # noqa: E402
@@ -35,7 +35,7 @@ def parameters(agent):
     return {name: p.detach().clone() for name, p in agent.named_parameters()}
 
 
-@pytest.mark.parametrize("method", LEARNERS)
+@pytest.mark.parametrize("method", AGENTS)
 def test_the_first_ratio_is_one_and_an_update_changes_what_is_optimised(collected, config, method):
     agent, _, (_, rollout) = collected(method, steps=16)
     before = parameters(agent)
@@ -138,7 +138,7 @@ def test_clipped_values_are_the_larger_error(collected, config):
     assert learnt(agent, rollout, ppo)["value_loss"] == pytest.approx(float(right), rel=1e-5)
 
 
-@pytest.mark.parametrize("method", LEARNERS)
+@pytest.mark.parametrize("method", AGENTS)
 def test_two_ranks_of_half_the_batch_are_one_rank(monkeypatch, collected, config, method):
     """Every sum is over all ranks: here they take turns, each knowing the other's share.
 

@@ -16,6 +16,7 @@ from safetensors.torch import load_file  # noqa: E402
 from internav_data.camp import data as data_module  # noqa: E402
 from internav_data.camp import train as train_module  # noqa: E402
 from internav_data.camp.agents import make_agent  # noqa: E402
+from internav_data.camp.agents.flat import PPOAgent  # noqa: E402
 from internav_data.camp.checkpoint import find, load_agent  # noqa: E402
 from internav_data.camp.config import (  # noqa: E402
     config_of,
@@ -261,6 +262,14 @@ def test_episodes_are_those_that_are_asked_for(scenes):
         TrainingData(scenes, ["shortest_path_m<=0"])
     with pytest.raises(UsageError, match="COLUMN=VALUE"):
         TrainingData(scenes, ["near"])
+
+
+def test_an_agent_without_parameters_has_nothing_to_learn(request_for, monkeypatch):
+    given = request_for("idle", "ppo")
+    monkeypatch.setattr(PPOAgent, "optimised", lambda _: [])
+    with pytest.raises(UsageError, match="nothing to learn; expected one of camp, "):
+        begin(given)
+    assert not given.out.exists()
 
 
 def test_a_dataset_without_outcomes_is_refused(scenes, monkeypatch):

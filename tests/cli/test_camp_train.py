@@ -70,7 +70,6 @@ def test_a_run_is_trained_and_measured(call, dataset, tmp_path):
         (("DATA", "--nonsense"), 2, ["--nonsense"]),
         ((), 5, ["internav-dataset", "internav-gen generate"]),
         (("DATA", "--method", "sarsa"), 2, ["sarsa", "ppo-intent"]),
-        (("DATA", "--method", "random"), 2, ["nothing to learn"]),
         (("DATA", "--set", "ppo.num_step=3"), 2, ["ppo.num_step", "ppo.num_steps"]),
         (("DATA", "--set", "ppo.num_steps=zero"), 2, ["ppo.num_steps", "whole number"]),
         (("DATA", "--set", "ppo.num_minibatches=5"), 2, ["minibatches", "divide"]),

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import torch
 
-from internav_data.camp.agents.flat import PPOAgent, PPOIntentAgent, RandomAgent
+from internav_data.camp.agents.flat import PPOAgent, PPOIntentAgent
 from internav_data.camp.agents.hierarchy import Hierarchy
 from internav_data.camp.agents.nie import NIEAgent
 from internav_data.camp.agents.protocol import Agent
@@ -59,11 +59,8 @@ AGENTS: Final = {
         "`ppo` that foresees what each action does to objects in sight (Zeng et al. 2021)",
         "**instance ids**",
     ),
-    "random": Method(RandomAgent, "each action with equal probability; nothing to learn"),
 }
 """Methods by name; trainer, documentation and tests derive their lists from it."""
-LEARNERS: Final = tuple(name for name in AGENTS if name != "random")
-"""Methods that can be trained."""
 GROUP: Final = "internav.agents"
 """Entry points that add methods."""
 

@@ -1,11 +1,10 @@
-"""Flat agents, one policy over all actions: `ppo`, `ppo-intent` (figure 2c), `random`.
+"""Flat agents, one policy over all actions: `ppo`, `ppo-intent` (figure 2c).
 
 Shapes: T steps, n environments, A actions (`ACTION_COUNT`).
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -173,28 +172,3 @@ class PPOIntentAgent(PPOAgent):
     def synchronise(self) -> None:
         """See `Agent`."""
         self.intent.synchronise(self.policy)
-
-
-class RandomAgent(RecurrentAgent[StepRecord]):
-    """Agent that takes each action with the same probability."""
-
-    def __init__(self, config: CampConfig) -> None:  # noqa: ARG002 - as all agents are made
-        super().__init__()
-
-    def initial_state(self, count: int) -> State:  # noqa: ARG002
-        """See `Agent`."""
-        return {}
-
-    def step(self, batch: Batch[Any], uniforms: Uniforms) -> AgentStep[StepRecord]:
-        """See `Agent`; the most probable action is the first."""
-        goal = batch.observations["goal"][0]
-        log_probs = torch.full((len(goal), ACTION_COUNT), -math.log(ACTION_COUNT)).to(goal.device)
-        choice = networks.drawn(log_probs, uniforms[1])
-        value = goal.new_zeros(len(goal))
-        return AgentStep(choice, log_probs[:, 0], value, StepRecord(choice), batch.state)
-
-    def evaluate(self, batch: Batch[StepRecord]) -> Evaluated:
-        """See `Agent`."""
-        nothing = torch.zeros(batch.episode_starts.shape, device=batch.episode_starts.device)
-        log = math.log(ACTION_COUNT)
-        return Evaluated(nothing - log, nothing, nothing + log, batch.state)
