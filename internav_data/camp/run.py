@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from internav_data.camp.checkpoint import TrainState, has_checkpoint, read
-from internav_data.camp.config import CampConfig, from_mapping
+from internav_data.camp.config import CampConfig, StagesConfig, from_mapping
 from internav_data.camp.logging import LOG
 from internav_data.camp.stages import PARTS
 from internav_data.camp.train import Request, Trainer
@@ -21,8 +21,8 @@ from internav_data.records.errors import UsageError
 CONFIG: Final = "config.toml"
 """File of a run's resolved settings, for people and for `--config`."""
 CHANGEABLE: Final = (
-    "stages.total_timesteps", "run.threads", "run.workers", "run.checkpoint_every",
-    "run.validate_every", "run.tensorboard", "data.house_cache_size",
+    "stages.total_timesteps", "stages.extra_timesteps", "run.threads", "run.workers",
+    "run.checkpoint_every", "run.validate_every", "run.tensorboard", "data.house_cache_size",
 )  # fmt: skip
 """Settings that a resumed run may change. More steps go to its last stage."""
 _TOTAL, _EXTRA = "stages.total_timesteps", "stages.extra_timesteps"
@@ -93,8 +93,11 @@ def resume(request: Request, asked: Mapping[str, Any]) -> Trainer:
         )
     if asked.get("parts") is not None:
         state.parts = tuple(asked["parts"])
-    if config.stages.extra_timesteps > checkpoint.config.stages.extra_timesteps:
-        _check_last(out, state)
+    if config.stages != checkpoint.config.stages and PARTS[-1] not in state.parts:
+        raise UsageError(
+            f"{out}: more steps go to the stage {PARTS[-1]!r}, which this run leaves out: add it "
+            "by --stages"
+        )
     request = replace(request, method=checkpoint.method, config=config)
     trainer = Trainer(request, state, checkpoint)
     known = checkpoint.progress.get("dataset")
@@ -149,28 +152,26 @@ def _continued(
     config = known
     for key in known_keys(known) if keys is None else keys:
         ours, theirs = plain(attrgetter(key)(known)), plain(attrgetter(key)(asked))
-        if ours == theirs or key == _EXTRA:
+        if ours == theirs:
             continue
         if key not in CHANGEABLE:
             raise UsageError(
                 f"{out}: {key} is {ours!r} in this run, asked for {theirs!r}: leave settings out "
                 f"with --resume, or choose another --out (only {', '.join(CHANGEABLE)} may change)"
             )
-        if key == _TOTAL:
-            extra = int(theirs) - int(ours)
-            if extra < known.stages.extra_timesteps:
-                raise UsageError(
-                    f"{out}: {key} is {int(ours) + known.stages.extra_timesteps} in this run, "
-                    f"asked for {theirs}: a run can be given more steps, not fewer"
-                )
-            key, theirs = _EXTRA, extra  # noqa: PLW2901 - steps that are asked for on top
+        if key in {_TOTAL, _EXTRA}:
+            total = theirs if key == _TOTAL else known.stages.total_timesteps + theirs
+            key, theirs = _EXTRA, _more_steps(out, config.stages, total)  # noqa: PLW2901
         config = from_mapping(config, nested(key, theirs), "--resume")
     return config
 
 
-def _check_last(out: Path, state: TrainState) -> None:
-    if PARTS[-1] not in state.parts:
+def _more_steps(out: Path, stages: StagesConfig, total: int) -> int:
+    """Return a run's steps beyond those that it began with, where it is to have a total of them."""
+    first, before = stages.total_timesteps, stages.total_timesteps + stages.extra_timesteps
+    if total < before and total != first:
         raise UsageError(
-            f"{out}: more steps go to the stage {PARTS[-1]!r}, which this run leaves out: add it "
-            "by --stages"
+            f"{out}: {_TOTAL} is {before} in this run, asked for {total}: a run can be given more "
+            "steps, not fewer"
         )
+    return max(total, before) - first

@@ -141,10 +141,14 @@ def test_more_steps_need_the_last_stage_and_fewer_are_refused(request_for):
     given = request_for("some", "ppo")
     given = replace(given, parts=("auxiliary",))
     begin(given)
-    for steps, words in ((100, "320 in this run, asked for 100.*not fewer"), (480, "'all'")):
-        config = request_for("some", stages={"total_timesteps": steps}).config
+    for name, steps, words in (
+        ("total_timesteps", 100, "320 in this run, asked for 100.*not fewer"),
+        ("total_timesteps", 480, "'all'"),
+        ("extra_timesteps", 160, "'all'"),
+    ):
+        config = request_for("some", stages={name: steps}).config
         with pytest.raises(UsageError, match=words):
-            resume(given, {"config": config, "keys": ["stages.total_timesteps"]})
+            resume(given, {"config": config, "keys": [f"stages.{name}"]})
 
 
 def test_other_workers_change_no_bit_of_a_resumed_run(request_for):
