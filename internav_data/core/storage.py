@@ -251,7 +251,7 @@ class FolderStore:
             # Some network file systems cannot lock folders: there we trust the user.
             with contextlib.suppress(OSError):
                 deadline = time.monotonic() + _ENDING_S
-                while not _locked(descriptor):
+                while not try_lock(descriptor):
                     if time.monotonic() > deadline:
                         raise LockedError(f"{self.root}: {busy}")
                     time.sleep(_POLL_S)
@@ -261,7 +261,7 @@ class FolderStore:
             os.close(descriptor)
 
 
-def _locked(descriptor: int) -> bool:
+def try_lock(descriptor: int) -> bool:
     """Lock a file if nobody else holds its lock, and return whether nobody does."""
     import fcntl  # noqa: PLC0415 - POSIX only; readers need no lock
 

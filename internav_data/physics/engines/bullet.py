@@ -7,18 +7,15 @@ costs nothing that threads could gain: pybullet holds the interpreter while it s
 
 from __future__ import annotations
 
-import atexit
 import math
 import os
-import shutil
-import tempfile
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import version
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from internav_data.core.locks import ThreadLock
+from internav_data.core.temporary import process_folder
 from internav_data.geometry import centre_of_mass, multiply, rotation_matrix
 from internav_data.physics.engines.bullet_scene import (
     HULL_MARGIN_M,
@@ -199,12 +196,5 @@ def bullet() -> Bullet:
 
 
 @cache  # by process: forked ones would overwrite each other's files
-def _of_process(pid: int) -> Bullet:
-    folder = Path(tempfile.mkdtemp(prefix="internav-"))
-    atexit.register(_remove, folder, pid)
-    return Bullet(Builder(pybullet.connect(pybullet.DIRECT), folder))
-
-
-def _remove(folder: Path, pid: int) -> None:
-    if pid == os.getpid():
-        shutil.rmtree(folder, ignore_errors=True)
+def _of_process(_pid: int) -> Bullet:
+    return Bullet(Builder(pybullet.connect(pybullet.DIRECT), process_folder()))
