@@ -23,6 +23,7 @@ from collections import Counter
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any, Literal
 
+from internav_data.core.hardware import hardware
 from internav_data.core.storage import StoreLike, exists, final_of, store_of
 from internav_data.dataset.journal import Journal
 from internav_data.dataset.manifest import (
@@ -275,4 +276,12 @@ def _manifest(
         dict(sorted(redraws.items())),
         tuple(entry for _, entry in sorted(quarantined.items())),
         files,
+        hardware=_hardware(old),
     )
+
+
+def _hardware(old: Manifest | None) -> tuple[str, ...]:
+    """Return the arithmetic of an old dataset's scenes and of this machine; () if not known."""
+    if old is not None and old.scenes and not old.hardware:
+        return ()
+    return tuple(sorted({*(old.hardware if old else ()), hardware()}))

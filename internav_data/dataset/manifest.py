@@ -1,8 +1,8 @@
 """The manifest: identity, counts and files of a dataset. It is written last.
 
 A folder without `manifest.json` is no dataset; a reader opens exactly the files that it names. It
-holds nothing of the machine, the clock or the number of workers, so the same configuration and
-seed give the same bytes.
+holds nothing of the clock, the place or the number of workers, and of the machine only the name of
+its arithmetic, so the same configuration and seed give the same bytes.
 """
 
 from __future__ import annotations
@@ -129,6 +129,9 @@ class Manifest:
     """Keys and columns that a reader must know; it ignores any other that it does not know."""
     metadata: tuple[MetadataFile, ...] | None = None
     """Files beside the data; null in datasets of earlier releases, which do not list them."""
+    hardware: tuple[str, ...] = ()
+    """Names of the arithmetic (`internav_data.core.hardware`) that the scenes were made with; empty
+    where it is not known. Machines of the same name make the same bytes."""
     sha256: str = ""
     """SHA-256 of the canonical text of all other keys (docs/dataset.md), 64 hexadecimal digits;
     filled in when the manifest is written."""
@@ -281,6 +284,7 @@ def _parse(path: str, raw: dict[str, Any]) -> Manifest:
         values["quarantined"] = tuple(_made(Quarantined, q) for q in raw["quarantined"])
         values["files"] = tuple(_made(DataFile, f) for f in raw["files"])
         values["requires"] = tuple(map(str, raw.get("requires", ())))
+        values["hardware"] = tuple(map(str, raw.get("hardware") or ()))
         if raw.get("metadata") is not None:
             values["metadata"] = tuple(_made(MetadataFile, m) for m in raw["metadata"])
         manifest = _made(Manifest, values)

@@ -23,6 +23,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TypeVar
 
+from internav_data.core.hardware import hardware
 from internav_data.core.lru import LRUCache
 from internav_data.physics.scene import PhysicsScene, PushSolution, SettleSolution
 from internav_data.physics.sweep import PATH_POSE_BYTES
@@ -343,5 +344,5 @@ def origin(engine: Engine) -> str | None:
         return None
     records = hashlib.sha256("".join(map(str, libraries)).encode()).hexdigest()
     system = f"{platform.system()} {'-'.join(platform.libc_ver())} {platform.python_version()}"
-    processor = f"{platform.machine()} {get_host_cpu_name()} {get_host_cpu_features().flatten()}"
+    processor = f"{hardware()} {get_host_cpu_name()} {get_host_cpu_features().flatten()}"
     return f"{engine.name} {engine.build}, {_CODE}, {records}, {system}, {processor}"

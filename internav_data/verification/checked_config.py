@@ -22,6 +22,8 @@ class CheckedConfig:
     """Minimum distance of a spawned obstacle from everything else, metres."""
     solvable: bool = False
     """Whether every episode must have an expert."""
+    same_hardware: bool = True
+    """Whether this machine's arithmetic made the data: then replays equal them to the last bit."""
 
 
 def checked_config(config: Mapping[str, Any]) -> CheckedConfig:

@@ -23,6 +23,10 @@ MAX_TEXT = 2_000
 """Characters of a value in a finding."""
 MAX_SHOWN = 20
 """Findings written out in the summary."""
+ELSEWHERE_M = 0.001
+"""Tolerance of settled poses in a dataset that other hardware made, metres."""
+MAX_DIFFERING = 0.005
+"""Share of falls, outcomes and experts that may end otherwise on other hardware; one always may."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -96,6 +100,8 @@ class FindingCollector:
         self.file = file
         self.scene = scene
         self.found: list[Finding] = []
+        self.differences: list[Finding] = []
+        """Results of another kind than on the hardware that made the data."""
         self.counts: Counter[str] = Counter()
         self.by_predicate: Counter[str] = Counter()
         self.notes: Counter[str] = Counter()
@@ -127,9 +133,35 @@ class FindingCollector:
         except Exception as error:  # noqa: BLE001 - whatever such values lead to
             self.expect(False, predicate, "values that can be checked", repr(error))  # noqa: FBT003
 
+    def differ(self, predicate: str, expected: object, got: object, episode: str) -> None:
+        """Note a result of another kind than on the hardware that made the data."""
+        self.counts["differing"] += 1
+        if len(self.differences) < MAX_FINDINGS:
+            self.differences.append(
+                Finding(self.file, self.scene, episode, predicate, _text(expected), _text(got))
+            )
+
+    def judge_differences(self, made_on: str) -> None:
+        """Take the differences as findings where there are too many, as notes else.
+
+        `made_on` names the hardware that made the data.
+        """
+        differing, compared = self.counts["differing"], self.counts["compared"]
+        self.notes[
+            f"made on {_text(made_on)}: compared within {1000.0 * ELSEWHERE_M:g} mm; "
+            f"{differing} of {compared} falls, outcomes and experts end otherwise here"
+        ] += self.counts["replayed"]
+        if differing > max(1.0, MAX_DIFFERING * compared):
+            self.found = sorted(self.found + self.differences)[:MAX_FINDINGS]
+            self.by_predicate.update(found.predicate for found in self.differences)
+            return
+        for found in sorted(self.differences)[:MAX_SHOWN]:
+            self.notes[f"ends otherwise here: {found}"] += 1
+
     def absorb(self, other: FindingCollector) -> None:
         """Add the findings and counts of another collector."""
         self.found = sorted(self.found + other.found)[:MAX_FINDINGS]
+        self.differences = sorted(self.differences + other.differences)[:MAX_FINDINGS]
         self.counts += other.counts
         self.by_predicate += other.by_predicate
         self.notes += other.notes

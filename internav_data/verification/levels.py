@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from internav_data.core.hardware import hardware
 from internav_data.core.messages import Failed, Recipe
 from internav_data.core.worker_pool import WorkerPool
 from internav_data.dataset import ASSETS, EPISODES, SCENES, from_table, read_table
@@ -154,12 +155,17 @@ def _validate_once(
         if WITHOUT_SOLID & set(tables.by_predicate):
             damaged |= {file.path for file in manifest.of("assets")}
     if level in {"geometry", "physics"}:
-        physics = checked_config(manifest.config) if level == "physics" else None
+        physics = None
+        if level == "physics":
+            here = manifest.hardware == (hardware(),)
+            physics = replace(checked_config(manifest.config), same_hardware=here)
         if physics is not None and tables.by_predicate:
             # The engine must not receive values that may not be numbers at all.
             physics = None
             whole.notes[UNTRUE] += sum(counts.episodes for counts in manifest.counts.values())
         _check_scenes(path, manifest, damaged, whole, sample, workers, progress_callback, physics)
+        if physics is not None and not physics.same_hardware:
+            whole.judge_differences("; ".join(manifest.hardware) or "hardware that is not stated")
     return whole.findings(level)
 
 

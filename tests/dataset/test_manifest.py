@@ -153,7 +153,7 @@ def test_a_manifest_from_before_digests_is_read_and_one_that_lost_it_is_not(dama
     assert read_manifest(BEFORE_DIGESTS.parent).scenes == before["scenes"]
     path = damaged_folder / "manifest.json"
     path.write_text(path.read_text().replace('\n "sha256"', '\n "sha356"'))
-    with pytest.raises(CorruptDataError, match="'metadata' but no sha256"):
+    with pytest.raises(CorruptDataError, match="'hardware' but no sha256"):
         read_manifest(damaged_folder)
 
 

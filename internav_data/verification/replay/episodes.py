@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from internav_data.physics import cache_disabled, get_engine
+from internav_data.verification.replay.elsewhere import TolerantExpect
 from internav_data.verification.replay.expert_replay import check_expert
 from internav_data.verification.replay.outcomes import check_outcomes
 from internav_data.verification.replay.settling import check_settling
@@ -27,9 +28,10 @@ def replay_episode(scene: CheckedScene, episode: Episode, report: FindingCollect
 def _replay(scene: CheckedScene, episode: Episode, report: FindingCollector) -> None:
     name = episode.episode_id
 
-    def expect(holds: object, predicate: str, expected: object, got: object) -> bool:
+    def exact(holds: object, predicate: str, expected: object, got: object) -> bool:
         return report.expect(holds, predicate, expected, got, name)
 
+    expect = exact if scene.config.same_hardware else TolerantExpect(episode, report)
     engine = get_engine(scene.engine(episode))
     made = f"{episode.physics.engine} of {episode.physics.build}"
     here = f"{engine.name} of {engine.build}"
