@@ -9,6 +9,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.set-up
 BARE := .venv-bare
+LOWEST := .venv-lowest
 # The interpreter to use; empty: the first CPython 3.11 found.
 PYTHON ?=
 # More for pytest, as in `make test ARGS='-k lattice -x'`.
@@ -131,6 +132,18 @@ test-bare: ## run the loader's tests with nothing but numpy and pyarrow installe
 	  --constraint constraints.txt --editable . pytest hypothesis
 	$(BARE)/bin/python -m pytest -q $(ARGS) tests/test_import.py tests/dataset \
 	  --ignore tests/dataset/test_json_schemas.py -k 'not (pandas or duckdb or polars)'
+
+LOWEST_TESTS := tests/dataset/test_loader.py tests/dataset/test_stream.py tests/core \
+  tests/geometry tests/catalog tests/evaluation/test_statistics.py tests/verification/test_mutations.py \
+  tests/cli/test_commands.py tests/envs/test_copies.py tests/camp/test_networks.py tests/camp/test_stages.py
+
+.PHONY: test-lowest
+test-lowest: ## run a part of every room's tests with the lowest versions that pyproject.toml allows
+	@$(call VIRTUAL_ENVIRONMENT,$(LOWEST)); \
+	$(LOWEST)/bin/python -m pip install -qq --disable-pip-version-check --no-input \
+	  --constraint constraints-lowest.txt --editable '.[all]' \
+	  hypothesis jsonschema psutil pytest pytest-xdist
+	$(LOWEST)/bin/python -m pytest $(TESTS) -k 'not (pandas or duckdb or polars)' $(LOWEST_TESTS) $(ARGS)
 
 .PHONY: bench
 bench: $(STAMP) ## run the benchmarks: JSON into bench-results/

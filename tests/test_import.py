@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import importlib
+import re
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import pytest
 
@@ -105,3 +108,18 @@ def test_push_and_settle_are_functions_whatever_was_imported_before():
 
     assert push is internav_data.physics.pushing.push
     assert settle is internav_data.physics.settling.settle
+
+
+def test_the_lowest_versions_are_those_that_the_package_states():
+    root = Path(__file__).parents[1]
+    project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    stated = [*project["dependencies"], *extras["generate"], *extras["meshes"], *extras["train"]]
+    lines = (root / "constraints-lowest.txt").read_text().splitlines()
+    lowest = dict(line.split("==") for line in lines if not line.startswith("#"))
+    bounds = dict(re.match(r"([\w-]+)>=([\d.]+)", each).groups() for each in stated)
+    assert lowest.keys() == bounds.keys()
+    del lowest["torch"]  # the page says why
+    for name, version in lowest.items():
+        assert f"{version}.".startswith(f"{bounds[name]}."), name
+        assert not version.removeprefix(bounds[name]).strip(".0") or name.startswith("opencv")
