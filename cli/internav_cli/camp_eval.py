@@ -115,6 +115,9 @@ tables.md, tables.json, report.html.""",
 @JSON
 def evaluate_command(**given: Any) -> int:  # noqa: ANN401 - the options above
     """Let RUN play DATASET, and print the paper's tables."""
+    from internav_data.core.extras import require
+
+    require("cv2", "scipy")  # of tables and page, when all has been played
     from internav_data.camp.policy import candidate, reference_policies_beside
     from internav_data.evaluation.archive import (
         Evaluation,

@@ -140,10 +140,16 @@ def test_commands_without_click_say_so_in_a_line(tmp_path):
     assert done.stderr == f"the commands need click: {install_command('click')}\n"
 
 
-@pytest.mark.parametrize("module", ["torch", "safetensors"])
-def test_the_trainer_names_the_missing_extra_in_a_line(tmp_path, module):
-    code = "from internav_cli.camp_train import main; main()"
-    done = without(tmp_path, module, code, "nothing", "--preset", "small")
+@pytest.mark.parametrize(
+    ("module", "command", "words"),
+    [
+        ("torch", "camp_train", ("nothing", "--preset", "small")),
+        ("safetensors", "camp_train", ("nothing", "--preset", "small")),
+        ("cv2", "camp_eval", ("random", "nothing")),
+    ],
+)
+def test_the_trainer_names_the_missing_extra_in_a_line(tmp_path, module, command, words):
+    done = without(tmp_path, module, f"from internav_cli.{command} import main; main()", *words)
     lines = done.stderr.strip().splitlines()
     assert (done.returncode, len(lines)) == (1, 1), done.stderr
     assert f"{module} is missing: {install_command(module)}" in lines[0]
