@@ -12,13 +12,16 @@ from internav_cli.main import launch
 from internav_cli.options import DATASET, JSON, dataset_to_read, positive, renamed_option
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
+    from internav_data.camp.policy import EvaluatedPolicy
     from internav_data.dataset import Dataset
     from internav_data.evaluation.archive import Evaluation
     from internav_data.evaluation.evaluator import EvaluationConfig
     from internav_data.evaluation.statements import Methods
 
+BUSY = "another camp-eval writes into this folder; wait for it to end, or choose another --out"
+"""Reason for which a second process is refused."""
 _REPORT = "report.html"
 
 
@@ -46,7 +49,7 @@ Examples:
   camp-eval evaluate --help                            all options of the first two
 
 \b
-Exit codes: 0 good, 1 error, 2 usage, 5 corrupt data, 130 interrupted.""",
+Exit codes: 0 good, 1 error, 2 usage, 5 corrupt data, 130/143 interrupted.""",
 )
 @click.option("--debug", is_flag=True, help="Show the traceback of an error.")
 @click.version_option(package_name="internav-data", prog_name="camp-eval")
@@ -119,15 +122,8 @@ def evaluate_command(**given: Any) -> int:  # noqa: ANN401 - the options above
 
     require("cv2", "scipy")  # of tables and page, when all has been played
     from internav_data.camp.policy import candidate, reference_policies_beside
-    from internav_data.evaluation.archive import (
-        Evaluation,
-        folder_name,
-        forget_evaluations,
-        write_evaluation,
-    )
-    from internav_data.evaluation.evaluator import evaluate
+    from internav_data.core.storage import lock_folder
     from internav_data.evaluation.report import methods_of
-    from internav_data.evaluation.videos import videos
 
     names, run = _who(given["run"])
     out = given["out"] or (run or Path()) / f"evaluation-{given['split']}"
@@ -140,6 +136,32 @@ def evaluate_command(**given: Any) -> int:  # noqa: ANN401 - the options above
     candidates = [
         candidate(name, dataset, settings, greedy=greedy, without_intent=cut) for name in names
     ]
+    logs = {} if run is None else {run.name: run}
+    with lock_folder(out, BUSY):
+        _check_out(out, force=given["force"])  # another may have ended just before
+        found = _evaluate(candidates, dataset, settings, out, film=given["video"])
+        _write(out, methods_of(found), dataset, logs, as_json=given["as_json"])
+    return 0
+
+
+def _evaluate(
+    candidates: Sequence[EvaluatedPolicy],
+    dataset: Dataset[Any],
+    settings: EvaluationConfig,
+    out: Path,
+    *,
+    film: bool,
+) -> list[Evaluation]:
+    """Evaluate policies, and write their results into a folder."""
+    from internav_data.evaluation.archive import (
+        Evaluation,
+        folder_name,
+        forget_evaluations,
+        write_evaluation,
+    )
+    from internav_data.evaluation.evaluator import evaluate
+    from internav_data.evaluation.videos import videos
+
     found = []
     for each in candidates:
         results = evaluate(each.policy, dataset, settings, _reporter(each.about.name))
@@ -148,13 +170,11 @@ def evaluate_command(**given: Any) -> int:  # noqa: ANN401 - the options above
     for evaluation in found:
         folder = out / folder_name(evaluation.about.name)
         write_evaluation(folder, evaluation.about, evaluation.results)
-    if given["video"]:
+    if film:
         first = candidates[0].policy
         for path in videos(out / "videos", first, found[0].results, dataset, settings):
             click.echo(f"wrote {path}", err=True)
-    logs = {} if run is None else {run.name: run}
-    _write(out, methods_of(found), dataset, logs, as_json=given["as_json"])
-    return 0
+    return found
 
 
 @cli.command(
@@ -182,11 +202,19 @@ def compare_command(
     *, runs: tuple[Path, ...], data: Path | None, out: Path | None, force: bool, as_json: bool
 ) -> int:
     """Lay evaluations side by side, and say what they can tell."""
+    from internav_data.core.storage import lock_folder
+
+    if out is None:
+        return _compare(runs, data, None, as_json=as_json)
+    _check_out(out, force=force)
+    with lock_folder(out, BUSY):
+        return _compare(runs, data, out, as_json=as_json)
+
+
+def _compare(runs: tuple[Path, ...], data: Path | None, out: Path | None, *, as_json: bool) -> int:
     from internav_data.evaluation.archive import find_evaluations, read_evaluation
     from internav_data.evaluation.report import methods_of
 
-    if out is not None:
-        _check_out(out, force=force)
     folders = [folder for run in runs for folder in find_evaluations(run)]
     methods = methods_of([read_evaluation(folder) for folder in dict.fromkeys(folders)])
     dataset = None if data is None else _same_dataset(data, next(iter(methods.values()))[0])

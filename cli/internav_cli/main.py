@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import shlex
+import signal
 import sys
+import threading
 import traceback
 import warnings
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from types import FrameType
 
 COMMANDS = {
     "generate": "Make a dataset from a seed; continue or extend one.",
@@ -21,9 +29,17 @@ COMMANDS = {
     "doctor": "Check that this machine can generate datasets.",
     "warmup": "Compile the numba kernels before their first use.",
 }
-INTERRUPTED = 130
 LONGEST_LINE = 1000
 """Characters of an error: one that quotes a file may be as long as the file."""
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class InterruptedCommandError(KeyboardInterrupt):
+    """A signal ended a command that has nothing to finish or to keep."""
+
+    def __init__(self, signum: int) -> None:
+        super().__init__(signum)
+        self.signum = signum
 
 
 class LazyGroup(click.Group):
@@ -89,8 +105,9 @@ def launch(command: click.Command, program: str, arguments: list[str] | None = N
         _line(program, f"warning: {message}"), err=True
     )
     try:
-        result = command.main(given, prog_name=program, standalone_mode=False)
-        sys.stdout.flush()
+        with _signals_raise():
+            result = command.main(given, prog_name=program, standalone_mode=False)
+            sys.stdout.flush()
     except BrokenPipeError:
         sys.stdout = None  # who read our output has gone: nothing is left to flush at the end
         sys.exit(0)
@@ -101,6 +118,30 @@ def launch(command: click.Command, program: str, arguments: list[str] | None = N
     sys.exit(result if isinstance(result, int) else 0)
 
 
+@contextlib.contextmanager
+def _signals_raise() -> Iterator[None]:
+    """Have the first SIGINT or SIGTERM end the block by an exception, the next one the process."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(signum: int, _frame: FrameType | None) -> None:
+        for each in SIGNALS:
+            signal.signal(each, signal.SIG_DFL)
+        raise InterruptedCommandError(signum)
+
+    # A signal that is ignored, as in a background job of a plain shell, stays ignored.
+    before = {signum: signal.getsignal(signum) for signum in SIGNALS}
+    for signum, handler in before.items():
+        if handler is not signal.SIG_IGN:
+            signal.signal(signum, end)
+    try:
+        yield
+    finally:
+        for signum, handler in before.items():
+            signal.signal(signum, handler)
+
+
 def _report(error: BaseException, program: str, given: list[str]) -> int:
     """Write an error on stderr and return the exit code."""
     from internav_data.records.errors import InternavError
@@ -109,7 +150,8 @@ def _report(error: BaseException, program: str, given: list[str]) -> int:
         error.show()
         return error.exit_code
     if isinstance(error, KeyboardInterrupt | click.Abort):
-        return _say(program, "interrupted", INTERRUPTED)
+        cause = error.__cause__ or error  # click makes its own exception of it
+        return _say(program, "interrupted", 128 + getattr(cause, "signum", signal.SIGINT))
     if isinstance(error, click.ClickException):
         return _say(program, _with_help(error), error.exit_code)
     if isinstance(error, InternavError):

@@ -259,7 +259,10 @@ def _write_folder(folder: Path, checkpoint: Checkpoint) -> None:
         files = {}
         for name, tensors in ((WEIGHTS, checkpoint.weights), (TRAINING, checkpoint.training)):
             copies = {key: value.detach().cpu().contiguous() for key, value in tensors.items()}
-            save_file(copies, temporary / name)
+            try:
+                save_file(copies, temporary / name)
+            except safetensors.SafetensorError as error:  # a full disk, in words alone
+                raise OSError(None, str(error), str(temporary / name)) from error
             # safetensors makes files private: readers of the folder may read them too.
             (temporary / name).chmod(temporary.stat().st_mode & 0o666)
             size = (temporary / name).stat().st_size

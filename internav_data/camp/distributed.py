@@ -101,6 +101,11 @@ def distributed_context(device: torch.device) -> DistributedContext:
     return DistributedContext(device, distributed.get_rank(), size)
 
 
+def is_first_rank() -> bool:
+    """Return whether this process is the only rank or the first, before the ranks have met."""
+    return os.environ.get("RANK", "0") == "0"
+
+
 def device_of(name: str) -> torch.device:
     """Return the device "cpu" or "cuda"; "auto" is a GPU where there is one.
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import json
+import os
+import socket
+import time
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.util import find_spec
@@ -54,25 +58,32 @@ class MetricsLogger:
                 f"{path}: {size} bytes, the checkpoint knows of {position}: put the log back that "
                 "belongs to it"
             )
-        self._file = path.open("ab")
+        self._path = path
+        self._file = path.open("ab", buffering=0)
         self._file.truncate(position)
         self.position = position
-        self._board: Any = None
+        self._board: _TensorBoard | None = None
         if board and find_spec("tensorboard") is not None:
-            from torch.utils.tensorboard import SummaryWriter  # noqa: PLC0415 - seconds
-
             # A resumed run repeats its updates to the last bit, so no step is to be purged.
-            self._board = SummaryWriter(str(run / BOARD))
+            self._board = _TensorBoard(run / BOARD)
 
     def write(self, row: Row) -> None:
-        """Append a row; TensorBoard draws it at its "step"."""
+        """Append a row; TensorBoard draws it at its "step".
+
+        Raises
+        ------
+        OSError
+            The disk is full: the log ends with the last row that is whole.
+        """
         line = (json.dumps(row, allow_nan=False) + "\n").encode()
-        self._file.write(line)
-        self._file.flush()
+        try:
+            write_all(self._file, line)
+        except OSError as error:
+            self._file.truncate(self.position)
+            raise OSError(error.errno, error.strerror, str(self._path)) from error
         self.position += len(line)
         if self._board is not None:
-            for name, value in _scalars(row):
-                self._board.add_scalar(name, value, row["step"])
+            self._board.write(row["step"], _scalars(row))
 
     def __enter__(self) -> Self:
         return self
@@ -82,6 +93,47 @@ class MetricsLogger:
         self._file.close()
         if self._board is not None:
             self._board.close()
+
+
+class _TensorBoard:
+    """Writer of a TensorBoard file.
+
+    torch's SummaryWriter writes in a thread of its own, where a full disk ends in a traceback.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        name = f"events.out.tfevents.{time.time_ns()}.{socket.gethostname()}.{os.getpid()}"
+        self._path = folder / name
+        self._file = self._path.open("xb", buffering=0)
+        self._write(file_version="brain.Event:2")
+
+    def write(self, step: int, scalars: Iterable[tuple[str, float]]) -> None:
+        from tensorboard.compat.proto.summary_pb2 import Summary  # noqa: PLC0415 - optional
+
+        values = [Summary.Value(tag=name, simple_value=value) for name, value in scalars]
+        self._write(step=step, summary=Summary(value=values))
+
+    def _write(self, **fields: Any) -> None:  # noqa: ANN401 - those of an event
+        from tensorboard.compat.proto.event_pb2 import Event  # noqa: PLC0415 - optional
+        from tensorboard.summary.writer.record_writer import RecordWriter  # noqa: PLC0415
+
+        record = io.BytesIO()
+        RecordWriter(record).write(Event(wall_time=time.time(), **fields).SerializeToString())
+        try:
+            write_all(self._file, record.getvalue())
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(self._path)) from error
+
+    def close(self) -> None:
+        self._file.close()
+
+
+def write_all(file: io.FileIO, data: bytes) -> None:
+    """Write all bytes to an unbuffered file, which may take a part at a time."""
+    rest = memoryview(data)
+    while rest:
+        rest = rest[file.write(rest) :]
 
 
 def _scalars(row: Mapping[str, Any]) -> Iterable[tuple[str, float]]:

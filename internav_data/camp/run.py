@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from operator import attrgetter
 from pathlib import Path
@@ -11,12 +12,13 @@ from typing import Any, Final
 
 from internav_data.camp.checkpoint import TrainState, has_checkpoint, read
 from internav_data.camp.config import CampConfig, StagesConfig, from_mapping
+from internav_data.camp.distributed import is_first_rank
 from internav_data.camp.logging import LOG
 from internav_data.camp.stages import PARTS
 from internav_data.camp.train import Request, Trainer
 from internav_data.core.config import config_toml, known_keys, nested, plain
-from internav_data.core.storage import write_atomically
-from internav_data.records.errors import UsageError
+from internav_data.core.storage import lock_folder, write_atomically
+from internav_data.records.errors import InternavError, UsageError
 
 CONFIG: Final = "config.toml"
 """File of a run's resolved settings, for people and for `--config`."""
@@ -26,8 +28,26 @@ CHANGEABLE: Final = (
 )  # fmt: skip
 """Settings that a resumed run may change. More steps go to its last stage."""
 _TOTAL, _EXTRA = "stages.total_timesteps", "stages.extra_timesteps"
+BUSY: Final = "another camp-train trains this run; wait for it to end, or choose another --out"
+"""Reason for which a second process is refused."""
 _MEASURED: Final = 2
 """Updates that a forecast is made of, after one that warms up."""
+
+
+@contextlib.contextmanager
+def _writing(out: Path) -> Iterator[None]:
+    """Hold a run's lock, in the first rank alone, and turn errors of its disk into one line."""
+    if out.exists() and not out.is_dir():
+        raise UsageError(f"{out}: --out: expected a folder, this is a file")
+    try:
+        with lock_folder(out, BUSY) if is_first_rank() else contextlib.nullcontext():
+            yield
+    except OSError as error:
+        whole = "go on by --resume: the last checkpoint is whole"
+        raise InternavError(
+            f"{error.filename or out}: {error.strerror or error}; make room or mend it, then "
+            + (whole if has_checkpoint(out) else "begin again")
+        ) from error
 
 
 def begin(request: Request) -> Trainer:
@@ -37,14 +57,21 @@ def begin(request: Request) -> Trainer:
     ------
     UsageError
         There is a run already, or a setting is out of its bounds.
+    LockedError
+        Another process trains this run.
+    InternavError
+        The disk is full; the last checkpoint is whole.
     """
+    with _writing(request.out):
+        return _begin(request)
+
+
+def _begin(request: Request) -> Trainer:
     out = request.out
     if has_checkpoint(out) or ((out / LOG).exists() and not (out / CONFIG).exists()):
         raise UsageError(
             f"{out}: a run is there already: go on with it by --resume, or choose another --out"
         )
-    if out.exists() and not out.is_dir():
-        raise UsageError(f"{out}: --out: expected a folder, this is a file")
     trainer = Trainer(request, TrainState(request.parts, request.clones))
     _write_config(trainer)
     trainer.fit()
@@ -70,7 +97,16 @@ def resume(request: Request, asked: Mapping[str, Any]) -> Trainer:
         for.
     CorruptDataError
         The checkpoint is damaged.
+    LockedError
+        Another process trains this run.
+    InternavError
+        The disk is full; the last checkpoint is whole.
     """
+    with _writing(request.out):
+        return _resume(request, asked)
+
+
+def _resume(request: Request, asked: Mapping[str, Any]) -> Trainer:
     out, checkpoint = request.out, read(request.out)
     if not checkpoint.training:
         raise UsageError(

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
 
 from internav_data.core.files import open_regular, size_of_regular
+from internav_data.core.holders import lock_holder
 from internav_data.records.errors import InternavError
 
 if TYPE_CHECKING:
@@ -241,7 +242,7 @@ class FolderStore:
         Raises
         ------
         LockedError
-            Another process holds it; `busy` says what to do.
+            Another process holds it; `busy` says what to do, and the process is named.
 
         """
         self.root.mkdir(parents=True, exist_ok=True)
@@ -253,7 +254,9 @@ class FolderStore:
                 deadline = time.monotonic() + _ENDING_S
                 while not try_lock(descriptor):
                     if time.monotonic() > deadline:
-                        raise LockedError(f"{self.root}: {busy}")
+                        holder = lock_holder(descriptor)
+                        named = f" (held by {holder})" if holder else ""
+                        raise LockedError(f"{self.root}: {busy}{named}")
                     time.sleep(_POLL_S)
             yield
         finally:
@@ -281,6 +284,26 @@ def held_locks() -> tuple[int, ...]:
     A child process that inherits them keeps the folders locked for as long as it lives.
     """
     return tuple(_HELD)
+
+
+@contextlib.contextmanager
+def lock_folder(folder: Path, busy: str) -> Iterator[None]:
+    """Hold a folder's lock, see `FolderStore.lock`; new folders that stay empty are removed.
+
+    Raises
+    ------
+    LockedError
+        Another process holds it; `busy` says what to do, and the process is named.
+
+    """
+    new = [each for each in (folder, *folder.parents) if not each.exists()]
+    try:
+        with FolderStore(folder).lock(busy):
+            yield
+    finally:
+        with contextlib.suppress(OSError):  # something was written
+            for each in new:
+                each.rmdir()
 
 
 def write_atomically(path: Path, data: bytes) -> None:

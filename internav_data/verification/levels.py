@@ -100,8 +100,9 @@ def validate(
     CorruptDataError
         The folder holds no finished dataset.
     InternavError
-        Some scenes could not be checked: their worker processes died again and again. Or a
-        generator extended the dataset over and over meanwhile.
+        Some scenes could not be checked: their worker processes died again and again. Or fewer
+        were checked than there are, for no reason that is a finding. Or a generator extended the
+        dataset over and over meanwhile.
 
     """
     _check_arguments(level, sample, workers)
@@ -166,7 +167,36 @@ def _validate_once(
         _check_scenes(path, manifest, damaged, whole, sample, workers, progress_callback, physics)
         if physics is not None and not physics.same_hardware:
             whole.judge_differences("; ".join(manifest.hardware) or "hardware that is not stated")
-    return whole.findings(level)
+    found = whole.findings(level)
+    _account_for(manifest, found, sample, path)
+    return found
+
+
+def _account_for(manifest: Manifest, found: Findings, sample: int | None, path: Path) -> None:
+    """Compare what was checked with what there is: nothing is called valid that nobody looked at.
+
+    Raises
+    ------
+    InternavError
+        No finding says why something was left out.
+
+    """
+    scenes = sum(counts.scenes for counts in manifest.counts.values())
+    episodes = sum(counts.episodes for counts in manifest.counts.values())
+    asked = {"files": len(manifest.files)}
+    if found.level in {"geometry", "physics"}:
+        asked["scenes"] = scenes if sample is None else min(sample, scenes)
+        if sample is None:
+            asked["episodes"] = episodes
+    if found.level == "physics" and not found.notes:
+        asked["replayed"] = asked.get("episodes", found.checked.get("episodes", 0))
+    for name, count in asked.items():
+        checked = found.checked.get(name, 0)
+        if found.ok and checked < count:
+            raise InternavError(
+                f"{path}: {checked} of {count} {name} were checked and nothing says why; run the "
+                "same command again, and report this if it comes back"
+            )
 
 
 def _check_arguments(level: str, sample: int | None, workers: int) -> None:

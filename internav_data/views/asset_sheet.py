@@ -215,16 +215,9 @@ def write_asset_sheet(path: Path, catalogue: Catalogue, types: Sequence[str] | N
 
     Raises
     ------
-    UsageError
+    InternavError
         The file cannot be written.
     """
-    import cv2  # noqa: PLC0415 - seconds, all of these
+    from internav_data.views.sheets import write_png  # noqa: PLC0415 - cv2, which takes seconds
 
-    image = draw_asset_sheet(catalogue, types)
-    good, data = cv2.imencode(".png", image[:, :, ::-1])
-    if not good:
-        raise UsageError(f"{path}: the picture could not be encoded")
-    try:
-        path.write_bytes(data.tobytes())
-    except OSError as error:
-        raise UsageError(f"{path}: cannot be written ({error.strerror}); choose another") from error
+    write_png(path, draw_asset_sheet(catalogue, types))

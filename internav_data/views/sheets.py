@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 
+from internav_data.core.storage import write_atomically
 from internav_data.records.errors import InternavError, UsageError
 from internav_data.views.canvas import Canvas
 
@@ -91,15 +90,6 @@ def write_png(path: Path, image: Image) -> None:
     if not good:
         raise InternavError(f"{path}: a picture of shape {image.shape} cannot be written as PNG")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, part = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        write_atomically(path, data.tobytes())
     except OSError as error:
-        raise InternavError(f"{path}: cannot be written: {error.strerror}") from error
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data.tobytes())
-        Path(part).chmod(0o644)
-        Path(part).replace(path)
-    except OSError as error:
-        Path(part).unlink(missing_ok=True)
         raise InternavError(f"{path}: cannot be written: {error.strerror}") from error

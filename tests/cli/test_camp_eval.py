@@ -1,10 +1,14 @@
 """`camp-eval` from the outside: exit codes, one line for what goes wrong, nothing overwritten."""
 
 import json
+import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
+import psutil
 import pytest
 from internav_cli.camp_eval import main
 from stderr_lines import beside_the_dataset
@@ -52,6 +56,41 @@ def test_nothing_is_overwritten_without_force(call, dataset, tmp_path):
     assert call("shortest_path", dataset, "--split", "val", "--force")[0] == 0
     kept = [p.parent.name for p in (tmp_path / "evaluation-val").glob("*/evaluation.json")]
     assert kept == ["shortest_path"], "what was there before is no part of what is there now"
+
+
+@pytest.mark.parametrize("words", [("evaluate", "random", "DATA"), ("compare", "a")])
+def test_two_commands_in_one_folder_are_refused_and_the_first_is_named(
+    call, dataset, tmp_path, words
+):
+    from internav_data.core.storage import FolderStore
+
+    with FolderStore(tmp_path / "out").lock("busy"):
+        given = [dataset if word == "DATA" else word for word in words]
+        code, _, err = call(*given, "--out", tmp_path / "out")
+    assert code == 1
+    assert f"held by process {os.getpid()} on " in beside_the_dataset(err)[-1]
+    assert call("random", dataset, "--split", "none-such", "--out", tmp_path / "new")[0] == 2
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize(
+    "signum", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)]
+)
+def test_a_signal_to_the_group_ends_it_in_one_line_with_all_its_processes(
+    dataset, tmp_path, signum
+):
+    words = [EVAL, "random", dataset, "--split", "all", "--workers", "2", "--out", tmp_path / "out"]
+    process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    children, deadline = [], time.monotonic() + 300
+    while len(children) < 2 and time.monotonic() < deadline:
+        time.sleep(0.02)
+        children = psutil.Process(process.pid).children()
+    os.killpg(process.pid, signum)
+    _, err = process.communicate(timeout=300)
+    assert process.returncode == 128 + signum, err
+    assert [line for line in beside_the_dataset(err) if line] == ["camp-eval: interrupted"]
+    assert psutil.wait_procs(children, 300)[1] == []
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_same_call_gives_the_same_files(call, dataset, tmp_path):

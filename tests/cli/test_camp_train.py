@@ -8,6 +8,7 @@ import sys
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 from stderr_lines import beside_the_dataset
 
@@ -131,25 +132,39 @@ def test_a_resumed_run_may_be_given_more_steps_and_other_workers(call, dataset, 
         assert (code, "was finished already" in err) == (0, True)
 
 
-def test_ctrl_c_saves_and_a_second_one_leaves_the_last_checkpoint(dataset, tmp_path):
+def started(run, dataset, *more):
+    """A run in two processes more, in a group of its own, that has made some updates."""
+    words = [TRAIN, dataset, *TINY, "--out", run, "--steps", 320_000, "--workers", 2, *more]
+    process = subprocess.Popen(
+        [str(word) for word in words], stderr=subprocess.PIPE, text=True,
+        env=os.environ | {"OMP_NUM_THREADS": "1"}, start_new_session=True,
+    )  # fmt: skip
+    lines = _rows(run)
+    deadline = time.monotonic() + 300
+    while _rows(run) < lines + 2 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    return process, psutil.Process(process.pid).children()
+
+
+@pytest.mark.parametrize(
+    "signum", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.slow)]
+)
+def test_a_signal_to_the_group_saves_and_a_second_one_leaves_the_last_checkpoint(
+    dataset, tmp_path, signum
+):
     run = tmp_path / "run"
-    words = [TRAIN, dataset, *TINY, "--out", run, "--steps", 320_000]
-    environment = os.environ | {"OMP_NUM_THREADS": "1"}
     for signals, extra in ((1, []), (2, ["--resume"])):
-        process = subprocess.Popen(
-            [str(word) for word in [*words, *extra]], stderr=subprocess.PIPE, text=True,
-            env=environment,
-        )  # fmt: skip
-        lines = _rows(run)
-        deadline = time.monotonic() + 300
-        while _rows(run) < lines + 2 and time.monotonic() < deadline:
-            time.sleep(0.05)
+        process, children = started(run, dataset, *extra)
+        assert len(children) == 2
         for _ in range(signals):
-            process.send_signal(signal.SIGINT)
+            os.killpg(process.pid, signum)
         _, err = process.communicate(timeout=300)
-        assert process.returncode == 130, err
+        assert process.returncode == 128 + signum, err
+        assert psutil.wait_procs(children, 300)[1] == []
         if signals == 1:
-            assert "--resume" in err
+            assert [line.partition(": ")[2] for line in beside_the_dataset(err)] == [
+                f"{run}: saved; go on with --resume"
+            ]
     done = subprocess.run(
         [str(word) for word in [TRAIN, dataset, "--out", run, "--resume", "--dry-run"]],
         check=False, capture_output=True, text=True,
@@ -158,6 +173,33 @@ def test_ctrl_c_saves_and_a_second_one_leaves_the_last_checkpoint(dataset, tmp_p
     from internav_data.camp.checkpoint import read
 
     assert read(run).progress["environment_steps"] >= 32
+
+
+def test_an_environments_process_that_is_killed_ends_the_run_in_one_line(dataset, tmp_path):
+    process, children = started(tmp_path / "run", dataset)
+    children[-1].kill()
+    _, err = process.communicate(timeout=300)
+    assert process.returncode == 1
+    (line,) = beside_the_dataset(err)
+    assert "of 2 was killed by SIGKILL; the system may be short of memory" in line
+    assert psutil.wait_procs(children, 300)[1] == []
+
+
+@pytest.mark.parametrize("more", [(), ("--resume",)])
+def test_two_runs_in_one_folder_are_refused_and_the_first_is_named(call, dataset, tmp_path, more):
+    from internav_data.core.storage import FolderStore
+
+    run = tmp_path / "run"
+    with FolderStore(run).lock("busy"):
+        code, _, err = call(dataset, *TINY, "--out", run, *more)
+    assert code == 1
+    (line,) = beside_the_dataset(err)
+    assert "another camp-train trains this run; wait for it to end" in line
+    assert f"held by process {os.getpid()} on " in line
+    assert list(run.iterdir()) == []
+    code, _, err = call(dataset, *TINY, "--out", tmp_path / "new", "--filter", "room_count=9")
+    assert code == 2
+    assert not (tmp_path / "new").exists(), "nothing came of it, and nothing is left"
 
 
 def _rows(run):

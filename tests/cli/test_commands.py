@@ -278,11 +278,11 @@ def test_a_fresh_house_is_drawn_without_its_episodes(tmp_path):
 def test_a_signal_ends_in_order_and_finished_scenes_stay(tmp_path, signum, code):
     words = ("--scenes", 500, "--episodes-per-scene", 2, "--rooms", 1, "--workers", 1)
     command = [GEN, "generate", "--out", tmp_path / "d", *map(str, words)]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
     deadline = time.monotonic() + 300
     while not list(tmp_path.rglob("scene-*.work")) and time.monotonic() < deadline:
         time.sleep(0.05)
-    process.send_signal(signum)
+    os.killpg(process.pid, signum)  # as a terminal does it
     _, result = process.communicate(timeout=300)
     assert process.returncode == code
     assert len(beside_the_dataset(result)) == 1, result

@@ -5,7 +5,7 @@ import pytest
 from builders import asset, box
 
 from internav_data.catalog import OBSTACLES, catalogue
-from internav_data.records.errors import UsageError
+from internav_data.records.errors import InternavError, UsageError
 from internav_data.views.asset_sheet import draw_asset_sheet, draw_assets, write_asset_sheet
 
 
@@ -91,5 +91,5 @@ def test_sheet(tmp_path):
     assert cv2.imread(str(path)) is not None
     with pytest.raises(UsageError, match="Chiar"):
         draw_asset_sheet(catalogue(), ["Chiar"])
-    with pytest.raises(UsageError, match="cannot be written"):
-        write_asset_sheet(tmp_path / "missing" / "x.png", catalogue(), ["Stool"])
+    with pytest.raises(InternavError, match="cannot be written"):
+        write_asset_sheet(path / "x.png", catalogue(), ["Stool"])
