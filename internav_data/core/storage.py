@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
 
 from internav_data.core.files import open_regular, size_of_regular
 from internav_data.core.holders import lock_holder
-from internav_data.records.errors import InternavError
+from internav_data.records.errors import InternavError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -39,8 +39,8 @@ class LockedError(InternavError):
     """Another process holds the lock of the store."""
 
 
-class OutsideError(OSError):
-    """A link leads out of the store."""
+class OutsideError(UsageError):
+    """A folder of the store is a link out of it: nothing is written or removed through it."""
 
 
 @runtime_checkable
@@ -62,8 +62,6 @@ class Store(Protocol):
         ------
         FileNotFoundError
             There is no such blob.
-        OutsideError
-            It is a link out of the store.
 
         """
         ...
@@ -163,7 +161,7 @@ class FolderStore:
         return str(self.root / name)
 
     def size(self, name: str) -> int:
-        """Return the number of bytes of a file inside the folder.
+        """Return the number of bytes of a file, or of the one that a link leads to.
 
         Raises
         ------
@@ -171,15 +169,9 @@ class FolderStore:
             There is no such file.
         OSError
             It is a folder, pipe, socket or device.
-        OutsideError
-            It is a link out of the folder.
 
         """
-        path = self.root / name
-        size = size_of_regular(path)
-        if not path.resolve().is_relative_to(self.root.resolve()):
-            raise OutsideError(f"{path}: a link out of {self.root}")
-        return size
+        return size_of_regular(self.root / name)
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> bytes:
         """Return the bytes start … stop - 1 of a file; fewer where it ends earlier."""
@@ -194,13 +186,17 @@ class FolderStore:
     def put(self, name: str, data: bytes, *, beside: str = "") -> None:
         """Write a file durably: readers see the old one or the new one, never a part.
 
+        It takes the place of a link, whose target stays as it is.
+
         Raises
         ------
         FileNotFoundError
             There is no file `beside`.
+        OutsideError
+            Its folder is a link out of this one.
 
         """
-        path = self.root / name
+        path = self._inside(self.root / name)
         if beside:
             self.size(beside)
             _make_folders(path.parent, (self.root / beside).parent)
@@ -224,14 +220,38 @@ class FolderStore:
         return sorted(path.relative_to(self.root).as_posix() for path in files)
 
     def remove(self, name: str) -> None:
-        """Remove a file; nothing if there is none."""
-        (self.root / name).unlink(missing_ok=True)
+        """Remove a file or a link; nothing if there is none.
+
+        Raises
+        ------
+        OutsideError
+            Its folder is a link out of this one.
+
+        """
+        self._inside(self.root / name).unlink(missing_ok=True)
 
     def prune(self, prefix: str) -> None:
-        """Remove the folders below a prefix that hold nothing."""
-        for folder, _, _ in os.walk(self.root / prefix, topdown=False):
+        """Remove the folders below a prefix that hold nothing; links are not followed.
+
+        Raises
+        ------
+        OutsideError
+            The prefix is a link out of this folder.
+
+        """
+        for folder, _, _ in os.walk(self._inside(self.root / prefix / "any").parent, topdown=False):
             with contextlib.suppress(OSError):  # it holds something
                 Path(folder).rmdir()
+
+    def _inside(self, path: Path) -> Path:
+        """Return a path whose folder lies in the store."""
+        folder = Path(os.path.realpath(path.parent))
+        if not folder.is_relative_to(os.path.realpath(self.root)):
+            raise OutsideError(
+                f"{path.parent}: leads out of {self.root} by a link, and nothing is written or "
+                "removed there: put the folder itself in the link's place"
+            )
+        return path
 
     @contextlib.contextmanager
     def lock(self, busy: str) -> Iterator[None]:

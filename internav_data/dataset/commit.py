@@ -57,6 +57,9 @@ if TYPE_CHECKING:
     from internav_data.dataset.staging import SceneState
     from internav_data.records import Asset
 
+_FOLDERS = frozenset({".work", ".work/scenes", "data", "data/episodes", "data/scenes", "schemas"})
+"""Folders that a commit writes into."""
+
 
 Retry = Literal["none", "died", "all"]
 """Quarantined scenes that are tried again: none, those whose processes died, or all."""
@@ -92,7 +95,8 @@ def open_staging(
     Raises
     ------
     UsageError
-        `out` is a file, holds something that is no dataset, or another configuration's dataset.
+        `out` is a file, holds something that is no dataset, another configuration's dataset, or a
+        link to a folder that a commit would write into.
 
     """
     store = store_of(out)
@@ -103,6 +107,11 @@ def open_staging(
         raise UsageError(
             f"{place}: is a file: give a folder that is new, empty or a dataset"
         ) from None
+    for folder in sorted(_FOLDERS.intersection(names)):
+        raise UsageError(
+            f"{store.at(folder)}: is a link or a file, and nothing is written through it: put the "
+            "folder itself in its place, or generate into another folder"
+        )
     if has_manifest(store):
         _same(place, identity_of(read_manifest(store)), identity, defaults or {})
     if exists(store, IDENTITY):

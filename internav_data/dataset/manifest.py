@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from internav_data.core.config import MAX_SEED
 from internav_data.core.files import FileLimits, parse_json
-from internav_data.core.storage import OutsideError, Store, StoreLike, exists, store_of
+from internav_data.core.storage import Store, StoreLike, exists, store_of
 from internav_data.dataset.consistency import inconsistencies
 from internav_data.dataset.location import making_command
 from internav_data.dataset.parquet import TableFile, footer_sha256, open_parquet
@@ -380,7 +380,7 @@ def locate(root: Path, file: DataFile) -> Path:
     Raises
     ------
     CorruptDataError
-        Missing, of another size, or a link out of the dataset.
+        Missing or of another size.
 
     """
     check_file(root, file)
@@ -393,17 +393,13 @@ def check_file(root: StoreLike, file: DataFile) -> None:
     Raises
     ------
     CorruptDataError
-        Missing, of another size, or a link out of the dataset.
+        Missing or of another size.
 
     """
     store = store_of(root)
     path = store.at(file.path)
     try:
         size = store.size(file.path)
-    except OutsideError:
-        raise CorruptDataError(
-            f"{path}: a link out of the dataset: put the file itself there"
-        ) from None
     except OSError as error:
         raise CorruptDataError(
             f"{path}: the file is missing ({error.strerror}): {_AGAIN}"

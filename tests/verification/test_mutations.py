@@ -113,11 +113,20 @@ def test_unlisted_file(dataset):
     assert findings.found[0].file == "data/episodes/extra.parquet"
 
 
-def test_link_out_of_the_dataset(dataset, tmp_path):
+def test_links_are_followed(dataset, tmp_path):
     path = shard(dataset)
     path.rename(tmp_path / "elsewhere.parquet")
     path.symlink_to(tmp_path / "elsewhere.parquet")
-    assert "files.inside" in predicates(validate(dataset))
+    (dataset / "data").rename(tmp_path / "data")
+    (dataset / "data").symlink_to(tmp_path / "data")
+    (tmp_path / "data" / "scenes").rename(tmp_path / "scenes")
+    (tmp_path / "data" / "scenes").symlink_to(tmp_path / "scenes")
+    assert validate(dataset).ok
+    (tmp_path / "scenes" / "extra.parquet").write_bytes(b"PAR1")
+    (tmp_path / "data" / "round").symlink_to(tmp_path / "data")
+    findings = validate(dataset)
+    assert predicates(findings) == {"files.unlisted"}
+    assert {f.file for f in findings.found} == {"data/round", "data/scenes/extra.parquet"}
 
 
 @pytest.mark.parametrize(
