@@ -83,7 +83,8 @@ def open_shard(store: Store, file: DataFile, spec: TableSpec[Any]) -> TableFile:
             return opened
         break
     raise CorruptDataError(
-        f"{store.at(file.path)}: the dataset was replaced by another one meanwhile: load it again"
+        f"{store.at(file.path)}: other rows have taken its place (the dataset was made anew, or "
+        "scenes were tried again): load it again"
     )
 
 
