@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from internav_cli.streams import prepare_streams
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from types import FrameType
@@ -55,6 +57,7 @@ class LazyGroup(click.Group):
             return None
         module = importlib.import_module(f"internav_cli.{cmd_name}")
         command: click.Command = module.command
+        command.help = command.help or COMMANDS[cmd_name]  # python -OO removes docstrings
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
@@ -98,6 +101,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 def launch(command: click.Command, program: str, arguments: list[str] | None = None) -> None:
     """Run a command line and exit with its code; every error becomes one line."""
+    prepare_streams()
     given = sys.argv[1:] if arguments is None else arguments
     debug = bool(given) and given[0] == "--debug"
     # A warning is a line for the user, not a place in the source.

@@ -23,13 +23,24 @@ def descriptions(cls: type[Any]) -> Mapping[str, str]:
     return _KNOWN[cls]
 
 
-def _read(cls: type[Any]) -> dict[str, str]:
+def class_description(cls: type[Any]) -> str:
+    """Return a class's docstring, under `python -OO` too; empty where there is no source."""
+    found = _definition(cls)
+    return "" if found is None else ast.get_docstring(found) or ""
+
+
+def _definition(cls: type[Any]) -> ast.ClassDef | None:
     try:
         tree = ast.parse(inspect.cleandoc(inspect.getsource(cls)))
     except (OSError, TypeError):
-        return {}
+        return None
+    return tree.body[0] if isinstance(tree.body[0], ast.ClassDef) else None
+
+
+def _read(cls: type[Any]) -> dict[str, str]:
+    found = _definition(cls)
     notes = {}
-    body = tree.body[0].body if isinstance(tree.body[0], ast.ClassDef) else []
+    body = [] if found is None else found.body
     for field, after in pairwise(body):
         if (
             isinstance(field, ast.AnnAssign)

@@ -6,12 +6,11 @@ colours are objects. Descriptions are the docstrings that stand below the datacl
 
 from __future__ import annotations
 
-import inspect
 import json
 from pathlib import Path
 from typing import Any
 
-from internav_data.core.field_docs import descriptions
+from internav_data.core.field_docs import class_description, descriptions
 from internav_data.core.storage import StoreLike, store_of
 from internav_data.dataset.manifest import Manifest
 from internav_data.dataset.nodes import (
@@ -69,7 +68,7 @@ def _document(name: str, cls: type[Any], *, bounded: bool) -> dict[str, Any]:
 def _record(node: Record, *, bounded: bool) -> dict[str, Any]:
     notes = descriptions(node.cls)
     return {
-        "description": inspect.cleandoc(node.cls.__doc__ or ""),
+        "description": class_description(node.cls),
         "type": "object",
         "properties": {
             field.name: _field(field, notes.get(field.name), bounded=bounded)

@@ -11,6 +11,7 @@ from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any, Final
 
 from internav_data.core.files import open_regular
+from internav_data.core.markdown import escaped, table_row
 from internav_data.core.storage import write_atomically
 from internav_data.evaluation.metrics import GROUPS, MEASURES
 from internav_data.evaluation.statements import as_json as differences_json
@@ -152,8 +153,8 @@ def text_of(methods: Methods) -> str:
     if rows:
         lines = [headings, ["---"] * len(headings), *rows]
         parts += ["### What each was given\n"]
-        parts += ["\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"]
-    statements = "\n".join(f"- {line}" for line in sentences(methods))
+        parts += ["\n".join(map(table_row, lines)) + "\n"]
+    statements = "\n".join(f"- {escaped(line)}" for line in sentences(methods))
     return "\n".join([*parts, "### What this can tell\n", statements, ""])
 
 

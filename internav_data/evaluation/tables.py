@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
+from internav_data.core.markdown import table_row
 from internav_data.evaluation.metrics import GROUPS, MEASURES
 from internav_data.evaluation.statistics import Interval, seed_interval
 
@@ -235,13 +236,9 @@ def _notes(
 def markdown(table: Table) -> str:
     """Return a table as Markdown, its notes below."""
     headings = ["", *table.headings()]
-    lines = [f"### {table.title}", "", _line(headings), _line(["---"] * len(headings))]
-    lines += [_line([row.name, *(each.text for each in row.cells)]) for row in table.rows]
+    lines = [f"### {table.title}", "", table_row(headings), table_row(["---"] * len(headings))]
+    lines += [table_row([row.name, *(each.text for each in row.cells)]) for row in table.rows]
     return "\n".join([*lines, "", *(f"{note}  " for note in table.notes), ""])
-
-
-def _line(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cells).replace("\n", " ") + " |"
 
 
 def as_json(table: Table) -> dict[str, Any]:
