@@ -26,7 +26,7 @@ MAX_CRASHES = 3
 """Crashes of its workers after which a task is given up."""
 MAX_FALSE_STARTS = 3
 """Workers that die in a row before they are ready, after which none can start."""
-FINISH_S = 1.0
+FINISH_S = 0.5
 """Seconds that workers have to finish their tasks after an interruption, which a user waits for."""
 TICK_S = 0.25
 """Longest time between two calls of `tick`, seconds."""

@@ -7,7 +7,7 @@ import json
 import os
 import random
 import signal
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import pytest
 from scene_stubs import CATALOGUE, stub
@@ -204,6 +204,24 @@ def test_all_quarantined_scenes_are_tried_again_on_demand(tmp_path, in_one_go):
     assert made(out, again, retry=True).exit_code == 0
     assert sorted(again.begun) == [2, 5, 23]
     assert contents(out) == in_one_go()
+
+
+def test_the_command_hands_the_option_on(monkeypatch, tmp_path):
+    from click.testing import CliRunner
+    from internav_cli.generate import command
+
+    report = made(tmp_path / "d", scenes=2)
+    asked = []
+
+    def generate(*_, retry_quarantined, **__):
+        asked.append(retry_quarantined)
+        return replace(report, died=3)
+
+    monkeypatch.setattr("internav_data.generation.generate", generate)
+    for options in ([], ["--retry-quarantined"]):
+        result = CliRunner().invoke(command, ["--out", str(tmp_path / "d"), *options])
+        assert "the workers of 3 quarantined scenes died" in result.output
+    assert asked == [False, True]
 
 
 def test_a_scene_that_fails_by_itself_is_not_tried_again(tmp_path):
