@@ -55,10 +55,10 @@ _MOVER: Final = struct.Struct("<7d8dI")
 
 SAMPLE: Final = 1000
 """One of so many keys has its solution compared with a new one whenever it is read from disk."""
-_LONE_BYTES: Final = 48 << 20
-"""Memory for solutions of one object, about 10,000 pushes, in each process."""
-_CROWDED_BYTES: Final = 48 << 20
-"""Memory for solutions of several objects, about 4,000 pushes, in each process."""
+_LONE_BYTES: Final = 32 << 20
+"""Memory for solutions of one object, about 6,000 pushes; the others are on disk."""
+_CROWDED_BYTES: Final = 32 << 20
+"""Memory for solutions of several objects, about 3,000 pushes, in each process."""
 _OBJECT_BYTES: Final = 2048
 """Memory of a solution and its key besides the paths, for a body that moves."""
 
