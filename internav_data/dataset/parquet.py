@@ -37,6 +37,12 @@ A random record costs reading its group; a group costs its overhead.
 _ZSTD_LEVEL = 3
 _TAIL = 8  # bytes: the footer's length and the letters PAR1
 
+MAX_FOOTER_BYTES = 64 << 20
+"""Size of a footer; one of 1,000 row groups takes 10 MB."""
+MAX_GROUP_BYTES = 2 << 30
+"""Size of a row group when it is decompressed."""
+MAX_VALUES = 1 << 28
+"""Rows times columns of a row group."""
 MENDING = "fetch the file again from where it came, or generate the dataset anew"
 
 
@@ -138,9 +144,26 @@ def footer_sha256(store: Store, name: str, size: int) -> str:
     """
     tail = store.read(name, max(0, size - _TAIL))
     length = int.from_bytes(tail[:4], "little") + _TAIL
-    if tail[4:] != b"PAR1" or length > size:
+    if tail[4:] != b"PAR1" or length > min(size, MAX_FOOTER_BYTES):
         raise damaged(store.at(name), ValueError("it does not end like a Parquet file"))
     return hashlib.sha256(store.read(name, size - length)).hexdigest()
+
+
+def _check_sizes(footer: pq.FileMetaData) -> None:
+    """Check what row groups state to take in memory, as a few bytes may state any number of rows.
+
+    Raises
+    ------
+    ValueError
+        One is too large to be of a dataset.
+
+    """
+    for k in range(footer.num_row_groups):
+        group = footer.row_group(k)
+        if group.num_rows * footer.num_columns > MAX_VALUES:
+            raise ValueError(f"row group {k} states {group.num_rows} rows")
+        if group.total_byte_size > MAX_GROUP_BYTES:
+            raise ValueError(f"row group {k} states {group.total_byte_size} bytes")
 
 
 class TableFile:
@@ -172,6 +195,7 @@ class TableFile:
         )
         try:
             self._file = pq.ParquetFile(self._source, page_checksum_verification=True)
+            _check_sizes(self._file.metadata)
             self.schema: pa.Schema = self._file.schema_arrow
             self._checksums: ChunkChecksums | None = checksums_of(self._file.metadata)
         except BaseException:

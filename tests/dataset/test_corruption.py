@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from strategies import rng
 
-from internav_data.dataset import load_dataset, read_manifest
+from internav_data.dataset import load_dataset, parquet, read_manifest
 from internav_data.records.errors import CorruptDataError
 
 
@@ -72,4 +72,11 @@ def test_another_file_of_the_same_size_is_noticed(damaged_folder):
     file = read_manifest(damaged_folder).of("episodes")[0]
     (damaged_folder / file.path).write_bytes(b"\0" * file.bytes)
     with pytest.raises(CorruptDataError, match=file.path):
+        load_dataset(damaged_folder)[0]
+
+
+@pytest.mark.parametrize("limit", ["MAX_VALUES", "MAX_GROUP_BYTES", "MAX_FOOTER_BYTES"])
+def test_row_groups_that_state_too_much_are_not_read(damaged_folder, monkeypatch, limit):
+    monkeypatch.setattr(parquet, limit, 100)
+    with pytest.raises(CorruptDataError, match=r"states \d+ (rows|bytes)|end like a Parquet file"):
         load_dataset(damaged_folder)[0]
