@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from internav_data.dataset.manifest import MANIFEST, manifest_sha256
+from internav_data.core.files import with_sha256
+from internav_data.dataset.manifest import MANIFEST
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,4 +18,4 @@ def edit_manifest(folder: Path, change: Callable[[dict[str, Any]], object]) -> N
     path = folder / MANIFEST
     raw = json.loads(path.read_text())
     change(raw)
-    path.write_text(json.dumps(raw | {"sha256": manifest_sha256(raw)}))
+    path.write_text(json.dumps(with_sha256(raw)))

@@ -2,7 +2,7 @@
 
 Nothing is unpickled. A checkpoint is a folder: `weights.safetensors` (the agent's, enough to
 act), `training.safetensors` (the optimiser's moments, hidden states, random numbers) and
-`checkpoint.json`, which has the sizes and digests of both. A run keeps its last checkpoint and its
+`checkpoint.json`, which has the sizes and digests of both, and its own. A run keeps its last checkpoint and its
 best; `checkpoints.json` names them, and takes a new one in only when it is on the disk. It notes
 as `leftovers` what a kill would leave behind; no other folder is ever removed.
 
@@ -34,7 +34,14 @@ from internav_data.camp.agents.protocol import Agent, State
 from internav_data.camp.config import CampConfig, from_mapping, preset
 from internav_data.camp.stages import check_parts
 from internav_data.core import config as values
-from internav_data.core.files import FileLimits, open_regular, read_json, size_of_regular
+from internav_data.core.files import (
+    FileLimits,
+    check_sha256,
+    open_regular,
+    read_json,
+    size_of_regular,
+    with_sha256,
+)
 from internav_data.core.storage import (
     file_sha256,
     final_of,
@@ -60,6 +67,11 @@ _FILE: Final = FileLimits(
     remedy="copy the checkpoint again", max_bytes=256_000_000, max_values=50_000_000
 )
 """Limits of the JSON files; the actions of 65,536 environments stay below."""
+_BEFORE_DIGESTS: Final = (
+    *("format", "method", "config", "progress", "files", "versions"),
+    *("serial", "last", "best", "best_score", "leftovers"),
+)
+"""Keys of checkpoints and of lists of them that may lack their digest."""
 _MAX_TENSOR_BYTES: Final = 16_000_000_000
 _MAX_HEADER_BYTES: Final = 10_000_000
 """Size of a safetensors file's list of tensors, which is read into memory."""
@@ -137,7 +149,8 @@ def _is_ours(name: object) -> bool:
 
 
 def _write_pointer(run: Path, pointer: Mapping[str, Any]) -> None:
-    write_atomically(run / POINTER, (json.dumps(pointer, indent=1) + "\n").encode())
+    text = json.dumps(with_sha256(pointer), indent=1)
+    write_atomically(run / POINTER, (text + "\n").encode())
 
 
 def best_score(run: Path) -> float | None:
@@ -200,6 +213,7 @@ def read(path: Path, which: str = "last", *, training: bool = True) -> Checkpoin
             f"{folder / ABOUT}: format {about.get('format')!r}: this release reads {FORMAT}; "
             "read it with the release that wrote it"
         )
+    check_sha256(about, folder / ABOUT, _FILE, _BEFORE_DIGESTS)
     method, files, progress = (about.get(name) for name in ("method", "files", "progress"))
     if not isinstance(method, str) or not isinstance(files, dict) or not isinstance(progress, dict):
         raise CorruptDataError(f"{folder / ABOUT}: expected a method, files and progress")
@@ -279,7 +293,7 @@ def _write_folder(folder: Path, checkpoint: Checkpoint) -> None:
                 **{name: version(name) for name in ("internav-data", "torch", "numpy")},
             },
         }
-        text = json.dumps(about, indent=1, allow_nan=False)
+        text = json.dumps(with_sha256(about), indent=1)
         write_atomically(temporary / ABOUT, (text + "\n").encode())
 
     write_folder_atomically(folder, fill)
@@ -287,7 +301,11 @@ def _write_folder(folder: Path, checkpoint: Checkpoint) -> None:
 
 def _pointer(run: Path) -> dict[str, Any]:
     path = run / POINTER
-    return _json(path) if path.is_file() else {}
+    if not path.is_file():
+        return {}
+    pointer = _json(path)
+    check_sha256(pointer, path, _FILE, _BEFORE_DIGESTS)
+    return pointer
 
 
 def _json(path: Path) -> dict[str, Any]:

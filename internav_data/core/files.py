@@ -9,6 +9,7 @@ memory is taken or arithmetic is done with them.
 from __future__ import annotations
 
 import errno
+import hashlib
 import json
 import math
 import os
@@ -23,8 +24,11 @@ from typing import TYPE_CHECKING, Any, Final
 from internav_data.records.errors import CorruptDataError, InternavError
 
 if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping
     from typing import BinaryIO
 
+DIGEST: Final = "sha256"
+"""Key of a JSON file's digest of itself."""
 _BLOCK: Final = 1 << 20
 _SHOWN: Final = 40
 """Characters of a refused value that its error shows."""
@@ -236,6 +240,55 @@ def parse_toml(data: bytes, place: object, limits: FileLimits) -> dict[str, Any]
     except _RefusedError as error:
         raise limits.refusal(place, error.text) from None
     return value
+
+
+def json_sha256(values: Mapping[str, Any]) -> str:
+    """Return the digest of the keys and values of a JSON file, its own key `sha256` left out.
+
+    It is the SHA-256 of them as JSON in ASCII, keys sorted, without spaces: damage to any letter
+    changes it, another indentation does not.
+    """
+    others = {key: value for key, value in values.items() if key != DIGEST}
+    text = json.dumps(others, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def with_sha256(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of a JSON file as it is to be written, with their digest."""
+    plain: dict[str, Any] = json.loads(json.dumps(values, allow_nan=False))
+    return plain | {DIGEST: json_sha256(plain)}
+
+
+def check_sha256(
+    values: Mapping[str, Any], place: object, limits: FileLimits, before: Collection[str]
+) -> None:
+    """Compare a JSON file's values with their digest.
+
+    Parameters
+    ----------
+    values
+        Values that were read.
+    place
+        Path of the file, for errors.
+    limits
+        The kind of error.
+    before
+        Keys of files that were written before there were digests: a file without one has no
+        others. Damage to the digest's own name must not make it pass for such a file.
+
+    Raises
+    ------
+    InternavError
+        Of the kind that the limits name.
+
+    """
+    if DIGEST in values:
+        if values[DIGEST] != json_sha256(values):
+            problem = f"its {DIGEST} is that of other content"
+            raise limits.refusal(place, f"damaged or edited ({problem})")
+    elif later := sorted(values.keys() - set(before)):
+        problem = f"it has a key {later[0]!r} but no {DIGEST}, which every release writes that knows"
+        raise limits.refusal(place, f"damaged or edited ({problem} such a key)")
 
 
 class _RefusedError(Exception):

@@ -16,7 +16,7 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from internav_data.core.config import MAX_SEED
-from internav_data.core.files import FileLimits, parse_json
+from internav_data.core.files import FileLimits, check_sha256, json_sha256, parse_json
 from internav_data.core.storage import Store, StoreLike, exists, store_of
 from internav_data.dataset.consistency import inconsistencies
 from internav_data.dataset.location import making_command
@@ -38,7 +38,6 @@ _MAX_FILES = 100_000
 _MAX_FILE_BYTES = 1 << 40
 _MAX_ROWS = 1 << 40
 _AGAIN = "restore it from where the dataset came, or generate the dataset anew"
-_DIGEST = "sha256"
 _KEYS_WITHOUT_DIGEST = frozenset(
     (
         *("format_version", "generator", "generator_version", "seed", "catalogue_version"),
@@ -152,17 +151,6 @@ class Manifest:
         return json.dumps(dataclasses.asdict(self), indent=1, ensure_ascii=False) + "\n"
 
 
-def manifest_sha256(raw: Mapping[str, Any]) -> str:
-    """Return the digest of a manifest's keys and values, its own key `sha256` left out.
-
-    It is the SHA-256 of them as JSON in ASCII, keys sorted, without spaces: damage to any letter
-    changes it, another indentation does not.
-    """
-    others = {key: value for key, value in raw.items() if key != _DIGEST}
-    text = json.dumps(others, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
 def write_manifest(root: StoreLike, manifest: Manifest) -> Manifest:
     """Put a manifest in place and return it with its digest: from then on readers see its dataset.
 
@@ -174,7 +162,7 @@ def write_manifest(root: StoreLike, manifest: Manifest) -> Manifest:
     """
     store = store_of(root)
     _check_consistency(store.at(MANIFEST), manifest)
-    digest = manifest_sha256(dataclasses.asdict(manifest))
+    digest = json_sha256(dataclasses.asdict(manifest))
     whole = dataclasses.replace(manifest, sha256=digest)
     store.put(MANIFEST, whole.to_json().encode())
     return whole
@@ -217,7 +205,7 @@ def read_manifest_and_digest(root: StoreLike) -> tuple[Manifest, str]:
         raise CorruptDataError(f"{path}: cannot be read: {error.strerror}: {_AGAIN}") from error
     raw = parse_json(content, path, MANIFEST_LIMITS)
     _check_version(path, raw)
-    _check_digest(path, raw)
+    check_sha256(raw, path, MANIFEST_LIMITS, _KEYS_WITHOUT_DIGEST)
     manifest = _parse(path, raw)
     if len(manifest.files) > _MAX_FILES:
         raise CorruptDataError(f"{path}: names more than {_MAX_FILES} files: {_AGAIN}")
@@ -255,20 +243,6 @@ def _check_version(path: str, raw: Any) -> None:  # noqa: ANN401 - JSON
         raise CorruptDataError(
             f"{path}: written in format version {version}, this release reads up to "
             f"{FORMAT_VERSION}: upgrade with `pip install --upgrade internav-data`"
-        )
-
-
-def _check_digest(path: str, raw: dict[str, Any]) -> None:
-    if _DIGEST in raw:
-        if raw[_DIGEST] != manifest_sha256(raw):
-            raise CorruptDataError(
-                f"{path}: damaged or edited (its {_DIGEST} is that of another manifest): {_AGAIN}"
-            )
-    # Damage to the digest's own name must not make a manifest pass for one of before digests.
-    elif later := sorted(raw.keys() - _KEYS_WITHOUT_DIGEST):
-        raise CorruptDataError(
-            f"{path}: damaged or edited (it has a key {later[0]!r} but no {_DIGEST}, which every "
-            f"release writes that knows such a key): {_AGAIN}"
         )
 
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Final, get_args, get_type_hints
 
-from internav_data.core.files import FileLimits, read_json
+from internav_data.core.files import FileLimits, check_sha256, read_json, with_sha256
 from internav_data.core.storage import write_atomically
-from internav_data.dataset import from_table, write_parquet
+from internav_data.dataset import from_table, logical_digest, write_parquet
 from internav_data.dataset.parquet import open_parquet
 from internav_data.evaluation.metrics import RESULTS, EpisodeResult
 from internav_data.records.errors import CorruptDataError, InternavError, UsageError
@@ -87,7 +87,7 @@ def write_evaluation(folder: Path, about: About, results: Sequence[EpisodeResult
     info = write_parquet(folder / EPISODES, ordered, RESULTS)
     values = {"format": FORMAT, **asdict(about), "episodes": info.rows}
     values["logical_digest"] = info.logical_digest
-    write_atomically(folder / ABOUT, (json.dumps(values, indent=2) + "\n").encode())
+    write_atomically(folder / ABOUT, (json.dumps(with_sha256(values), indent=2) + "\n").encode())
 
 
 def read_evaluation(folder: Path) -> Evaluation:
@@ -99,7 +99,7 @@ def read_evaluation(folder: Path) -> Evaluation:
         A file is missing, damaged, or of another version.
     """
     path = Path(folder) / ABOUT
-    about, episodes = _about(path)
+    about, episodes, digest = _about(path)
     table_path = Path(folder) / EPISODES
     with open_parquet(table_path, RESULTS) as opened:
         rows = opened.metadata.num_rows
@@ -108,7 +108,12 @@ def read_evaluation(folder: Path) -> Evaluation:
                 f"{table_path}: expected {episodes} rows as {ABOUT} says (at most "
                 f"{_MAX_ROWS}), got {rows}; evaluate again"
             )
-        results = tuple(from_table(opened.read_all(), RESULTS))
+        table = opened.read_all()
+    if digest is not None and digest != logical_digest(table):
+        raise CorruptDataError(
+            f"{table_path}: holds other results than {ABOUT} was written with; evaluate again"
+        )
+    results = tuple(from_table(table, RESULTS))
     if len({result.episode_id for result in results}) != len(results):
         raise CorruptDataError(f"{table_path}: an episode is there twice; evaluate again")
     return Evaluation(about, results)
@@ -149,20 +154,27 @@ def find_evaluations(path: Path) -> list[Path]:
     return found
 
 
-def _about(path: Path) -> tuple[About, int]:
+def _about(path: Path) -> tuple[About, int, str | None]:
+    """Return what `evaluation.json` says: policy and settings, number and digest of results."""
+
     def wrong(text: str) -> InternavError:
         return _FILE.refusal(path, text)
 
     values = read_json(path, _FILE)
     if not isinstance(values, dict) or values.get("format") != FORMAT:
         raise wrong(f"expected an evaluation of format {FORMAT}")
+    names = [field.name for field in fields(About)]
+    check_sha256(values, path, _FILE, ["format", *names, "episodes", "logical_digest"])
+    if missing := [name for name in names if name not in values]:
+        raise wrong(f"{missing[0]} is missing")
     hints = get_type_hints(About)
     for field in fields(About):
         kinds = get_args(hints[field.name]) or (hints[field.name],)
         kind = type(values.get(field.name))
         if kind not in kinds and not (kind is int and float in kinds):
-            names = " or ".join("null" if k is NoneType else k.__name__ for k in kinds)
-            raise wrong(f"{field.name}: expected {names}, got {kind.__name__}")
+            expected = " or ".join("null" if k is NoneType else k.__name__ for k in kinds)
+            raise wrong(f"{field.name}: expected {expected}, got {kind.__name__}")
     if type(values.get("episodes")) is not int:
         raise wrong("episodes: expected a count")
-    return About(**{field.name: values[field.name] for field in fields(About)}), values["episodes"]
+    about = About(**{name: values[name] for name in names})
+    return about, values["episodes"], values.get("logical_digest")

@@ -12,6 +12,7 @@ from safetensors.torch import load_file, save_file  # noqa: E402
 from internav_data.camp import checkpoint as checkpoints  # noqa: E402
 from internav_data.camp.agents import AGENTS, make_agent  # noqa: E402
 from internav_data.camp.checkpoint import Checkpoint, find, load_agent, read, save  # noqa: E402
+from internav_data.core.files import with_sha256  # noqa: E402
 from internav_data.core.storage import file_sha256  # noqa: E402
 from internav_data.records.errors import CorruptDataError, UsageError  # noqa: E402
 
@@ -52,7 +53,7 @@ def test_an_agent_is_handed_on_alone(kept, made, tmp_path):
 def edit(folder, **changes):
     path = folder / checkpoints.ABOUT
     said = json.loads(path.read_bytes())
-    path.write_text(json.dumps(said | changes))
+    path.write_text(json.dumps(with_sha256(said | changes)))
 
 
 def test_what_is_read_is_what_was_written(kept, made):
@@ -119,7 +120,7 @@ def test_no_temporary_folder_is_taken_for_a_checkpoint(kept, made):
     left.mkdir()
     (left / checkpoints.ABOUT).write_text("{")
     noted = json.loads((run / checkpoints.POINTER).read_text()) | {"leftovers": [left.name]}
-    (run / checkpoints.POINTER).write_text(json.dumps(noted))
+    (run / checkpoints.POINTER).write_text(json.dumps(with_sha256(noted)))
     assert read(run).progress["updates"] == 1
     save(run, made(number=2))
     assert not left.exists()
@@ -136,7 +137,7 @@ def test_a_strangers_folders_survive_all_checkpoints(kept, made):
         path.write_text("precious")
     noted = json.loads((run / checkpoints.POINTER).read_text())
     outside = {"leftovers": ["mine", "../../x", "", ".", "..", 7, folder.name]}
-    (run / checkpoints.POINTER).write_text(json.dumps(noted | outside))
+    (run / checkpoints.POINTER).write_text(json.dumps(with_sha256(noted | outside)))
     for number in range(2, 6):
         save(run, made(number=number))
         assert read(run).progress["updates"] == number
@@ -170,6 +171,31 @@ def test_a_changed_byte_is_noticed(kept):
     path.write_bytes(data)
     with pytest.raises(CorruptDataError, match="have changed"):
         read(run)
+
+
+@pytest.mark.parametrize("name", [checkpoints.ABOUT, checkpoints.POINTER])
+def test_a_flipped_bit_of_a_checkpoints_json_is_noticed(kept, name):
+    """A sample of the bytes, and each letter of the name of the digest."""
+    run, folder = kept
+    path = (folder if name == checkpoints.ABOUT else run) / name
+    data, whole = path.read_bytes(), read(run)
+    key = data.index(b'"sha256": "', len(data) - 100)
+    sample = [k for k in range(0, len(data), max(1, len(data) // 40)) if data[k] not in b" \n"]
+    for k in (*sample, *range(key + 1, key + 7)):
+        path.write_bytes(data[:k] + bytes([data[k] ^ (1 << k % 7)]) + data[k + 1 :])
+        with pytest.raises(CorruptDataError):
+            read(run)
+    path.write_text(json.dumps(json.loads(data)))  # another layout is no damage
+    assert read(run).progress == whole.progress
+
+
+def test_a_checkpoint_from_before_digests_is_read(kept):
+    run, folder = kept
+    for path in (folder / checkpoints.ABOUT, run / checkpoints.POINTER):
+        said = json.loads(path.read_bytes())
+        del said["sha256"]
+        path.write_text(json.dumps(said))
+    assert read(run).progress["updates"] == 1
 
 
 class Bomb:

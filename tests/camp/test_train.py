@@ -68,6 +68,7 @@ def written(run):
     about["progress"].pop("training_s")
     about["progress"].pop("log")  # bytes: rates have more or fewer digits
     about.pop("files")
+    about.pop("sha256")
     names = ("weights.safetensors", "training.safetensors")
     return rows, about, *((folder / name).read_bytes() for name in names)
 

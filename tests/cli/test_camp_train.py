@@ -15,6 +15,7 @@ from stderr_lines import beside_the_dataset
 pytest.importorskip("torch")
 
 from internav_cli.camp_train import main
+from internav_data.core.files import with_sha256
 
 TRAIN = Path(sys.executable).with_name("camp-train")
 TINY = (
@@ -112,7 +113,7 @@ def test_a_checkpoint_that_is_no_checkpoint_is_refused(call, dataset, tmp_path):
         ({"progress": values["progress"] | {"parts": [1]}}, "parts[0]"),
         ({"progress": values["progress"] | {"parts": ["all", "single"]}}, "--stages"),
     ):  # fmt: skip
-        about.write_text(json.dumps(values | change))
+        about.write_text(json.dumps(with_sha256(values | change)))
         code, _, err = call(dataset, "--out", "runs/ppo-0", "--resume")
         assert code == 5, err
         assert words in err

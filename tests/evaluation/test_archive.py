@@ -5,6 +5,7 @@ from dataclasses import asdict, replace
 
 import pytest
 
+from internav_data.core.files import with_sha256
 from internav_data.evaluation.archive import (
     ABOUT,
     EPISODES,
@@ -44,7 +45,7 @@ def test_the_same_results_give_the_same_bytes(written, tmp_path, row):
 
 def test_whole_numbers_do_for_seconds(written):
     said = json.loads((written / ABOUT).read_text()) | {"training_s": 60}
-    (written / ABOUT).write_text(json.dumps(said))
+    (written / ABOUT).write_text(json.dumps(with_sha256(said)))
     assert read_evaluation(written).about == replace(CAMP, training_s=60)
 
 
@@ -63,8 +64,33 @@ def test_whole_numbers_do_for_seconds(written):
 )
 def test_another_version_or_type_is_refused(written, change, word):
     said = json.loads((written / ABOUT).read_text()) | change
-    (written / ABOUT).write_text(json.dumps(said))
+    (written / ABOUT).write_text(json.dumps(with_sha256(said)))
     with pytest.raises(CorruptDataError, match=word):
+        read_evaluation(written)
+
+
+@pytest.mark.parametrize("name", ["seed", "sync_every", "episodes"])
+def test_a_description_that_lacks_a_key_is_refused(written, name):
+    said = json.loads((written / ABOUT).read_text())
+    del said[name]
+    (written / ABOUT).write_text(json.dumps(with_sha256(said)))
+    with pytest.raises(CorruptDataError, match=name):
+        read_evaluation(written)
+
+
+def test_a_flipped_bit_of_a_description_is_noticed(written):
+    path = written / ABOUT
+    data = path.read_bytes()
+    for k in (k for k in range(len(data)) if data[k] not in b" \n"):
+        path.write_bytes(data[:k] + bytes([data[k] ^ (1 << k % 7)]) + data[k + 1 :])
+        with pytest.raises(CorruptDataError):
+            read_evaluation(written)
+
+
+def test_a_table_of_another_evaluation_is_noticed(written, tmp_path, row):
+    write_evaluation(tmp_path / "b", CAMP, [row(1), row(0)])
+    (written / EPISODES).write_bytes((tmp_path / "b" / EPISODES).read_bytes())
+    with pytest.raises(CorruptDataError, match="other results"):
         read_evaluation(written)
 
 
