@@ -262,7 +262,7 @@ def solver_modules(root: Path, start: tuple[str, ...] = _SOLVERS) -> dict[str, P
     start : tuple of str
         Packages to begin at. Result: all of their modules, and every module of `internav_data`
         that one of these imports, at its top or inside a function. Imports for type checkers do
-        not count.
+        not count, but for those by which a package says where its lazy names are.
 
     Returns
     -------
@@ -278,10 +278,15 @@ def solver_modules(root: Path, start: tuple[str, ...] = _SOLVERS) -> dict[str, P
             if file.name != "__init__.py"
         ]
     found: dict[str, Path] = {}
+    seen: set[str] = set()
     while waiting:
         name = waiting.pop()
+        if name in seen:
+            continue
+        seen.add(name)
         file = _source_of(root, name)
-        if file is None or name in found:
+        if file is None:
+            waiting += _lazy_home(root, name)
             continue
         found[name] = file
         waiting += [name.rpartition(".")[0], *_imported(file)]
@@ -295,6 +300,20 @@ def _source_of(root: Path, name: str) -> Path | None:
     stem = root.joinpath(*name.split("."))
     files = (stem.with_suffix(".py"), stem / "__init__.py")
     return next((file for file in files if file.is_file()), None)
+
+
+def _lazy_home(root: Path, name: str) -> list[str]:
+    """Return the module that a package imports when one of its names is first used, if it does."""
+    package, _, attribute = name.rpartition(".")
+    file = _source_of(root, package)
+    if file is None or file.name != "__init__.py":
+        return []
+    return [
+        node.module
+        for node in ast.walk(ast.parse(file.read_bytes()))
+        if isinstance(node, ast.ImportFrom) and node.module is not None
+        if any(attribute in {alias.name, alias.asname} for alias in node.names)
+    ]
 
 
 def _imported(file: Path) -> list[str]:

@@ -5,13 +5,18 @@ from __future__ import annotations
 import contextlib
 import io
 
+from internav_data.core.storage import temporary_of
+
 
 class KilledError(Exception):
     """The process that wrote has died."""
 
 
 class MemoryStore:
-    """Blobs by name; dies before the change of number `deadline`, counted from 0."""
+    """Blobs by name; dies at the change of number `deadline`, counted from 0.
+
+    As a folder does, it then keeps half of a blob that was being put, under its temporary name.
+    """
 
     def __init__(self, blobs=None, deadline=None):
         self.blobs = dict(blobs or {})
@@ -33,6 +38,8 @@ class MemoryStore:
     def put(self, name, data, *, beside=""):
         if beside:
             self._blob(beside)
+        if self.changes == self.deadline:
+            self.blobs.setdefault(temporary_of(name), bytes(data[: len(data) // 2]))
         self._change("put", name)
         self.blobs[name] = bytes(data)
 

@@ -91,18 +91,19 @@ def test_an_open_dataset_goes_on_with_its_own_episodes(tmp_path, opening, pickle
 
 def test_a_file_taken_from_those_who_hold_it_open_is_found_again(tmp_path, monkeypatch):
     """As network file systems do when another machine removes it."""
-    extend(tmp_path, 0, 10)
+    extend(tmp_path, 0, 9)
     ds = load_dataset(tmp_path)
     before = list(ds)
     ds.row_group_cache.clear()
-    extend(tmp_path, 10, 19)
-    monkeypatch.setattr(TableFile, "read_group", _stale(tmp_path))
+    extend(tmp_path, 9, 19)
+    taken = []
+    monkeypatch.setattr(TableFile, "read_group", _stale(tmp_path, taken))
     assert list(ds) == before
+    assert taken, "a shard was replaced"
 
 
-def _stale(folder):
+def _stale(folder, seen):
     real, paths = TableFile.read_group, {file.path for file in read_manifest(folder).files}
-    seen = []
 
     def read_group(file, *args):
         name = file.place.removeprefix(f"{folder}/")

@@ -66,7 +66,8 @@ def stub(payload):
             raise OSError(28, "No space left on device", payload.staging.store.at(STAGING))
         home = house(payload.config.seed, scene)
         count = payload.config.episodes_of(home.split)
-        stage_scene(payload.staging, scene, home, [episode(home, k) for k in range(count)])
+        episodes = [episode(home, k) for k in range(count)]
+        stage_scene(payload.staging, scene, home, episodes, redraws={"spot": scene % 3})
         return count
 
     return make

@@ -1,6 +1,7 @@
 """Threads of a process get the solutions of one, and nothing else enters the cache."""
 
 import os
+import signal
 from dataclasses import replace
 
 import pytest
@@ -79,6 +80,7 @@ def test_a_fork_while_another_thread_solves_solves_too(alone):
         for _ in range(3):
             child = os.fork()
             if child == 0:
+                signal.alarm(60)  # one that waits for a lock for ever ends
                 os._exit(0 if bullet().push(LONE[0], FORCE) == alone[0][0] else 1)
             codes.append(os.waitpid(child, 0)[1])
         return codes

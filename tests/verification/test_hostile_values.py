@@ -147,6 +147,18 @@ def test_hostile_numbers_are_found_and_end_no_validation(valid, tmp_path, table,
     assert not findings.ok
 
 
+@pytest.mark.parametrize(
+    ("table", "path", "change"),
+    [("scenes", ("doors", 0, "rooms"), 0), ("assets", ("parts", 0, "shape"), 5)],
+)
+def test_an_error_of_a_check_is_a_finding(valid, tmp_path, table, path, change):
+    """Values of right types and ranges, for which a check was not written."""
+    spec = next(spec for spec in TABLES if spec.name == table)
+    kind = dict(nodes(pa.struct(list(spec.schema))))[path]
+    findings = judge(valid, tmp_path, (spec, path, kind, change), "geometry")
+    assert any(name.endswith(".checkable") for name in findings.by_predicate)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("level", ["schema", "geometry", "physics"])
 def test_every_hostile_value_in_every_column_is_a_finding(valid, tmp_path, level):
