@@ -13,6 +13,7 @@ import pytest
 import strategies
 
 from internav_data.core import storage
+from internav_data.core.hardware import hardware
 from internav_data.dataset import (
     Identity,
     Staging,
@@ -284,6 +285,19 @@ def test_full_disk_leaves_the_old_file(tmp_path, monkeypatch):
         storage.write_atomically(path, b"new")
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_all_hardware_that_made_a_dataset_is_named(tmp_path, monkeypatch):
+    def extended(low, high):
+        build(tmp_path, range(low, high))
+        return assemble(tmp_path, IDENTITY, ASSETS, high)
+
+    assert extended(0, 3).hardware == (hardware(),)
+    monkeypatch.setattr("internav_data.dataset.commit.hardware", lambda: "another")
+    manifest = extended(3, 5)
+    assert set(manifest.hardware) == {hardware(), "another"}
+    write_manifest(tmp_path, replace(manifest, hardware=()))
+    assert extended(5, 6).hardware == (), "who made its first scenes is not known"
 
 
 @pytest.mark.usefixtures("few_scenes_a_shard")
