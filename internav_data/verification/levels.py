@@ -14,7 +14,12 @@ from internav_data.dataset.parquet import open_parquet
 from internav_data.records import LoaderStream, Purpose, generator
 from internav_data.records.errors import InternavError, UsageError
 from internav_data.verification.checked_config import CheckedConfig, checked_config
-from internav_data.verification.files import check_file, check_listing, check_manifest
+from internav_data.verification.files import (
+    CHANGING,
+    check_file,
+    check_listing,
+    check_manifest,
+)
 from internav_data.verification.findings import LEVELS, FindingCollector, Findings, Level, join
 from internav_data.verification.scenes import check_scene
 from internav_data.verification.shapes import Shapes
@@ -183,7 +188,8 @@ def _account_for(manifest: Manifest, found: Findings, sample: int | None, path: 
     """
     scenes = sum(counts.scenes for counts in manifest.counts.values())
     episodes = sum(counts.episodes for counts in manifest.counts.values())
-    asked = {"files": len(manifest.files)}
+    files = len(manifest.files) + len(manifest.metadata or ())
+    asked = {"files": files - found.notes.get(CHANGING, 0)}
     if found.level in {"geometry", "physics"}:
         asked["scenes"] = scenes if sample is None else min(sample, scenes)
         if sample is None:

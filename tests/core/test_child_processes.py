@@ -68,8 +68,11 @@ def test_children_leave_signals_of_the_group_to_their_parent(signum):
 
 
 def test_the_end_of_the_thread_that_started_a_child_does_not_end_it():
-    thread = "thread = threading.Thread(target=start); thread.start(); thread.join()"
-    parent, child = started(thread)
+    # The kernel looks at the thread only once the child has asked for its death to be told.
+    work = "lambda: (start(), sys.stdin.readline())"
+    parent, child = started(f"t = threading.Thread(target={work}); t.start(); t.join()")
+    parent.stdin.write("end\n")
+    parent.stdin.flush()
     time.sleep(0.3)
     assert child.status() != psutil.STATUS_ZOMBIE
     ends(parent, child)

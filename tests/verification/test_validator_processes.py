@@ -14,6 +14,7 @@ import pytest
 from checker_stubs import STARTED
 from scenery import small_scenes, write_dataset
 
+from internav_data.dataset import read_manifest
 from internav_data.records.errors import InternavError
 from internav_data.verification import levels
 from internav_data.verification.findings import FindingCollector
@@ -92,6 +93,21 @@ def test_what_nobody_looked_at_is_not_called_valid(good, monkeypatch, sample):
     monkeypatch.setattr(levels, "check_unit", lambda _: FindingCollector())
     with pytest.raises(InternavError, match=f"0 of {sample or 3} scenes were checked"):
         levels.validate(good, sample=sample)
+
+
+@pytest.mark.parametrize("missing", ["files", "episodes", "replayed"])
+def test_whatever_was_left_out_is_noticed(good, monkeypatch, missing):
+    counts = read_manifest(good).counts.values()
+    episodes = sum(count.episodes for count in counts)
+    report = FindingCollector()
+    report.counts.update(scenes=3, episodes=episodes, replayed=episodes)
+    monkeypatch.setattr(levels, "check_unit", lambda _: report)
+    assert levels.validate(good, "physics").ok
+    del report.counts[missing]
+    if missing == "files":
+        monkeypatch.setattr(levels, "check_file", lambda *_: FindingCollector())
+    with pytest.raises(InternavError, match=rf"\d of \d+ {missing} were checked"):
+        levels.validate(good, "physics")
 
 
 def test_scenes_whose_workers_are_killed_again_and_again_are_named(good, tmp_path):
