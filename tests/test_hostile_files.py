@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import signal
 from dataclasses import asdict
 from pathlib import Path
 
@@ -211,6 +212,17 @@ def _paths(value, path=()):
             yield from _paths(value[key], (*path, key))
 
 
+@pytest.fixture
+def limited_time():
+    """Fail after a minute, which whoever waits for a pipe would take."""
+    before = signal.signal(signal.SIGALRM, lambda *_: pytest.fail("it waits"))
+    signal.alarm(60)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+@pytest.mark.usefixtures("limited_time")
 @pytest.mark.parametrize("name", READERS)
 def test_what_is_no_small_file_is_refused_by_every_reader(tmp_path, place, name):
     path = place(name)
