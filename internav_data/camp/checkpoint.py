@@ -1,10 +1,10 @@
 """Checkpoints: tensors in safetensors, the rest in JSON, complete or absent.
 
-Nothing is unpickled. A checkpoint is a folder: `weights.safetensors` (the agent's, enough to
-act), `training.safetensors` (the optimiser's moments, hidden states, random numbers) and
-`checkpoint.json`, which has the sizes and digests of both, and its own. A run keeps its last checkpoint and its
-best; `checkpoints.json` names them, and takes a new one in only when it is on the disk. It notes
-as `leftovers` what a kill would leave behind; no other folder is ever removed.
+Nothing is unpickled. A checkpoint is a folder: `weights.safetensors` (the agent's, enough to act),
+`training.safetensors` (the optimiser's moments, hidden states, random numbers) and
+`checkpoint.json`, which has the sizes and digests of both, and its own. A run keeps its last
+checkpoint and its best; `checkpoints.json` names them, and takes a new one in only when it is on
+the disk. It notes as `leftovers` what a kill would leave behind; no other folder is ever removed.
 
 `TrainState`, `pack` and `unpack` turn training between two updates into counters and tensors by
 name, and back.

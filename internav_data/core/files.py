@@ -287,7 +287,9 @@ def check_sha256(
             problem = f"its {DIGEST} is that of other content"
             raise limits.refusal(place, f"damaged or edited ({problem})")
     elif later := sorted(values.keys() - set(before)):
-        problem = f"it has a key {later[0]!r} but no {DIGEST}, which every release writes that knows"
+        problem = (
+            f"it has a key {later[0]!r} but no {DIGEST}, which every release writes that knows"
+        )
         raise limits.refusal(place, f"damaged or edited ({problem} such a key)")
 
 

@@ -15,6 +15,7 @@ from stderr_lines import beside_the_dataset
 pytest.importorskip("torch")
 
 from internav_cli.camp_train import main
+
 from internav_data.core.files import with_sha256
 
 TRAIN = Path(sys.executable).with_name("camp-train")
