@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from internav_data.core.hardware import hardware
 from internav_data.core.storage import StoreLike, exists, final_of, store_of
-from internav_data.dataset.journal import Journal
+from internav_data.dataset.journal import Journal, journal_names
 from internav_data.dataset.manifest import (
     MANIFEST,
     Counts,
@@ -36,7 +36,7 @@ from internav_data.dataset.manifest import (
     read_manifest,
     write_manifest,
 )
-from internav_data.dataset.metadata_files import put_metadata
+from internav_data.dataset.metadata_files import METADATA, put_metadata
 from internav_data.dataset.shards import SPLITS, SceneSource, put_shards
 from internav_data.dataset.staging import (
     IDENTITY,
@@ -52,8 +52,9 @@ from internav_data.dataset.tables import FORMAT_VERSION
 from internav_data.records.errors import CorruptDataError, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
+    from internav_data.core.storage import Store
     from internav_data.dataset.staging import SceneState
     from internav_data.records import Asset
 
@@ -95,8 +96,8 @@ def open_staging(
     Raises
     ------
     UsageError
-        `out` is a file, holds something that is no dataset, another configuration's dataset, or a
-        link to a folder that a commit would write into.
+        `out` is a file, holds something that is no dataset, another configuration's dataset, a
+        link to a folder that a commit would write into, or a file that it would write over.
 
     """
     store = store_of(out)
@@ -118,10 +119,22 @@ def open_staging(
         _same(place, read_identity(store), identity, defaults or {})
     elif not has_manifest(store) and any(final_of(name) != IDENTITY for name in names):
         raise UsageError(f"{place}: holds something that is no dataset: give a new or empty folder")
+    if not has_manifest(store):
+        _refuse_strangers(store, journal_names(store))
     store.put(IDENTITY, (json.dumps(asdict(identity), indent=1) + "\n").encode())
     staging = Staging(store, identity.digest())
     remove_foreign(staging)
     return staging
+
+
+def _refuse_strangers(store: Store, ours: Iterable[str] = ()) -> None:
+    """Refuse to write a new dataset's metadata over files that somebody put there."""
+    for name in sorted(METADATA.difference(ours)):
+        if exists(store, name):
+            raise UsageError(
+                f"{store.at(name)}: is in the way of the dataset's own file of this name: move it "
+                "away, then run the same command again: finished scenes are kept"
+            )
 
 
 def _same(out: str, there: Identity, wanted: Identity, defaults: Mapping[str, Any]) -> None:
@@ -206,12 +219,16 @@ def commit_scenes(
     ------
     CorruptDataError
         A scene is neither in the dataset nor staged, or a file is damaged.
+    UsageError
+        No dataset is there, but somebody's file of a name that one would have.
 
     """
     store = staging.store
     old = read_manifest(store) if has_manifest(store) else None
     journal = Journal(store)
     journal.sweep(old)
+    if old is None:
+        _refuse_strangers(store)
     first = old.scenes if old else 0
     scenes = max(scenes, first)
     given_up = [entry.scene for entry in old.quarantined] if old else []

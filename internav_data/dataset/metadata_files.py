@@ -12,11 +12,25 @@ from internav_data.dataset.croissant import croissant
 from internav_data.dataset.jsonschemas import schema_text, schemas
 from internav_data.dataset.manifest import MetadataFile
 from internav_data.dataset.stats import stats_of
+from internav_data.dataset.tables import TABLES
 
 if TYPE_CHECKING:
     from internav_data.core.storage import Store
     from internav_data.dataset.journal import Journal
     from internav_data.dataset.manifest import Manifest
+
+METADATA = frozenset(
+    (
+        "README.md",
+        "croissant.json",
+        "stats.json",
+        *(
+            f"schemas/{name}.schema.json"
+            for name in (*(t.name for t in TABLES), "manifest", "stats")
+        ),
+    )
+)
+"""Names of all metadata files."""
 
 
 def metadata_blobs(store: Store, manifest: Manifest) -> dict[str, bytes]:

@@ -7,10 +7,10 @@ Workers call `stage_scene` or `stage_quarantine` for every scene they finish; af
     u32 header length  header (JSON)
     u64 length  Arrow IPC stream of the scene row  u64 length  Arrow IPC stream of its episodes
 
-and one that is damaged, or of another identity, counts as not done. A worker whose parent is gone
-ends before it writes. Should it outlive its run all the same, the folder may be removed or belong
-to another run by then: it writes only where the identity that its run put there still stands, and
-below a folder named by it.
+and one that is damaged, of another identity, or under another scene's name counts as not done. A
+worker whose parent is gone ends before it writes. Should it outlive its run all the same, the
+folder may be removed or belong to another run by then: it writes only where the identity that its
+run put there still stands, and below a folder named by it.
 """
 
 from __future__ import annotations
@@ -330,4 +330,7 @@ def _state(staging: Staging, name: str, data: bytes) -> SceneState:
     if data[_HEAD:_BODY] != bytes.fromhex(staging.digest):
         raise CorruptDataError(f"{place}: made by another run: remove it and generate again")
     length = int.from_bytes(data[_BODY : _BODY + 4], "little")
-    return SceneState(**json.loads(data[_BODY + 4 : _BODY + 4 + length]))
+    state = SceneState(**json.loads(data[_BODY + 4 : _BODY + 4 + length]))
+    if name != staging.name(state.scene):
+        raise CorruptDataError(f"{place}: holds another scene: remove it and generate again")
+    return state

@@ -357,6 +357,12 @@ def _assembled(
         if not staged:
             end_staging(store)
         return read_manifest(store)
+    if not staged:
+        staging.check()  # so removed with its folder, or alone
+        raise CorruptDataError(
+            f"{store.at(STAGING)}: its scenes were removed while this run was at work: run the "
+            "command again, in a folder that stays"
+        )
     if not has_manifest(store) and all(state.quarantined for state in staged.values()):
         raise _hopeless(store, len(staged), next(iter(staged.values())).quarantined)
     progress.log(f"writing {scenes} scenes into {store.at('')}")

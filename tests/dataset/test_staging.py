@@ -44,6 +44,19 @@ def test_a_scene_of_another_identity_is_not_done(tmp_path, change):
         assemble(tmp_path / "d", IDENTITY, ASSETS, 3)
 
 
+@pytest.mark.parametrize("pair", [(1, 2), (1, 7)])
+def test_a_scene_under_the_name_of_another_is_not_done(tmp_path, pair):
+    staging = build(tmp_path, range(4))
+    paths = [tmp_path / staging.name(scene) for scene in pair]
+    blobs = [path.read_bytes() if path.exists() else b"" for path in paths]
+    for path, blob in zip(paths, reversed(blobs), strict=True):
+        path.write_bytes(blob)
+    left = set(range(4)) - set(pair)
+    assert done_scenes(staging) == set(staged_scenes(staging, range(9))) == left
+    with pytest.raises(CorruptDataError, match="another scene"):
+        read_staged_rows(staging, pair[1], house=True)
+
+
 def test_scenes_of_other_code_are_removed_and_made_again(tmp_path):
     build(tmp_path, range(3), identity=replace(IDENTITY, rules="1" * 64))
     staging = open_staging(tmp_path, IDENTITY)

@@ -23,6 +23,7 @@ from internav_data.dataset import (
     read_manifest,
     shards,
 )
+from internav_data.dataset.metadata_files import METADATA
 from internav_data.records.errors import CorruptDataError, UsageError
 
 BESIDE = {
@@ -97,6 +98,23 @@ def test_a_strangers_files_survive_a_commit_killed_anywhere():
         assemble(left, IDENTITY, ASSETS, 12)
         assert left.blobs == whole.blobs
         assert found(left) == BESIDE
+
+
+@pytest.mark.parametrize("name", sorted(METADATA))
+def test_a_first_commit_writes_over_nobodys_file(name):
+    store = MemoryStore()
+    build(store, range(4))
+    store.put(name, b"theirs")
+    for call in (assemble, commit_scenes):
+        with pytest.raises(UsageError, match="in the way"):
+            call(store if call is assemble else staging_of(store), IDENTITY, ASSETS, 4)
+    with pytest.raises(UsageError, match="in the way"):
+        open_staging(store, IDENTITY)
+    assert store.read(name) == b"theirs"
+    store.remove(name)
+    open_staging(store, IDENTITY)
+    assemble(store, IDENTITY, ASSETS, 4)
+    assert {file.path for file in read_manifest(store).metadata} == METADATA
 
 
 @pytest.mark.parametrize("identity", [None, b"{}", b'{"of": "another"}', b"\x00", b"[]"])

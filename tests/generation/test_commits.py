@@ -6,6 +6,7 @@ import functools
 import json
 import os
 import random
+import shutil
 import signal
 from dataclasses import dataclass, field, replace
 
@@ -21,7 +22,7 @@ from internav_data.generation import commits
 from internav_data.generation.config import load_config
 from internav_data.generation.progress import GenerationProgress
 from internav_data.generation.run import generate
-from internav_data.records.errors import UsageError
+from internav_data.records.errors import InternavError, UsageError
 
 CONFIG = load_config(overrides=["episodes_per_scene=2"])
 SCENES = 30
@@ -231,3 +232,19 @@ def test_a_scene_that_fails_by_itself_is_not_tried_again(tmp_path):
     assert made(out, again, quarantine=(5,)).new_scenes == 0
     assert again.begun == []
     assert contents(out) == before
+
+
+@pytest.mark.parametrize("what", ["", ".work", ".work/scenes"])
+def test_scenes_that_are_removed_before_they_are_committed_end_the_run_in_a_line(tmp_path, what):
+    out = tmp_path / "d"
+
+    class Removing(Shuffled):
+        def run(self, recipe, tasks, tick):
+            yield from super().run(recipe, tasks, tick)
+            shutil.rmtree(out / what)
+
+    with pytest.raises(InternavError, match="while this"):
+        made(out, Removing(), 5)
+    made(out, scenes=5)
+    made(tmp_path / "whole" / "d", scenes=5)
+    assert contents(out) == contents(tmp_path / "whole" / "d")
