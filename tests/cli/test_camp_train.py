@@ -196,7 +196,7 @@ def test_two_runs_in_one_folder_are_refused_and_the_first_is_named(call, dataset
 
     run = tmp_path / "run"
     with FolderStore(run).lock("busy"):
-        code, _, err = call(dataset, *TINY, "--out", run, *more)
+        code, _, err = call(dataset, *TINY, "--steps", 32, "--out", run, *more)
     assert code == 1
     (line,) = beside_the_dataset(err)
     assert "another camp-train trains this run; wait for it to end" in line
