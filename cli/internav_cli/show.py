@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from internav_cli.options import DATASET, config_from, config_options, dataset_to_read, positive
+from internav_cli.options import DATASET, config_from, config_options, dataset_to_read
 
 if TYPE_CHECKING:
     from internav_data.generation import GenerationConfig
@@ -31,7 +31,14 @@ Examples:
     type=click.Path(path_type=Path),
     help="The PNG to write.  [default: named after the scene or episode]",
 )
-@click.option("--pixels", type=int, default=900, show_default=True, callback=positive)
+@click.option(
+    "--pixels",
+    type=click.IntRange(1, 8192),
+    default=900,
+    show_default=True,
+    metavar="INTEGER",
+    help="Length of the picture's longer side.",
+)
 @config_options
 def command(
     *,

@@ -44,6 +44,8 @@ MAX_SIZE_M, MIN_SIZE_M = 5.0, 0.01
 _DENSITY_KG_M3 = 200.0
 _GREY: RGB = (168, 164, 156)
 _GRID_M = 2e-4
+_ZERO_INDEX = re.compile(rb"^[ \t]*f[ \t](?:[^\n]*[ \t])?0(?:[/\s]|\Z)", re.MULTILINE)
+"""Face of an OBJ file with a corner of number 0: they count from 1, and trimesh takes the last."""
 _STL_HEADER, _STL_TRIANGLE = 84, 50
 """Bytes of a binary STL: header with the number of triangles as its last four, each triangle."""
 
@@ -221,6 +223,8 @@ def _content(path: Path) -> bytes:
         groups = sum(map(content.count, (b"\nusemtl", b"\no ", b"\ng ")))
         if groups > MAX_GROUPS:
             raise UsageError(f"{path}: {groups} groups, at most {MAX_GROUPS}; join them")
+        if _ZERO_INDEX.search(content):
+            raise UsageError(f"{path}: a face has corner 0, but they count from 1; export it again")
     return content
 
 

@@ -212,7 +212,7 @@ def updated(config: C, assignment: str, elsewhere: Sequence[str] = ()) -> C:
         `assignment` is not of this form, its key is unknown, or its value has the wrong type.
 
     """
-    where = f"--set {assignment}"
+    where = f"--set {' '.join(assignment.split())}"
     key, equals, text = (piece.strip() for piece in assignment.partition("="))
     if not equals or not key:
         raise UsageError(f"{where}: expected KEY=VALUE, as in --set house.scale=1.1")
@@ -273,9 +273,10 @@ def _parsed(text: str) -> Any:  # noqa: ANN401 - any TOML value
     if text in {"nan", "inf", "-inf", "+inf"}:
         return float(text)  # refused with the setting's name
     try:
-        return parse_toml(f"value = {text}".encode(errors="replace"), "", _FILE)["value"]
+        table = parse_toml(f"value = {text}".encode(errors="replace"), "", _FILE)
     except UsageError:
         return text
+    return table["value"] if len(table) == 1 else text  # a line break begins another setting
 
 
 def _typed(value: Any, hint: Any, where: str) -> Any:  # noqa: ANN401 - checked here

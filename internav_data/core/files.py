@@ -8,6 +8,7 @@ memory is taken or arithmetic is done with them.
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import hashlib
 import json
@@ -103,6 +104,19 @@ def open_regular(path: str | Path) -> BinaryIO:
     except BaseException:
         os.close(descriptor)
         raise
+
+
+def check_replaceable(path: Path) -> None:
+    """Check that nothing stands at a path but a file: who writes one there would replace it.
+
+    Raises
+    ------
+    OSError
+        There is a folder, pipe, socket or device, or a link to one.
+
+    """
+    with contextlib.suppress(FileNotFoundError):
+        _check_kind(path.stat().st_mode, path)
 
 
 def size_of_regular(path: Path) -> int:

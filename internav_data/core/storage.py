@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
 
-from internav_data.core.files import open_regular, size_of_regular
+from internav_data.core.files import check_replaceable, open_regular, size_of_regular
 from internav_data.core.holders import lock_holder
 from internav_data.records.errors import InternavError, UsageError
 
@@ -330,7 +330,7 @@ def write_atomically(path: Path, data: bytes) -> None:
     """Write a file by way of a temporary one beside it: readers see the old or the new one.
 
     After an error (a full disk, an interrupt) the temporary file is removed and `path` is as it
-    was before.
+    was before. A device, pipe, socket or folder is refused.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     _write_atomically(path, data)
@@ -344,6 +344,7 @@ def _make_folders(folder: Path, top: Path) -> None:
 
 
 def _write_atomically(path: Path, data: bytes) -> None:
+    check_replaceable(path)  # /dev/null would be a plain file from then on
     temporary = _new(path, Path.touch)
     try:
         temporary.write_bytes(data)

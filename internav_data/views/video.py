@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import cv2
 
+from internav_data.core.files import check_replaceable
 from internav_data.records.errors import InternavError, UsageError
 from internav_data.views.gif import write_gif
 
@@ -72,6 +73,7 @@ def write_video(path: Path, frames: Iterable[Image], fps: float) -> int:
         raise UsageError(f"a video's frames a second: expected more than 0, got {fps}")
     write = _gif if kind == "gif" else _mp4
     try:
+        check_replaceable(path)
         path.parent.mkdir(parents=True, exist_ok=True)
         # The encoder tells the container by the name's end.
         handle, name = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=f".{kind}", dir=path.parent)

@@ -124,6 +124,7 @@ HUGE = b"\0" * 80 + struct.pack("<I", 4_000_000_000)
         ("empty.obj", b"", "0 bytes"),
         ("points.obj", b"v 0 0 0\nv 1 1 1\n", "cannot be read as a mesh"),
         ("flat.obj", FLAT, "no volume"),
+        ("zero.obj", FLAT + b"f 3/1 0/2 1/3\n", "corner 0"),
         ("cut.stl", HUGE, "84 bytes, its header of 4000000000 triangles means 200000000084"),
         ("cut.stl", CUT, "(184 bytes, its header of 3 triangles means 234)"),
         ("short.stl", b"\0\xff", "(2 bytes, a binary STL has 84 at least)"),

@@ -274,6 +274,20 @@ def test_a_fresh_house_is_drawn_without_its_episodes(tmp_path):
     assert (tmp_path / "plan.png").stat().st_size > 10_000
 
 
+@pytest.mark.parametrize("command", [("show", "--scene", 2), ("replay", "--scene", 2, "--force")])
+def test_a_picture_replaces_no_device(dataset, tmp_path, command):
+    """Links to devices stand for them: a test that fails must not break the machine's."""
+    out = tmp_path / "out.gif"
+    out.symlink_to("/dev/null")
+    one_line(run(command[0], dataset, *command[1:], "--out", out), 1, "a device")
+    assert out.is_symlink()
+    assert list(tmp_path.iterdir()) == [out]
+
+
+def test_a_picture_is_bounded(dataset, tmp_path):
+    one_line(run("show", dataset, "--out", tmp_path / "x.png", "--pixels", 10**8), 2, "8192")
+
+
 @pytest.mark.parametrize(("signum", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_ends_in_order_and_finished_scenes_stay(tmp_path, signum, code):
     words = ("--scenes", 500, "--episodes-per-scene", 2, "--rooms", 1, "--workers", 1)

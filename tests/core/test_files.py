@@ -22,6 +22,7 @@ from internav_data.core.files import (
     read_text,
     read_toml,
 )
+from internav_data.core.storage import write_atomically
 from internav_data.records.errors import CorruptDataError, UsageError
 
 LIMITS = FileLimits("list", UsageError, "write it again", 1000, 4, 50, 1e6)
@@ -70,6 +71,18 @@ def test_what_took_the_place_of_a_file_is_not_read(tmp_path, monkeypatch):
     looked = (tmp_path / "file").stat()
     monkeypatch.setattr(Path, "stat", lambda _: looked)
     assert "a pipe" in _refused(read_file, tmp_path / "pipe", LIMITS)
+
+
+@pytest.mark.parametrize("make", [_pipe, lambda path: path.symlink_to("/dev/zero")])
+def test_what_is_no_file_is_never_replaced_by_one(tmp_path, make):
+    """A superuser's `--out /dev/null` would make a file of the machine's null device."""
+    path = tmp_path / "out"
+    make(path)
+    before = path.lstat()
+    with pytest.raises(OSError, match="expected a regular file"):
+        write_atomically(path, b"new")
+    assert path.lstat() == before
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_large_file_takes_no_memory(tmp_path):

@@ -125,3 +125,7 @@ def test_every_value_but_paths_is_identity(key):
         text = other[type(value)]
     changed = load_config(overrides=[f"{key}={text}"])
     assert base.identity("c") != changed.identity("c")
+
+
+def test_one_set_is_one_setting():
+    assert "expected a number" in refusal("house.scale=1.1\nseed = 5")
