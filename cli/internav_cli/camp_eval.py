@@ -49,7 +49,7 @@ Examples:
   camp-eval evaluate --help                            all options of the first two
 
 \b
-Exit codes: 0 good, 1 error, 2 usage, 5 corrupt data, 130/143 interrupted.""",
+Exit codes: 0 good, 1 error, 2 usage, 5 corrupt data, 129/130/143 interrupted.""",
 )
 @click.option("--debug", is_flag=True, help="Show the traceback of an error.")
 @click.version_option(package_name="internav-data", prog_name="camp-eval")

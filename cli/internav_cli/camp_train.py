@@ -47,8 +47,8 @@ Examples:
 Ctrl-C finishes the update, saves and exits with 130; a second one leaves the
 last checkpoint as it is. Measure what was trained by camp-eval RUN.
 DATASET defaults to the folder that INTERNAV_DATASET names, else internav-dataset.
-Exit codes: 0 good, 1 error, 2 usage, 5 corrupt data, 6 NaN or infinity, 130/143
-interrupted.""",
+Exit codes: 0 good, 1 error, 2 usage, 5 corrupt data, 6 NaN or infinity,
+129/130/143 interrupted.""",
 )
 @DATASET
 @click.option(

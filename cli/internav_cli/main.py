@@ -33,7 +33,7 @@ COMMANDS = {
 }
 LONGEST_LINE = 1000
 """Characters of an error: one that quotes a file may be as long as the file."""
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class InterruptedCommandError(KeyboardInterrupt):
@@ -86,7 +86,7 @@ Shell completion (bash; zsh and fish likewise):
 
 \b
 Exit codes: 0 good, 1 error, 2 usage, 3 validation failed, 4 finished with
-quarantined scenes, 5 corrupt data, 130/143 interrupted.""",
+quarantined scenes, 5 corrupt data, 129/130/143 interrupted.""",
 )
 @click.option("--debug", is_flag=True, help="Show the traceback of an error.")
 @click.version_option(package_name="internav-data", prog_name="internav-gen")
@@ -124,7 +124,7 @@ def launch(command: click.Command, program: str, arguments: list[str] | None = N
 
 @contextlib.contextmanager
 def _signals_raise() -> Iterator[None]:
-    """Have the first SIGINT or SIGTERM end the block by an exception, the next one the process."""
+    """Have the first of `SIGNALS` end the block by an exception, the next one the process."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM end a run in order: tasks under way are finished, results are kept."""
+"""Ctrl-C, SIGTERM and a hang-up end a run in order: what is under way is finished and kept."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from internav_data.records.errors import InternavError
 if TYPE_CHECKING:
     from types import FrameType, TracebackType
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""Signals by which a user, a batch system or a terminal that closes asks a command to end."""
 
 
 class InterruptedRunError(InternavError):
@@ -26,8 +27,9 @@ class InterruptedRunError(InternavError):
 class Interrupts:
     """Flag that the first signal raises; the second one ends the process.
 
-    Signals are caught inside a `with` block only. Outside the main thread Python cannot catch them;
-    there the flag never rises.
+    Signals are caught inside a `with` block only; one that is ignored, as under nohup or in a
+    background job of a plain shell, stays ignored. Outside the main thread Python cannot catch
+    them; there the flag never rises.
     """
 
     def __init__(self) -> None:
@@ -41,7 +43,8 @@ class Interrupts:
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
             for signum in SIGNALS:
-                self._before[signum] = signal.signal(signum, self._caught)
+                if signal.getsignal(signum) is not signal.SIG_IGN:
+                    self._before[signum] = signal.signal(signum, self._caught)
         return self
 
     def __exit__(

@@ -1,5 +1,6 @@
 import json
 import os
+import pty
 import resource
 import signal
 import subprocess
@@ -301,7 +302,22 @@ def test_a_signal_ends_in_order_and_finished_scenes_stay(tmp_path, signum, code)
     assert process.returncode == code
     assert len(beside_the_dataset(result)) == 1, result
     assert "run the same command again to continue" in result
-    assert list(tmp_path.rglob("scene-*.work"))
+    assert (tmp_path / "d" / "manifest.json").exists(), "one worker makes the first scenes first"
+
+
+def test_a_terminal_that_closes_ends_a_run_in_order(tmp_path):
+    words = ("--scenes", 500, "--episodes-per-scene", 2, "--rooms", 1, "--workers", 1)
+    command = [GEN, "generate", "--out", str(tmp_path / "d"), *map(str, words)]
+    child, terminal = pty.fork()
+    if not child:
+        os.execv(command[0], command)
+    deadline = time.monotonic() + 300
+    while not list(tmp_path.rglob("scene-*.work")) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    os.close(terminal)
+    _, status = os.waitpid(child, 0)
+    assert os.waitstatus_to_exitcode(status) == 128 + signal.SIGHUP
+    assert (tmp_path / "d" / "manifest.json").exists()
 
 
 def test_a_reader_that_leaves_early_is_no_error():

@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+from internav_data.core.interrupts import Interrupts
+
 RUN = """
 import time
 from internav_data.core.interrupts import Interrupts
@@ -18,7 +20,7 @@ with Interrupts() as stop:
 """
 
 
-@pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_second_signal_ends_a_process_at_once(signum):
     with subprocess.Popen([sys.executable, "-c", RUN], stdout=subprocess.PIPE, text=True) as run:
         for line in ("begun\n", "saving\n"):
@@ -28,3 +30,16 @@ def test_a_second_signal_ends_a_process_at_once(signum):
             assert run.wait(timeout=30) == 128 + signum
         finally:
             run.kill()
+
+
+def test_a_signal_that_is_ignored_stays_ignored():
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+    try:
+        with Interrupts() as stop:
+            signal.raise_signal(signal.SIGHUP)
+            assert not stop()
+            signal.raise_signal(signal.SIGTERM)
+            assert stop.signum == signal.SIGTERM
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
