@@ -66,9 +66,13 @@ class LRUCache(Generic[K, V]):
         If `make` raises, nothing changes. A value is made by one thread; others wait for it.
         """
         with self._lock:
-            if key in self._entries:
+            try:
+                known = self._entries[key]  # not `in` before: the hash of a key may take longest
+            except KeyError:
+                pass
+            else:
                 self._entries.move_to_end(key)
-                return self._entries[key]
+                return known
             value = self._entries[key] = make()
             self._weight += self._weigh(value)
             while self._weight > self.capacity and len(self._entries) > 1:

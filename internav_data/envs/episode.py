@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from internav_data.world import StepResult
 
 
+_WHOLE: Final = (int, np.integer)
+_FIRST: Final = int(Action.WAIT)
+
+
 def check_actions(actions: Sequence[Any]) -> list[int]:
     """Return actions as integers; none is taken before all are known to exist.
 
@@ -29,7 +33,7 @@ def check_actions(actions: Sequence[Any]) -> list[int]:
         One is no whole number, or there is no such action.
     """
     for action in actions:
-        if not isinstance(action, int | np.integer) or not Action.WAIT <= action < ACTION_COUNT:
+        if not isinstance(action, _WHOLE) or not _FIRST <= action < ACTION_COUNT:
             raise UsageError(
                 f"step: expected an action of 0 … {ACTION_COUNT - 1}, or -1 to wait; got {action!r}"
             )
