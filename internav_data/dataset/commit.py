@@ -221,9 +221,12 @@ def commit_scenes(
         A scene is neither in the dataset nor staged, or a file is damaged.
     UsageError
         No dataset is there, but somebody's file of a name that one would have.
+    InternavError
+        The folder was removed or is another run's.
 
     """
     store = staging.store
+    staging.check()
     old = read_manifest(store) if has_manifest(store) else None
     journal = Journal(store)
     journal.sweep(old)

@@ -11,8 +11,10 @@ from internav_data.core.storage import FolderStore
 from internav_data.dataset import (
     Staging,
     assemble,
+    commit_scenes,
     done_scenes,
     open_staging,
+    read_manifest,
     read_staged_rows,
     stage_quarantine,
     staged_scenes,
@@ -110,3 +112,16 @@ def test_a_finished_dataset_is_no_staging(tmp_path):
         put(staging)
     assert not (tmp_path / ".work").exists()
     assert done_scenes(staging_of(tmp_path)) == {0, 1, 2}
+
+
+def test_a_run_commits_nothing_into_a_folder_that_is_anothers_by_now(tmp_path):
+    staging = build(tmp_path / "d", range(6))
+    assemble(tmp_path / "d", IDENTITY, ASSETS, 3)
+    shutil.move(tmp_path / "d", tmp_path / "away")
+    other = replace(IDENTITY, seed=8)
+    build(tmp_path / "d", range(3), identity=other)
+    manifest = assemble(tmp_path / "d", other, ASSETS, 3)
+    build(tmp_path / "d", range(3, 6), identity=other)
+    with pytest.raises(InternavError, match="another run's by now"):
+        commit_scenes(staging, IDENTITY, ASSETS, 6)
+    assert read_manifest(tmp_path / "d") == manifest
