@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -20,6 +21,11 @@ settings.register_profile(
     "any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("any machine")
+
+# A background job of a plain shell ignores Ctrl-C, one under nohup a hang-up, and so would all of
+# its children: tests of signals send both.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 # Tests ask the engine itself: an answer from disk would be right even if the engine no longer were.
 os.environ["INTERNAV_CACHE_DIR"] = ""

@@ -14,7 +14,7 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from typing_extensions import Buffer
+    from _typeshed import ReadableBuffer
 
 _STDERR = 2
 
@@ -22,7 +22,7 @@ _STDERR = 2
 class _ForgivingFile(io.FileIO):
     """A file that takes whatever is written, even where the device is full or gone."""
 
-    def write(self, data: Buffer, /) -> int:
+    def write(self, data: ReadableBuffer, /) -> int:
         """Write bytes; return how many were taken: all, after an error."""
         try:
             return super().write(data)
