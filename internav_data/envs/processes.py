@@ -276,7 +276,7 @@ class InterNavProcesses(PlainSpec, VectorEnv[Any, Any, Any]):
         return tuple(picture for pictures in self._ask_all("render") for picture in pictures)
 
     def action_masks(self) -> Bools:
-        """Return which actions could succeed now, (N, 12) bool: `internav_data.world.masks`."""
+        """Return which actions could succeed, (N, actions) bool: `internav_data.world.masks`."""
         return np.concatenate(self._ask_all("action_masks"))
 
     def state(self) -> tuple[EpisodeSnapshot, ...]:

@@ -149,7 +149,7 @@ class InterNavEnv(Rebuilt, gymnasium.Env[dict[str, Any], np.int64]):
         return picture
 
     def action_masks(self) -> Bools:
-        """Return which actions could succeed now, (12,) bool; see `internav_data.world.masks`."""
+        """Return which actions could succeed now, (actions,) bool: `internav_data.world.masks`."""
         return action_mask(self._slot.run.world)
 
     def snapshots(self) -> list[EpisodeSnapshot | None]:

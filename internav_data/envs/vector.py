@@ -259,7 +259,7 @@ class InterNavVectorEnv(Rebuilt, VectorEnv[Any, Any, Any]):
         return tuple(self._large.render([slot.run.view()]).rgb[0] for slot in self.slots)
 
     def action_masks(self) -> Bools:
-        """Return which actions could succeed now, (N, 12) bool: `internav_data.world.masks`."""
+        """Return which actions could succeed, (N, actions) bool: `internav_data.world.masks`."""
         return np.stack([action_mask(slot.run.world) for slot in self.slots])
 
     def snapshots(self) -> list[EpisodeSnapshot | None]:

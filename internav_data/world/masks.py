@@ -17,7 +17,7 @@ _AHEAD = ((1, 0), (0, 1), (-1, 0), (0, -1))
 
 
 def action_mask(world: World) -> Bools:
-    """Return whether each action could succeed, (12,) bool; Done always can end the episode.
+    """Return whether each action could succeed, (actions,) bool; Done always can end the episode.
 
     What is masked out would fail and change nothing. What is not may still fail: a push that
     physics refuses, a drop without room.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -64,3 +66,20 @@ def test_a_capacity_can_grow():
     cache.capacity = 2
     cache.get(2, int)
     assert len(cache) == 2
+
+
+def test_threads_that_ask_for_one_value_share_it():
+    cache, made, others = LRUCache(4), [], []
+
+    def make():
+        made.append(threading.get_ident())
+        if len(made) == 1:  # the second thread asks while the first one is at it
+            others.append(threading.Thread(target=lambda: cache.get("key", make)))
+            others[0].start()
+            others[0].join(0.3)
+        return object()
+
+    first = cache.get("key", make)
+    others[0].join()
+    assert cache.get("key", make) is first
+    assert len(made) == 1

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import threading
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from internav_data.geometry import yaw_quaternion
 from internav_data.navigation import Lattice
 from internav_data.records import Pose
 from internav_data.records.errors import UsageError
+from internav_data.render import asset_mesh
 from internav_data.render.camera import Camera, CameraView, Props, StaticScene
 
 SIZE = 48
@@ -158,3 +160,23 @@ def test_other_processes_draw_the_same_bytes():
         for n in ("1", "2")
     }  # fmt: skip
     assert len(digests) == 1
+
+
+def test_an_asset_that_comes_while_the_mesh_is_made_is_in_the_next_one(monkeypatch):
+    first, second, *_ = catalogue().assets.values()
+    library, join = asset_mesh.Library(), asset_mesh.mesh_of
+    comes = threading.Thread(target=lambda: library.number(second))
+
+    def slow(models):
+        found = join(models)
+        if comes.ident is None:
+            comes.start()
+            comes.join(0.3)
+        return found
+
+    monkeypatch.setattr(asset_mesh, "mesh_of", slow)
+    library.number(first)
+    assert library.mesh
+    comes.join()
+    both = join([asset_mesh.model_of(asset) for asset in (first, second)])
+    assert len(library.mesh.vertices) == len(both.vertices)
