@@ -6,6 +6,7 @@ of an update is a sum across ranks (`ppo.update`). The first rank writes the run
 
 from __future__ import annotations
 
+import atexit
 import os
 from datetime import timedelta
 from typing import Any
@@ -98,6 +99,8 @@ def distributed_context(device: torch.device) -> DistributedContext:
     if not distributed.is_initialized():
         backend = "nccl" if device.type == "cuda" else "gloo"
         distributed.init_process_group(backend, timeout=timedelta(hours=_TIMEOUT_H))
+        # gloo's threads must have ended before the interpreter does, or the process aborts.
+        atexit.register(distributed.destroy_process_group)
     return DistributedContext(device, distributed.get_rank(), size)
 
 

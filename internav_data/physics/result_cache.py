@@ -274,6 +274,8 @@ def _connected(path: Path) -> sqlite3.Connection:
     if not file.execute(schema).fetchall():
         with suppress(sqlite3.OperationalError):
             file.executescript(f"BEGIN IMMEDIATE; {'; '.join(_TABLES)}; COMMIT")
+        if file.in_transaction:  # another process made the tables first: let it write
+            file.execute("ROLLBACK")
     found = file.execute(schema).fetchall()
     if not found:
         raise sqlite3.OperationalError(

@@ -313,13 +313,23 @@ def test_settings_come_from_preset_file_options_and_overrides(tmp_path):
 
 
 BY_GRADIENTS = """
+import atexit
+import os
 import torch
 from internav_cli.camp_train import main
+
+@atexit.register  # registered first, so called last
+def check():
+    if torch.distributed.is_initialized():
+        os._exit(9)
+
 torch.optim.Adam = torch.optim.SGD
 main()
 """
-"""`camp-train` whose steps are the gradients: Adam divides by |g| + 1e-8, so that the last bits of
-tiny gradients would decide on its steps."""
+"""`camp-train` that must leave its process group, and whose steps are the gradients.
+
+Adam divides by |g| + 1e-8, so that the last bits of tiny gradients would decide on its steps.
+"""
 
 
 def test_two_ranks_train_what_one_does(scenes, tmp_path):

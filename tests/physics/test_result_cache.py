@@ -205,6 +205,29 @@ def test_several_processes_write_at_once(tmp_path):
         assert found.get(k.to_bytes(32, "little")) == k.to_bytes(4, "little") * 700
 
 
+def test_who_finds_the_tables_made_meanwhile_writes_and_lets_others_write(tmp_path, monkeypatch):
+    first, looked = [], []
+
+    class Late(sqlite3.Connection):
+        """Connection that looks for tables just before another process makes them."""
+
+        def execute(self, question, *values):
+            cursor = super().execute(question, *values)
+            if question.startswith("SELECT type") and not looked:
+                looked.append(question)
+                found = cursor.fetchall()
+                first.append(ResultCache(tmp_path))
+                return super().execute("SELECT 1 WHERE ?", [bool(found)])
+            return cursor
+
+    monkeypatch.setattr(sqlite3, "connect", functools.partial(sqlite3.connect, factory=Late))
+    late = ResultCache(tmp_path)
+    for number, cache in enumerate((late, *first)):
+        fill(cache, [number])
+        cache.flush()
+    assert known(ResultCache(tmp_path), range(2)) == {0, 1}
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
 def test_a_forked_process_leaves_its_parents_file_alone(tmp_path):
     held = ResultCache(tmp_path)
