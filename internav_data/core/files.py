@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, Final
 from internav_data.records.errors import CorruptDataError, InternavError
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
+    from collections.abc import Callable, Collection, Mapping
     from typing import BinaryIO
 
 DIGEST: Final = "sha256"
@@ -212,28 +212,11 @@ def parse_json(data: bytes, place: object, limits: FileLimits) -> Any:  # noqa: 
         Of the kind that the limits name.
 
     """
-    text = _decoded(data, place, limits)
-    try:
-        value = json.loads(text, object_pairs_hook=_object)
-        _check_value(value, limits, 0)
-    except (ValueError, RecursionError) as error:
-        raise limits.refusal(place, f"not JSON ({_reason(error)})") from error
-    except _RefusedError as error:
-        raise limits.refusal(place, error.text) from None
-    return value
+    return _parsed("JSON", _json_value, data, place, limits)
 
 
 def parse_toml(data: bytes, place: object, limits: FileLimits) -> dict[str, Any]:
     """Return the table of TOML in UTF-8: numbers and texts as in `parse_json`, no dates.
-
-    Parameters
-    ----------
-    data
-        Bytes of the file.
-    place
-        Its path, for errors.
-    limits
-        Limits, and the kind of error.
 
     Raises
     ------
@@ -241,19 +224,8 @@ def parse_toml(data: bytes, place: object, limits: FileLimits) -> dict[str, Any]
         Of the kind that the limits name.
 
     """
-    import tomllib  # noqa: PLC0415 - the loader of datasets needs it not
-
-    text = _decoded(data, place, limits)
-    if _LONG_KEY.search(text):
-        raise limits.refusal(place, "not TOML (a key of more than 32 parts)")
-    try:
-        value = tomllib.loads(text)
-        _check_value(value, limits, 0)
-    except (ValueError, RecursionError) as error:
-        raise limits.refusal(place, f"not TOML ({_reason(error)})") from error
-    except _RefusedError as error:
-        raise limits.refusal(place, error.text) from None
-    return value
+    table: dict[str, Any] = _parsed("TOML", _toml_table, data, place, limits)
+    return table
 
 
 def json_sha256(values: Mapping[str, Any]) -> str:
@@ -342,6 +314,33 @@ def _decoded(data: bytes, place: object, limits: FileLimits) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise limits.refusal(place, f"not UTF-8 text (byte {error.start})") from error
+
+
+def _parsed(
+    kind: str, read: Callable[[str], Any], data: bytes, place: object, limits: FileLimits
+) -> Any:  # noqa: ANN401 - plain values
+    """Return the value that a format's reader finds in UTF-8 text, checked."""
+    text = _decoded(data, place, limits)
+    try:
+        value = read(text)
+        _check_value(value, limits, 0)
+    except (ValueError, RecursionError) as error:
+        raise limits.refusal(place, f"not {kind} ({_reason(error)})") from error
+    except _RefusedError as error:
+        raise limits.refusal(place, error.text) from None
+    return value
+
+
+def _json_value(text: str) -> Any:  # noqa: ANN401 - JSON
+    return json.loads(text, object_pairs_hook=_object)
+
+
+def _toml_table(text: str) -> dict[str, Any]:
+    import tomllib  # noqa: PLC0415 - the loader of datasets needs it not
+
+    if _LONG_KEY.search(text):
+        raise ValueError("a key of more than 32 parts")
+    return tomllib.loads(text)
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
