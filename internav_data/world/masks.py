@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from internav_data.world.actions import ACTIONS, HORIZONS_DEG, Action
-from internav_data.world.world import carries
+from internav_data.world.world import AHEAD, carries
 
 if TYPE_CHECKING:
     from internav_data.core.typing import Bools
     from internav_data.world.world import World
-
-_AHEAD = ((1, 0), (0, 1), (-1, 0), (0, -1))
 
 
 def action_mask(world: World) -> Bools:
@@ -27,7 +25,7 @@ def action_mask(world: World) -> Bools:
 
 def _could_succeed(world: World, action: Action) -> bool:
     if action.kind == "move":
-        return bool(world.lattice.edge_free(world.i, world.j, *_AHEAD[world.quarter]))
+        return bool(world.lattice.edge_free(world.i, world.j, *AHEAD[world.quarter]))
     if action.kind == "look":
         last = HORIZONS_DEG[-1 if action == Action.LOOK_DOWN else 0]
         return world.horizon_deg != last

@@ -59,7 +59,8 @@ MAX_DROP_M: Final = 2.5
 # Moves are most of all actions and have one result each: made once.
 _STEPPED: Final = StepResult(Action.MOVE_AHEAD, success=True)
 _BLOCKED: Final = StepResult(Action.MOVE_AHEAD, success=False, reason="something is in the way")
-_AHEAD: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))
+AHEAD: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))
+"""Lattice step ahead (di, dj) by the agent's quarter turns."""
 
 
 def _known(action: int) -> Action:
@@ -71,7 +72,7 @@ def _known(action: int) -> Action:
 
 
 def _move(world: World, _: Action) -> StepResult:
-    di, dj = _AHEAD[world.quarter]
+    di, dj = AHEAD[world.quarter]
     if not world.lattice.edge_free(world.i, world.j, di, dj):
         return _BLOCKED
     world.i += di
