@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from internav_data.records import Episode
 
 
-def lasting(dataset: str | Path | Dataset[Episode]) -> str | Dataset[Episode]:
+def with_absolute_path(dataset: str | Path | Dataset[Episode]) -> str | Dataset[Episode]:
     """Return a dataset's path, found from any directory; a loaded dataset as it is."""
     return os.path.abspath(dataset) if isinstance(dataset, str | Path) else dataset  # noqa: PTH100
 
@@ -31,7 +31,7 @@ def plain_spec(spec: EnvSpec | None) -> EnvSpec | None:
         return spec
     spec = copy.copy(spec)
     spec.kwargs = dict(spec.kwargs)
-    dataset = lasting(spec.kwargs["dataset"])
+    dataset = with_absolute_path(spec.kwargs["dataset"])
     if not isinstance(dataset, str):
         for name in ("split", "filters"):
             if getattr(dataset, name) is not None:

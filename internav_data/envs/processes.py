@@ -17,7 +17,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 
 from internav_data.core.main_module import dumped, loaded
 from internav_data.core.processes import GRACE_S, Child
-from internav_data.envs.copies import PlainSpec, lasting
+from internav_data.envs.copies import PlainSpec, with_absolute_path
 from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.envs.slot import EpisodeSnapshot, check_options, task_names
 from internav_data.envs.spaces import buffer_shapes
@@ -191,7 +191,7 @@ class InterNavProcesses(PlainSpec, VectorEnv[Any, Any, Any]):
         )  # fmt: skip
         self._copy, self._done = copy, np.zeros(num_envs, np.bool_)
         given = dict(
-            arguments, dataset=lasting(dataset), image_size=image_size,
+            arguments, dataset=with_absolute_path(dataset), image_size=image_size,
             autoreset_mode=self._mode, render_mode=render_mode,
         )  # fmt: skip
         given["sensors"], tasks = sensors, task_names(arguments, num_envs)

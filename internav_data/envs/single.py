@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import gymnasium
 import numpy as np
 
-from internav_data.envs.copies import Rebuilt, lasting
+from internav_data.envs.copies import Rebuilt, with_absolute_path
 from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.envs.slot import (
     Arguments,
@@ -73,7 +73,7 @@ class InterNavEnv(Rebuilt, gymnasium.Env[dict[str, Any], np.int64]):
     ) -> None:
         check_render_mode(render_mode)
         self.render_mode = render_mode
-        dataset = lasting(dataset)
+        dataset = with_absolute_path(dataset)
         self._arguments = dict(
             arguments, dataset=dataset, image_size=image_size, render_mode=render_mode,
             sensors=sensors,

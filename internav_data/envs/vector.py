@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from internav_data.envs.copies import Rebuilt, lasting
+from internav_data.envs.copies import Rebuilt, with_absolute_path
 from internav_data.envs.episode import check_actions
 from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.envs.slot import (
@@ -157,7 +157,7 @@ class InterNavVectorEnv(Rebuilt, VectorEnv[Any, Any, Any]):
         buffers: Observations | None = None,
         **arguments: Unpack[Arguments],
     ) -> None:
-        dataset = lasting(dataset)
+        dataset = with_absolute_path(dataset)
         self._arguments = dict(
             arguments, num_envs=num_envs, dataset=dataset, image_size=image_size,
             autoreset_mode=autoreset_mode, render_mode=render_mode, copy=copy, sensors=sensors,
