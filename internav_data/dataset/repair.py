@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
@@ -20,7 +20,7 @@ from internav_data.dataset.manifest import MANIFEST, has_manifest, read_manifest
 from internav_data.dataset.metadata_files import put_metadata
 from internav_data.dataset.parquet import parquet_bytes
 from internav_data.dataset.staging import read_staged_rows, remove_scenes
-from internav_data.dataset.tables import ASSETS, EPISODES, SCENES, TableSpec
+from internav_data.dataset.tables import ASSETS, SCENES, SPECS
 from internav_data.records.errors import CorruptDataError
 from internav_data.records.splits import split_of_scene
 
@@ -110,7 +110,7 @@ def repair_files(staging: Staging, damage: Damage, assets: Sequence[Asset]) -> N
     store = staging.store
     journal = Journal(store)
     for file in damage.files:
-        data = parquet_bytes(_table(staging, file, damage.scenes(file), assets), _SPECS[file.table])
+        data = parquet_bytes(_table(staging, file, damage.scenes(file), assets), SPECS[file.table])
         if hashlib.sha256(data).hexdigest() != file.sha256:
             raise CorruptDataError(
                 f"{store.at(file.path)}: missing or damaged, and made again it has other bytes "
@@ -127,13 +127,10 @@ def repair_files(staging: Staging, damage: Damage, assets: Sequence[Asset]) -> N
     remove_scenes(staging, damage.all_scenes())
 
 
-_SPECS: dict[str, TableSpec[Any]] = {spec.name: spec for spec in (EPISODES, SCENES, ASSETS)}
-
-
 def _table(
     staging: Staging, file: DataFile, scenes: Sequence[int], assets: Sequence[Asset]
 ) -> pa.Table:
     if file.table == ASSETS.name:
         return shards.assets_table(assets)
     rows = [read_staged_rows(staging, k, house=file.table == SCENES.name) for k in scenes]
-    return pa.concat_tables([_SPECS[file.table].schema.empty_table(), *rows]).combine_chunks()
+    return pa.concat_tables([SPECS[file.table].schema.empty_table(), *rows]).combine_chunks()

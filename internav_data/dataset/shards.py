@@ -20,7 +20,7 @@ from internav_data.dataset.encode import to_table
 from internav_data.dataset.manifest import DataFile, Manifest, check_file, open_file
 from internav_data.dataset.parquet import file_info, parquet_bytes
 from internav_data.dataset.staging import SceneState, Staging, read_staged_rows
-from internav_data.dataset.tables import ASSETS, EPISODES, SCENES, TableSpec
+from internav_data.dataset.tables import ASSETS, EPISODES, SCENES, SPECS, TableSpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -69,7 +69,7 @@ class SceneSource:
 
     def _find_scenes(self, file: DataFile) -> None:
         """Note which rows of a file are a scene's: they stand together."""
-        column = self._read(file, _spec(file.table), ["scene_id"])["scene_id"]
+        column = self._read(file, SPECS[file.table], ["scene_id"])["scene_id"]
         runs, end = pc.value_counts(column).to_pylist(), 0
         self._held[file.path] = [run["values"] for run in runs]
         for run in runs:
@@ -123,10 +123,6 @@ class SceneSource:
             if self._last is None or self._last[0] != span.file.path:
                 self._last = (span.file.path, self._read(span.file, spec))
             yield self._last[1].slice(span.start, span.end - span.start)
-
-
-def _spec(table: str) -> TableSpec[Any]:
-    return EPISODES if table == "episodes" else SCENES
 
 
 def put_shards(

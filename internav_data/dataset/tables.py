@@ -7,12 +7,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import pyarrow as pa
 
 from internav_data.dataset.nodes import Coordinates, Field, Keyed, Leaf, Node, Record, record_node
 from internav_data.records import Asset, Episode, House
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 R = TypeVar("R")
 
@@ -107,3 +110,5 @@ EPISODES: TableSpec[Episode] = TableSpec(
 SCENES: TableSpec[House] = TableSpec("scenes", House, ("scene_id", "scene", "area_m2"))
 ASSETS: TableSpec[Asset] = TableSpec("assets", Asset, ("asset_id",))
 TABLES: tuple[TableSpec[Any], ...] = (EPISODES, SCENES, ASSETS)
+SPECS: Mapping[str, TableSpec[Any]] = {spec.name: spec for spec in TABLES}
+"""Tables by name."""

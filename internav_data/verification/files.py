@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
 from typing import TYPE_CHECKING
 
-from internav_data.core.storage import FolderStore
-from internav_data.dataset import TABLES, logical_digest, read_manifest
+from internav_data.core.storage import FolderStore, file_sha256
+from internav_data.dataset import logical_digest, read_manifest
 from internav_data.dataset.journal import journal_names
 from internav_data.dataset.manifest import MANIFEST
 from internav_data.dataset.parquet import open_parquet
+from internav_data.dataset.tables import SPECS
 from internav_data.records.errors import CorruptDataError, InternavError, UsageError
 from internav_data.verification.findings import FindingCollector
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from internav_data.dataset import DataFile, Manifest
     from internav_data.dataset.manifest import MetadataFile
 
-BLOCK_BYTES = 1 << 20
 CHANGING = "file that a generator is putting or replacing, or was when it was cut off: not checked"
 
 
@@ -106,7 +105,7 @@ def check_file(root: Path, file: DataFile) -> FindingCollector:
     path = root / file.path
     if not _check_bytes(root, file, report):
         return report
-    spec = next(spec for spec in TABLES if spec.name == file.table)
+    spec = SPECS[file.table]
     try:
         with open_parquet(path, spec) as opened:
             table = opened.read_as_written()
@@ -129,11 +128,6 @@ def _check_bytes(root: Path, file: DataFile | MetadataFile, report: FindingColle
         return False
     size = path.stat().st_size
     report.expect(size == file.bytes, "files.bytes", file.bytes, size)
-    digest = hashlib.sha256()
-    with path.open("rb") as stream:
-        while block := stream.read(BLOCK_BYTES):
-            digest.update(block)
-    report.expect(
-        digest.hexdigest() == file.sha256, "files.sha256", file.sha256, digest.hexdigest()
-    )
+    digest = file_sha256(path)
+    report.expect(digest == file.sha256, "files.sha256", file.sha256, digest)
     return True

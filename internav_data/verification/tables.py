@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from internav_data.dataset import ASSETS, EPISODES, SCENES, TABLES, from_table, read_table
+from internav_data.dataset import ASSETS, EPISODES, SCENES, from_table, read_table
+from internav_data.dataset.tables import SPECS
 from internav_data.records import OUTSIDE
 from internav_data.records.errors import InternavError
 from internav_data.verification.checked_config import checked_config
@@ -89,7 +90,7 @@ def _check_table(
 ) -> FindingCollector:
     report = FindingCollector(file.path)
     unsafe.add(file.path)  # until its values are known
-    spec = next(spec for spec in TABLES if spec.name == file.table)
+    spec = SPECS[file.table]
     try:
         table = read_table(root / file.path, spec)
     except InternavError as error:
