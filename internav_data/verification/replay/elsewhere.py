@@ -8,16 +8,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from internav_data.verification.findings import ELSEWHERE_M
-
 if TYPE_CHECKING:
     from internav_data.records import Episode
     from internav_data.verification.findings import FindingCollector
 
-TOLERANCE_M: Final = ELSEWHERE_M
-"""Tolerance along each axis of a settled pose."""
 TURN_TOLERANCE: Final = 2e-3
-"""Tolerance of its quaternion: 4 mrad, 1 mm at 0.25 m."""
+"""Tolerance of a settled pose's quaternion: 4 mrad, 1 mm at 0.25 m."""
 MEASURES: Final = frozenset((
     *("physics.settle-time", "physics.settle-depth"),
     *("physics.outcome-displacement", "physics.outcome-seconds"),

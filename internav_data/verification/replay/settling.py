@@ -15,7 +15,8 @@ import shapely
 
 from internav_data.physics import Body, settle, wall_body
 from internav_data.records import Pose
-from internav_data.verification.replay.elsewhere import TOLERANCE_M, TURN_TOLERANCE
+from internav_data.verification.findings import ELSEWHERE_M
+from internav_data.verification.replay.elsewhere import TURN_TOLERANCE
 from internav_data.verification.shapes import AGENT_HEIGHT_M, STEP_OVER_M
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ TRIES = 3
 def check_settling(scene: CheckedScene, episode: Episode, expect: Expect) -> None:
     """Let every obstacle of an episode fall again, in order."""
     same = scene.config.same_hardware
-    most_m, most_turned = (ROUNDED_M, ROUNDED) if same else (TOLERANCE_M, TURN_TOLERANCE)
+    most_m, most_turned = (ROUNDED_M, ROUNDED) if same else (ELSEWHERE_M, TURN_TOLERANCE)
     for number, obstacle in enumerate(episode.obstacles):
         what = f"obstacle {number} ({obstacle.asset_id})"
         settled = _fall(scene, episode, number)
