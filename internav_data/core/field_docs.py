@@ -12,21 +12,26 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 
-_KNOWN: dict[type[Any], Mapping[str, str]] = {}
-"""Docstrings read so far: finding and parsing a source takes 10 ms, and a commit asks 30 times."""
+_KNOWN: dict[type[Any], tuple[str, Mapping[str, str]]] = {}
+"""What was read of each class: parsing a source takes 10 ms, and a commit asks 60 times."""
 
 
 def descriptions(cls: type[Any]) -> Mapping[str, str]:
     """Return the docstrings below a dataclass's fields, by name; none where there is no source."""
-    if cls not in _KNOWN:
-        _KNOWN[cls] = MappingProxyType(_read(cls))
-    return _KNOWN[cls]
+    return _read(cls)[1]
 
 
 def class_description(cls: type[Any]) -> str:
     """Return a class's docstring, under `python -OO` too; empty where there is no source."""
-    found = _definition(cls)
-    return "" if found is None else ast.get_docstring(found) or ""
+    return _read(cls)[0]
+
+
+def _read(cls: type[Any]) -> tuple[str, Mapping[str, str]]:
+    if cls not in _KNOWN:
+        found = _definition(cls)
+        text = "" if found is None else ast.get_docstring(found) or ""
+        _KNOWN[cls] = text, MappingProxyType(_notes([] if found is None else found.body))
+    return _KNOWN[cls]
 
 
 def _definition(cls: type[Any]) -> ast.ClassDef | None:
@@ -37,10 +42,8 @@ def _definition(cls: type[Any]) -> ast.ClassDef | None:
     return tree.body[0] if isinstance(tree.body[0], ast.ClassDef) else None
 
 
-def _read(cls: type[Any]) -> dict[str, str]:
-    found = _definition(cls)
+def _notes(body: list[ast.stmt]) -> dict[str, str]:
     notes = {}
-    body = [] if found is None else found.body
     for field, after in pairwise(body):
         if (
             isinstance(field, ast.AnnAssign)

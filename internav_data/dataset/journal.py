@@ -49,10 +49,10 @@ class Journal:
         self.announce(name)
         self._store.put(name, data)
 
-    def announce(self, name: str) -> None:
-        """Note a name under which a blob is to be put, and that of its temporary file."""
-        temporary = temporary_of(name)
-        self.note([name] if exists(self._store, temporary) else [name, temporary])
+    def announce(self, *names: str) -> None:
+        """Note names under which blobs are to be put, and those of their temporary files."""
+        temporary = (name for name in map(temporary_of, names) if not exists(self._store, name))
+        self.note([*names, *temporary])
 
     def note(self, names: Iterable[str]) -> None:
         """Note names of files that are to be put or removed."""

@@ -48,8 +48,9 @@ def metadata_blobs(store: Store, manifest: Manifest) -> dict[str, bytes]:
 
 def put_metadata(journal: Journal, store: Store, manifest: Manifest) -> Manifest:
     """Put the files beside the data and return the manifest that lists them."""
-    files = []
-    for name, data in metadata_blobs(store, manifest).items():
+    files, blobs = [], metadata_blobs(store, manifest)
+    journal.announce(*blobs)  # at once: the disk is waited for at each change of the journal
+    for name, data in blobs.items():
         journal.put(name, data)
         files.append(MetadataFile(name, len(data), hashlib.sha256(data).hexdigest()))
     return replace(manifest, metadata=tuple(files))
