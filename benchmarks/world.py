@@ -25,8 +25,8 @@ from internav_data.episodes import build_episodes
 from internav_data.episodes.outcomes import outcomes_of
 from internav_data.geometry import yaw_quaternion
 from internav_data.houses import HouseConfig, build_house
-from internav_data.physics import get_engine, push
-from internav_data.physics.cache import CachedEngine
+from internav_data.physics import get_solver, push
+from internav_data.physics.cache import Solver
 from internav_data.physics.engines.bullet import bullet
 from internav_data.physics.result_cache import FOLDER_VARIABLE, ResultCache
 from internav_data.physics.scene import UPRIGHT, Body, PhysicsScene
@@ -64,8 +64,8 @@ def summary(times: list[float]) -> dict[str, float]:
 
 def forget(*, lone: bool = True) -> None:
     """Drop the pushes in memory: all, or only those among other objects."""
-    engine = get_engine()
-    assert isinstance(engine, CachedEngine)
+    engine = get_solver()
+    assert isinstance(engine, Solver)
     engine.forget(lone=lone)
 
 
@@ -100,11 +100,11 @@ def kept_pushes(folder: Path) -> dict[str, float]:
     """Free pushes that another process has solved and kept on disk."""
     pool = [asset for asset in catalogue().spawnable if asset.pushable][::3]
     asked = [PhysicsScene((Body.of(asset, Pose(0.0, 0.0, 0.001, UPRIGHT)),)) for asset in pool]
-    first = CachedEngine(bullet(), ResultCache(folder), "here")
+    first = Solver(bullet(), ResultCache(folder), "here")
     for scene in asked:
         first.push(scene, PUSH_SPECS["force"])
     first.result_cache.flush()
-    later = CachedEngine(bullet(), ResultCache(folder), "here")
+    later = Solver(bullet(), ResultCache(folder), "here")
     return summary([timed(lambda s=scene: later.push(s, PUSH_SPECS["force"])) for scene in asked])
 
 

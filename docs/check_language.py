@@ -108,7 +108,7 @@ DIALECT_CLASSES = {
     "Preset": "HousePreset or TrainPreset",
     "Pushed": "PushResult",
     "Ran": "ForwardOutput",
-    "Remembering": "CachedEngine",
+    "Remembering": "Solver",
     "Rest": "SettleSolution (unrounded, in its own frame)",
     "Rules": "TaskConfig",
     "Scenery": "StaticScene or CheckedLayout",

@@ -19,7 +19,7 @@ from internav_data.episodes.site import SpawnSite
 from internav_data.episodes.spawn import EpisodeDraft, spawn
 from internav_data.geometry import round_m
 from internav_data.navigation import SPACING_M, node_paths
-from internav_data.physics import Body, get_engine
+from internav_data.physics import Body, get_solver
 from internav_data.planner.search import solve
 from internav_data.records import (
     Episode,
@@ -304,7 +304,7 @@ def _obstacle(spawned: Spawned, outcomes: tuple[Outcome, ...]) -> Obstacle:
 
 
 def _physics(draft: EpisodeDraft) -> Physics:
-    engine = get_engine(draft.config.engine)
+    engine = get_solver(draft.config.engine)
     return Physics(
         engine=engine.name,
         build=engine.build,

@@ -8,12 +8,13 @@ from internav_data.core.lazy import lazy_imports
 from internav_data.physics.engines import DEFAULT_ENGINE, ENGINES
 
 if TYPE_CHECKING:
+    from internav_data.physics.cache import Solver
+    from internav_data.physics.engines.protocol import Engine, Simulation
     from internav_data.physics.pushing import PushResult, push
-    from internav_data.physics.registry import cache_disabled, get_engine
+    from internav_data.physics.registry import cache_disabled, get_solver
     from internav_data.physics.scene import (
         AgentCollider,
         Body,
-        Engine,
         PhysicsScene,
         PushSolution,
         SettleSolution,
@@ -32,8 +33,10 @@ __all__ = [
     "PushSolution",
     "SettleResult",
     "SettleSolution",
+    "Simulation",
+    "Solver",
     "cache_disabled",
-    "get_engine",
+    "get_solver",
     "push",
     "settle",
     "wall_body",
@@ -43,12 +46,13 @@ __all__ = [
 __getattr__, __dir__ = lazy_imports(
     __name__,
     {
+        "cache": ["Solver"],
+        "engines.protocol": ["Engine", "Simulation"],
         "pushing": ["PushResult", "push"],
-        "registry": ["cache_disabled", "get_engine"],
+        "registry": ["cache_disabled", "get_solver"],
         "scene": [
             "AgentCollider",
             "Body",
-            "Engine",
             "PhysicsScene",
             "PushSolution",
             "SettleSolution",

@@ -1,4 +1,4 @@
-"""Wrapper of a physics engine that looks solutions up, in memory and on disk, before it solves.
+"""Solver on a physics engine that looks solutions up, in memory and on disk, before it solves.
 
 This module knows physics: which problems are equal, what a solution depends on besides, and how it
 is packed into bytes. The file on disk that holds those bytes is `result_cache`, which knows none.
@@ -26,14 +26,15 @@ from typing import TYPE_CHECKING, Final, TypeVar
 from internav_data.core.hardware import hardware
 from internav_data.core.lru import LRUCache
 from internav_data.physics.scene import PhysicsScene, PushSolution, SettleSolution
+from internav_data.physics.solving import RULES, solve_push, solve_settle
 from internav_data.physics.sweep import PATH_POSE_BYTES
 from internav_data.records import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from internav_data.physics.engines.protocol import Engine
     from internav_data.physics.result_cache import ResultCache
-    from internav_data.physics.scene import Engine
     from internav_data.records import Asset, PushSpec
 
 S = TypeVar("S")
@@ -78,8 +79,11 @@ def _pushes(capacity: int) -> LRUCache[tuple[PushSpec, PhysicsScene], PushSoluti
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CachedEngine:
-    """An engine that solves only problems whose solution is not known yet."""
+class Solver:
+    """Solver on one engine: it simulates only problems whose solution is not known yet.
+
+    Its results are a pure function of the problem, in any process and after any history.
+    """
 
     engine: Engine
     result_cache: ResultCache | None
@@ -101,18 +105,8 @@ class CachedEngine:
 
     @property
     def build(self) -> str:
-        """Version and build of the engine."""
-        return self.engine.build
-
-    @property
-    def rules(self) -> int:
-        """Number of the engine's rules (`Engine.rules`)."""
-        return self.engine.rules
-
-    @property
-    def libraries(self) -> tuple[str, ...]:
-        """Installed distributions that the engine's results come from."""
-        return self.engine.libraries
+        """Version of the engine and number of the rules, as stored in certificates."""
+        return f"{self.engine.build}, rules {RULES}"
 
     @property
     def contact_margin_m(self) -> float:
@@ -123,7 +117,7 @@ class CachedEngine:
         """Let the first body of the scene fall until it rests."""
 
         def solve() -> SettleSolution:
-            return self.engine.settle(scene)
+            return solve_settle(self.engine, scene)
 
         return self._settled.get(
             scene, lambda: self._find("settle", scene, solve, pack_settle, unpack_settle)
@@ -133,7 +127,7 @@ class CachedEngine:
         """Push the first body of the scene along +x."""
 
         def solve() -> PushSolution:
-            return self.engine.push(scene, spec)
+            return solve_push(self.engine, scene, spec)
 
         known = self._lone if _is_lone(scene) else self._crowded
         return known.get(

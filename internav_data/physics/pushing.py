@@ -18,7 +18,7 @@ from internav_data.physics.engines import DEFAULT_ENGINE
 from internav_data.physics.frames import Frame
 from internav_data.physics.kdop import grown
 from internav_data.physics.narrow_phase import met_on_path, prisms_of, prisms_of_collider
-from internav_data.physics.registry import get_engine
+from internav_data.physics.registry import get_solver
 from internav_data.physics.scene import (
     AGENT_HEIGHT_M,
     AGENT_LOW_M,
@@ -33,8 +33,9 @@ from internav_data.records.agent import AGENT
 if TYPE_CHECKING:
     from collections.abc import Callable, Container, Sequence
 
+    from internav_data.physics.cache import Solver
     from internav_data.physics.kdop import Dop8
-    from internav_data.physics.scene import Engine, PushSolution
+    from internav_data.physics.scene import PushSolution
     from internav_data.records import Asset, PushSpec, Quaternion, Vec2
 
     Near = Callable[[Dop8], Sequence[tuple[int, Body]]]
@@ -101,7 +102,7 @@ class _Problem:
     pushed: Body
     spec: PushSpec
     near: Near
-    solver: Engine
+    solver: Solver
 
     @staticmethod
     def of(body: Body, heading: int, near: Near, spec: PushSpec, engine: str) -> _Problem:
@@ -109,7 +110,7 @@ class _Problem:
         turn = _coarse(frame.enter(body.pose).quaternion)
         start = Pose(0.0, 0.0, round(body.pose.z, _HEIGHT_DIGITS), turn)
         pushed = Body(body.asset, start, body.dynamics)
-        return _Problem(frame, pushed, spec, near, get_engine(engine))
+        return _Problem(frame, pushed, spec, near, get_solver(engine))
 
     @property
     def margin_m(self) -> float:

@@ -1,4 +1,4 @@
-"""Access to the physics engines by name: connected at first use, one of each per process."""
+"""Access to the solvers by the names of their engines: one of each per process."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 from internav_data.core.locks import ThreadLock
-from internav_data.physics.cache import CachedEngine, origin
+from internav_data.physics.cache import Solver, origin
 from internav_data.physics.engines import DEFAULT_ENGINE, ENGINES
 from internav_data.physics.result_cache import ResultCache, result_cache
 from internav_data.records.errors import UsageError
@@ -16,7 +16,7 @@ from internav_data.records.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from internav_data.physics.scene import Engine
+    from internav_data.physics.engines.protocol import Engine
 
 _cache_off: ContextVar[bool] = ContextVar("_cache_off", default=False)
 """Of one thread: another one may read the cache meanwhile."""
@@ -33,10 +33,10 @@ def cache_disabled() -> Iterator[None]:
         _cache_off.reset(before)
 
 
-def get_engine(name: str = DEFAULT_ENGINE) -> Engine:
-    """Return a physics engine, connected at first use.
+def get_solver(name: str = DEFAULT_ENGINE) -> Solver:
+    """Return the solver on a physics engine, which is connected at first use.
 
-    The engine reads and fills the user's result cache, except inside `cache_disabled`.
+    The solver reads and fills the user's result cache, except inside `cache_disabled`.
 
     Raises
     ------
@@ -52,6 +52,6 @@ def get_engine(name: str = DEFAULT_ENGINE) -> Engine:
 
 
 @lru_cache(maxsize=8)
-def _cached(engine: Engine, known: ResultCache | None) -> Engine:
+def _cached(engine: Engine, known: ResultCache | None) -> Solver:
     where = origin(engine)
-    return CachedEngine(engine, known if where else None, where or "")
+    return Solver(engine, known if where else None, where or "")

@@ -1,9 +1,9 @@
-"""Problems of physics and their solutions as plain data, and the protocol of an engine."""
+"""Problems of physics and their solutions as plain data."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Final
 
 from internav_data.records import Asset, Part, Pose
 from internav_data.records.agent import AGENT
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from internav_data.physics.kdop import Dop8
-    from internav_data.records import Dynamics, Obstacle, PushSpec, Quaternion, Wall
+    from internav_data.records import Dynamics, Obstacle, Quaternion, Wall
 
 UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
 AGENT_LOW_M: Final = 0.022
@@ -57,7 +57,7 @@ class AgentCollider:
 
 @dataclass(frozen=True, slots=True)
 class PhysicsScene:
-    """A problem for an engine: the few bodies that can touch each other, on a floor at z = 0."""
+    """A problem of physics: the few bodies that can touch each other, on a floor at z = 0."""
 
     bodies: tuple[Body, ...]
     """Bodies in the order in which they enter the engine; the first one falls or is pushed."""
@@ -88,7 +88,7 @@ def wall_body(wall: Wall) -> Body:
 
 @dataclass(frozen=True, slots=True)
 class SettleSolution:
-    """An engine's solution of a settle, in the frame of its scene."""
+    """Solution of a settle, in the frame of its scene."""
 
     pose: Pose
     """Final pose of the first body, unrounded."""
@@ -103,7 +103,7 @@ class SettleSolution:
 
 @dataclass(frozen=True, slots=True)
 class PushSolution:
-    """An engine's solution of a push, in the frame of its scene: one entry per moving body."""
+    """Solution of a push, in the frame of its scene: one entry per moving body."""
 
     poses: tuple[Pose, ...]
     """Final poses, unrounded."""
@@ -114,44 +114,3 @@ class PushSolution:
     seconds: float
     """Simulated time from the first touch until at rest, or the time limit."""
     at_rest: bool
-
-
-class Engine(Protocol):
-    """A physics engine: pure functions from scenes to solutions.
-
-    No state remains between two calls: the same scene gives the same solution to the last bit, in
-    any process and after any history.
-    """
-
-    @property
-    def name(self) -> str:
-        """Name of the engine, as stored in certificates."""
-
-    @property
-    def build(self) -> str:
-        """Version of the engine and number of its rules, as stored in certificates."""
-
-    @property
-    def rules(self) -> int:
-        """Number of the rules by which scenes are built and solved; part of `build`.
-
-        Raised with every change of results: a dataset of other rules is not taken for a wrong one,
-        and no cached result outlives its rules.
-        """
-
-    @property
-    def libraries(self) -> tuple[str, ...]:
-        """Installed distributions that results come from, besides numpy and numba."""
-
-    @property
-    def contact_margin_m(self) -> float:
-        """Distance at which two bodies of this engine may already touch, metres."""
-
-    def settle(self, scene: PhysicsScene) -> SettleSolution:
-        """Let the first body of the scene fall until it rests; the others stay."""
-
-    def push(self, scene: PhysicsScene, spec: PushSpec) -> PushSolution:
-        """Push the first body along +x; bodies that move take part, the others stay."""
-
-    def __hash__(self) -> int:
-        """Return a hash: engines are part of the keys of cached solutions."""

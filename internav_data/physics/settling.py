@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from internav_data.geometry import multiply, rotation_matrix, round_m, round_quaternion
 from internav_data.physics.engines import DEFAULT_ENGINE
-from internav_data.physics.registry import get_engine
+from internav_data.physics.registry import get_solver
 from internav_data.physics.scene import UPRIGHT, Body, PhysicsScene
 from internav_data.records import Pose
 
@@ -67,7 +67,7 @@ def settle(
         No engine has this name.
 
     """
-    solver = get_engine(engine)
+    solver = get_solver(engine)
     falling = Body(body.asset, _START, body.dynamics)
     solution = solver.settle(PhysicsScene((falling,)))
     if solution.reach_m + solver.contact_margin_m > clearance_m:

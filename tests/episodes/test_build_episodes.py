@@ -15,7 +15,7 @@ from internav_data.episodes.outcomes import outcomes_of
 from internav_data.episodes.spawn import NEAR_M
 from internav_data.geometry import asset_corners, footprint, house_footprints, transform
 from internav_data.houses import HouseConfig, build_house
-from internav_data.physics import Body, PhysicsScene, get_engine, wall_body
+from internav_data.physics import Body, PhysicsScene, get_solver, wall_body
 from internav_data.physics.result_cache import ResultCache
 from internav_data.physics.scene import UPRIGHT
 from internav_data.planner.search import replay
@@ -173,7 +173,7 @@ def test_same_episode_in_a_fresh_process(episodes):
 
 def test_obstacles_stay_at_rest_in_a_whole_scene_of_bullet(houses, episodes):
     # The generator lets each thing fall as if alone; here each falls among all that is near it.
-    engine = get_engine()
+    engine = get_solver()
     assets = {**houses[1].assets, **catalogue().assets}
     for episode in episodes[1][:4]:
         for k, obstacle in enumerate(episode.obstacles):
@@ -311,7 +311,7 @@ def test_invalid_settings_are_refused(field, value):
 
 
 def test_all_spawnable_assets_settle(pool):
-    engine = get_engine()
+    engine = get_solver()
     for asset in pool[::7]:
         rest = engine.settle(PhysicsScene((Body.of(asset, Pose(0.0, 0.0, 0.01, UPRIGHT)),)))
         assert rest.at_rest, asset.asset_id

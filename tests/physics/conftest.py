@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import pytest
 
-from internav_data.physics.engines.bullet import Bullet
+from internav_data.physics import cache
 
 
 @pytest.fixture
 def solved(monkeypatch):
-    """Scenes that Bullet was asked to push in, in order."""
+    """Scenes whose pushes were simulated, in order."""
     asked = []
-    solve = Bullet.push
+    solve = cache.solve_push
 
-    def watched(self, scene, spec):
+    def watched(engine, scene, spec):
         asked.append(scene)
-        return solve(self, scene, spec)
+        return solve(engine, scene, spec)
 
-    monkeypatch.setattr(Bullet, "push", watched)
+    monkeypatch.setattr(cache, "solve_push", watched)
     return asked

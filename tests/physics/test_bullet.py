@@ -10,6 +10,7 @@ from internav_data.geometry import yaw_quaternion
 from internav_data.physics import AgentCollider, Body, PhysicsScene, wall_body
 from internav_data.physics.engines.bullet import Bullet, bullet
 from internav_data.physics.engines.bullet_scene import SCENES_PER_WORLD, Builder, pybullet
+from internav_data.physics.solving import solve_push, solve_settle
 from internav_data.records import PUSH_SPECS, Pose, Wall
 
 LEGS = {"leg_m": 0.05, "friction": 0.5}
@@ -44,7 +45,9 @@ def scenes(count):
 
 
 def answer(engine, scene, falls):
-    return engine.settle(scene) if falls else engine.push(scene, PUSH_SPECS["force"])
+    if falls:
+        return solve_settle(engine, scene)
+    return solve_push(engine, scene, PUSH_SPECS["force"])
 
 
 @pytest.fixture
@@ -67,7 +70,7 @@ def test_what_an_interrupt_left_in_a_world_is_swept_away(fresh, monkeypatch):
     asked = [scene for scene, falls in scenes(60) if not falls]
     lone = next(scene for scene in asked if len(scene.bodies) == 1)
     crowded = next(scene for scene in asked if len(scene.bodies) > 1)
-    expected = fresh.push(lone, PUSH_SPECS["force"])
+    expected = solve_push(fresh, lone, PUSH_SPECS["force"])
     real = pybullet.createMultiBody
 
     def interrupted(*args, **where):
@@ -79,8 +82,8 @@ def test_what_an_interrupt_left_in_a_world_is_swept_away(fresh, monkeypatch):
         with monkeypatch.context() as patch:
             patch.setattr(pybullet, "createMultiBody", interrupted)
             with pytest.raises(KeyboardInterrupt):
-                bullet().push(crowded, PUSH_SPECS["force"])
-        assert bullet().push(lone, PUSH_SPECS["force"]) == expected
+                solve_push(bullet(), crowded, PUSH_SPECS["force"])
+        assert solve_push(bullet(), lone, PUSH_SPECS["force"]) == expected
 
 
 def test_a_world_is_given_up_before_it_leaks_much(monkeypatch):
@@ -99,11 +102,11 @@ def test_a_world_is_given_up_before_it_leaks_much(monkeypatch):
 
 def test_what_a_users_own_client_sets_changes_nothing():
     asked = [scene for scene, falls in scenes(30) if not falls]
-    expected = [bullet().push(scene, PUSH_SPECS["force"]) for scene in asked]
+    expected = [solve_push(bullet(), scene, PUSH_SPECS["force"]) for scene in asked]
     client = pybullet.connect(pybullet.DIRECT)
     # Bullet's own global, whichever client it is set by.
     pybullet.setPhysicsEngineParameter(contactBreakingThreshold=0.02, physicsClientId=client)
-    answers = [bullet().push(scene, PUSH_SPECS["force"]) for scene in asked]
+    answers = [solve_push(bullet(), scene, PUSH_SPECS["force"]) for scene in asked]
     pybullet.disconnect(client)
     assert answers == expected
 

@@ -1,4 +1,4 @@
-"""The cached engine returns solutions to the last bit, whatever happens to the cache's file."""
+"""The solver returns solutions to the last bit, whatever happens to the cache's file."""
 
 import contextlib
 import functools
@@ -22,10 +22,10 @@ from internav_data.physics import (
     PushSolution,
     SettleSolution,
     cache_disabled,
-    get_engine,
+    get_solver,
 )
 from internav_data.physics.cache import (
-    CachedEngine,
+    Solver,
     origin,
     pack_push,
     pack_settle,
@@ -34,6 +34,7 @@ from internav_data.physics.cache import (
 )
 from internav_data.physics.engines.bullet import bullet
 from internav_data.physics.result_cache import FILE_NAME, ResultCache
+from internav_data.physics.solving import solve_push, solve_settle
 from internav_data.records import PUSH_SPECS, Pose
 
 BOX = crate("Box_0", (0.4, 0.4, 0.3), mass_kg=3.0, friction=0.5, pickable=True)
@@ -43,24 +44,21 @@ FORCE = PUSH_SPECS["force"]
 
 
 class Counting:
-    """An engine that counts what it is asked."""
+    """Bullet under another name; it counts the scenes that it loads."""
 
-    name, build = "counting", "1"
+    name, build, libraries = "counting", "1", ("pybullet",)
+    contact_margin_m, step_s = 0.0, bullet().step_s
 
     def __init__(self):
         self.asked = 0
 
-    def push(self, scene, spec):
+    def load(self, scene):
         self.asked += 1
-        return bullet().push(scene, spec)
-
-    def settle(self, scene):
-        self.asked += 1
-        return bullet().settle(scene)
+        return bullet().load(scene)
 
 
 def remembering(folder, origin="here", engine=None):
-    return CachedEngine(engine or Counting(), ResultCache(folder), origin)
+    return Solver(engine or Counting(), ResultCache(folder), origin)
 
 
 def test_a_later_process_reads_what_was_solved_to_the_last_bit(tmp_path):
@@ -69,27 +67,27 @@ def test_a_later_process_reads_what_was_solved_to_the_last_bit(tmp_path):
     assert first.engine.asked == 2
     first.result_cache.flush()
     later = remembering(tmp_path)
-    assert later.push(LONE, FORCE) == pushed == bullet().push(LONE, FORCE)
-    assert later.settle(LONE) == settled == bullet().settle(LONE)
+    assert later.push(LONE, FORCE) == pushed == solve_push(bullet(), LONE, FORCE)
+    assert later.settle(LONE) == settled == solve_settle(bullet(), LONE)
     assert later.engine.asked == 0
 
 
 def test_a_push_among_others_is_kept_by_its_process_alone(tmp_path):
-    engine = remembering(tmp_path)
-    pushed = engine.push(PAIR, FORCE)
-    assert engine.push(PAIR, FORCE) is pushed
-    assert engine.engine.asked == 1
-    assert engine.result_cache.count() == 0
+    solver = remembering(tmp_path)
+    pushed = solver.push(PAIR, FORCE)
+    assert solver.push(PAIR, FORCE) is pushed
+    assert solver.engine.asked == 1
+    assert solver.result_cache.count() == 0
     assert remembering(tmp_path).push(PAIR, FORCE) == pushed
 
 
 def test_memory_of_solutions_is_counted_in_bytes(monkeypatch):
     monkeypatch.setattr("internav_data.physics.cache._LONE_BYTES", 50_000)
-    engine = CachedEngine(Counting(), None, "here")
+    solver = Solver(Counting(), None, "here")
     bodies = [replace(LONE.bodies[0], pose=Pose(0.01 * k, 0.0, 0.0, UPRIGHT)) for k in range(30)]
-    paths = sum(len(engine.push(PhysicsScene((body,)), FORCE).paths[0]) for body in bodies)
+    paths = sum(len(solver.push(PhysicsScene((body,)), FORCE).paths[0]) for body in bodies)
     assert paths > 50_000
-    assert 2 < len(engine._lone) < 50_000 // (paths // 30)  # noqa: SLF001 - entries in memory
+    assert 2 < len(solver._lone) < 50_000 // (paths // 30)  # noqa: SLF001 - entries in memory
 
 
 @pytest.fixture
@@ -105,7 +103,7 @@ def test_a_wrong_solution_is_found_on_use_and_the_cache_dropped(tmp_path):
     assert wise.engine.asked == 1
     assert wise.result_cache.count() == 1, "what is right stays"
     liar = Counting()
-    liar.push = lambda scene, spec: replace(bullet().push(scene, spec), seconds=1.0)
+    liar.step_s /= 2.0
     lying = remembering(tmp_path / "other", engine=liar)
     lie = lying.push(LONE, FORCE)
     lying.settle(LONE)
@@ -151,7 +149,7 @@ def test_a_value_under_another_key_is_not_believed(tmp_path):
 
 
 def test_every_difference_in_what_is_asked_is_another_question(tmp_path):
-    engine = remembering(tmp_path)
+    solver = remembering(tmp_path)
     body = LONE.bodies[0]
     asked = [
         (LONE, FORCE),
@@ -163,10 +161,10 @@ def test_every_difference_in_what_is_asked_is_another_question(tmp_path):
         (PhysicsScene((body, replace(PAIR.bodies[1], moves=False))), FORCE),
     ]
     for scene, spec in asked:
-        engine.push(scene, spec)
-    engine.settle(LONE)
-    assert engine.engine.asked == len(asked) + 1
-    assert engine.result_cache.count() == len(asked) + 1 - 2, "those of two bodies stay in memory"
+        solver.push(scene, spec)
+    solver.settle(LONE)
+    assert solver.engine.asked == len(asked) + 1
+    assert solver.result_cache.count() == len(asked) + 1 - 2, "those of two bodies stay in memory"
 
 
 def test_other_rules_or_machines_are_not_believed(tmp_path):
@@ -294,9 +292,9 @@ def test_no_bytes_make_reading_fail(value, movers):
 
 
 def kept(folder):
-    engine = remembering(folder)
-    solution = engine.push(LONE, FORCE)
-    engine.result_cache.flush()
+    solver = remembering(folder)
+    solution = solver.push(LONE, FORCE)
+    solver.result_cache.flush()
     return solution
 
 
@@ -347,11 +345,11 @@ def test_another_database_is_begun_anew(tmp_path, schema):
 
 @pytest.mark.parametrize("where", [0.0, 0.3, 0.6])
 def test_a_file_damaged_anywhere_costs_no_answer_and_is_begun_anew(tmp_path, where):
-    engine = remembering(tmp_path)
-    solution = engine.push(LONE, FORCE)
+    solver = remembering(tmp_path)
+    solution = solver.push(LONE, FORCE)
     for k in range(200):
-        engine.result_cache.put(bytes([k]) * 32, bytes(3000))
-    engine.result_cache.flush()
+        solver.result_cache.put(bytes([k]) * 32, bytes(3000))
+    solver.result_cache.flush()
     path = tmp_path / FILE_NAME
     with path.open("r+b") as file:
         file.seek(int(where * path.stat().st_size))
@@ -360,16 +358,16 @@ def test_a_file_damaged_anywhere_costs_no_answer_and_is_begun_anew(tmp_path, whe
     for _ in range(2):
         later = remembering(tmp_path)
         assert {later.result_cache.get(key) for key in asked} <= {None, bytes(3000)}
-        assert later.push(LONE, FORCE) == engine.push(LONE, FORCE) == solution
+        assert later.push(LONE, FORCE) == solver.push(LONE, FORCE) == solution
     assert kept(tmp_path) == solution
     assert remembering(tmp_path).result_cache.count() >= 1
 
 
 def test_a_folder_that_cannot_be_made_keeps_nothing(tmp_path):
     (tmp_path / "file").write_text("in the way")
-    engine = remembering(tmp_path / "file" / "below")
-    assert engine.push(LONE, FORCE) == bullet().push(LONE, FORCE)
-    assert engine.result_cache.count() == 0
+    solver = remembering(tmp_path / "file" / "below")
+    assert solver.push(LONE, FORCE) == solve_push(bullet(), LONE, FORCE)
+    assert solver.result_cache.count() == 0
 
 
 def test_a_read_only_file_is_read(tmp_path, monkeypatch):
@@ -381,11 +379,11 @@ def test_a_read_only_file_is_read(tmp_path, monkeypatch):
             self.execute("PRAGMA query_only = ON")
 
     monkeypatch.setattr(sqlite3, "connect", functools.partial(sqlite3.connect, factory=ReadOnly))
-    engine = remembering(tmp_path)
-    engine.push(LONE, FORCE)
-    assert engine.engine.asked == 0
-    engine.push(PAIR, FORCE)
-    assert engine.result_cache.count() == 1
+    solver = remembering(tmp_path)
+    solver.push(LONE, FORCE)
+    assert solver.engine.asked == 0
+    solver.push(PAIR, FORCE)
+    assert solver.result_cache.count() == 1
 
 
 def test_a_writer_who_is_waited_for_in_vain_costs_no_answer(tmp_path, monkeypatch):
@@ -395,9 +393,9 @@ def test_a_writer_who_is_waited_for_in_vain_costs_no_answer(tmp_path, monkeypatc
     with contextlib.closing(opened(tmp_path)) as other:
         other.execute("BEGIN EXCLUSIVE")
         shut_out = remembering(tmp_path)
-        for engine in (held, shut_out):
-            assert engine.push(LONE, FORCE) == solution
-            engine.result_cache.flush()
+        for solver in (held, shut_out):
+            assert solver.push(LONE, FORCE) == solution
+            solver.result_cache.flush()
     assert not shut_out.result_cache.is_open
     assert held.push(LONE, FORCE) == remembering(tmp_path).push(LONE, FORCE) == solution
 
@@ -417,11 +415,11 @@ def test_solving_anew_believes_nothing_that_is_kept(tmp_path, monkeypatch):
             super().put(key, value)
 
     held = Recording(tmp_path)
-    lie = replace(get_engine().push(LONE, FORCE), seconds=123.0)
+    lie = replace(get_solver().push(LONE, FORCE), seconds=123.0)
     held.put(held.last, pack_push(lie))
     held.flush()
     held = ResultCache(tmp_path)
-    assert get_engine().push(LONE, FORCE) == lie
+    assert get_solver().push(LONE, FORCE) == lie
     with cache_disabled():
-        assert get_engine().push(LONE, FORCE) == bullet().push(LONE, FORCE) != lie
-    assert get_engine().push(LONE, FORCE) == lie
+        assert get_solver().push(LONE, FORCE) == solve_push(bullet(), LONE, FORCE) != lie
+    assert get_solver().push(LONE, FORCE) == lie

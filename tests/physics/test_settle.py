@@ -8,7 +8,7 @@ import pytest
 from builders import UPRIGHT, asset, box, chair, crate
 
 from internav_data.geometry import asset_corners, transform, yaw_quaternion
-from internav_data.physics import Body, PhysicsScene, get_engine, settle, wall_body
+from internav_data.physics import Body, PhysicsScene, get_solver, settle, wall_body
 from internav_data.physics.settling import MAX_PENETRATION_M
 from internav_data.records import Pose, Wall
 
@@ -34,7 +34,7 @@ def test_a_chair_stays_where_it_was_put():
 def test_free_fall_takes_as_long_as_physics_says():
     # 1 cm falls in sqrt(2 h / g) = 45 ms = 11 steps; then ten calm steps follow.
     cube = crate("Crate_0", (0.4, 0.4, 0.4))
-    rest = get_engine().settle(PhysicsScene((Body.of(cube, Pose(0.0, 0.0, 0.01, UPRIGHT)),)))
+    rest = get_solver().settle(PhysicsScene((Body.of(cube, Pose(0.0, 0.0, 0.01, UPRIGHT)),)))
     assert rest.seconds >= math.sqrt(2 * 0.01 / 9.81) + 9 / 240
 
 
@@ -68,7 +68,7 @@ def test_same_answer_in_a_fresh_process_and_after_any_history():
         "n = int(sys.argv[1])\n"
         "for k in range(n): settle(Body.of(crate(f'Crate_{k}', (.2, .3, .2 + k / 25)), "
         "Pose(0, 0, 0, UPRIGHT)), 0.0, nothing)\n"
-        "e = get_engine()\n"
+        "e = get_solver()\n"
         "print(repr(e.settle(PhysicsScene((Body.of(chair(), Pose(0, 0, .01, UPRIGHT)),)))))"
     )
     answers = {

@@ -8,10 +8,11 @@ import pytest
 from builders import UPRIGHT, chair, crate
 from threaded import run_in_threads
 
-from internav_data.physics import Body, PhysicsScene, cache_disabled, get_engine
-from internav_data.physics.cache import CachedEngine, pack_push
+from internav_data.physics import Body, PhysicsScene, cache_disabled, get_solver
+from internav_data.physics.cache import Solver, pack_push
 from internav_data.physics.engines.bullet import bullet
 from internav_data.physics.result_cache import ResultCache
+from internav_data.physics.solving import solve_push
 from internav_data.records import PUSH_SPECS, Pose
 
 FORCE = PUSH_SPECS["force"]
@@ -27,23 +28,27 @@ CROWDED = [
 ]
 
 
-def solved(engine):
-    pushed = [engine.push(scene, FORCE) for scene in (*LONE, *CROWDED)]
-    return pushed, [engine.settle(scene) for scene in LONE]
+def solved(solver):
+    pushed = [solver.push(scene, FORCE) for scene in (*LONE, *CROWDED)]
+    return pushed, [solver.settle(scene) for scene in LONE]
+
+
+def uncached():
+    return Solver(bullet(), None, "here")
 
 
 @pytest.fixture(scope="module")
 def alone():
-    return solved(bullet())
+    return solved(uncached())
 
 
 def test_threads_in_one_engine_solve_as_one_does(alone):
-    assert run_in_threads(lambda _: solved(bullet()), 4) == [alone] * 4
+    assert run_in_threads(lambda _: solved(uncached()), 4) == [alone] * 4
 
 
 def test_threads_keep_what_one_would_keep(alone, tmp_path):
     held = ResultCache(tmp_path)
-    engine = CachedEngine(bullet(), held, "here")
+    engine = Solver(bullet(), held, "here")
     assert run_in_threads(lambda _: solved(engine), 8) == [alone] * 8
     assert held.count() == 2 * len(LONE)
     later = ResultCache(tmp_path)
@@ -59,9 +64,9 @@ def test_one_threads_doubt_is_not_anothers():
         for _ in range(200):
             if number % 2:
                 with cache_disabled():
-                    engines.add(get_engine())
+                    engines.add(get_solver())
             else:
-                engines.add(get_engine())
+                engines.add(get_solver())
         return engines
 
     found = run_in_threads(work, 4)
@@ -75,13 +80,13 @@ def test_a_fork_while_another_thread_solves_solves_too(alone):
 
     def work(number):
         if number:
-            return [solved(bullet()) for _ in range(2)]
+            return [solved(uncached()) for _ in range(2)]
         codes = []
         for _ in range(3):
             child = os.fork()
             if child == 0:
                 signal.alarm(60)  # one that waits for a lock for ever ends
-                os._exit(0 if bullet().push(LONE[0], FORCE) == alone[0][0] else 1)
+                os._exit(0 if solve_push(bullet(), LONE[0], FORCE) == alone[0][0] else 1)
             codes.append(os.waitpid(child, 0)[1])
         return codes
 

@@ -9,7 +9,7 @@ from builders import scene_object
 from scenery import ASSETS, Grid, obstacle, small_scenes
 
 from internav_data.episodes.outcomes import outcomes_of
-from internav_data.physics import Body, get_engine, settle
+from internav_data.physics import Body, get_solver, settle
 from internav_data.planner.search import expert_of_episode
 from internav_data.records import Pose
 from internav_data.world import HouseModel, World
@@ -34,7 +34,7 @@ def settled(one):
 
 def played(house, episode, model="force"):
     """An episode with settled obstacles, outcomes and expert."""
-    engine = get_engine()
+    engine = get_solver()
     resting = tuple(settled(one) for one in episode.obstacles)
     episode = replace(
         episode,

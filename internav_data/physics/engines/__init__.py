@@ -1,7 +1,7 @@
 """Table of the physics engines, each in a module of its own behind the protocol `Engine`.
 
-To add one, write its module and add a row to `ENGINES`; `internav_data.physics.scene.Engine` lists
-its methods and the figures that it states.
+To add one, write its module and add a row to `ENGINES`; `internav_data.physics.engines.protocol`
+lists its methods and the figures that it states.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from internav_data.physics.scene import Engine
+    from internav_data.physics.engines.protocol import Engine
 
 DEFAULT_ENGINE: Final = "bullet"
 """Name of the engine that is taken where none is named."""

@@ -51,9 +51,6 @@ def _import_quietly() -> ModuleType:
 
 pybullet: Any = _import_quietly()
 
-RULES = 4
-"""Number of the rules by which scenes are built and solved (`Engine.rules`). Raised with every
-change of results."""
 STEP_S = 1.0 / 240.0
 """Time step, seconds."""
 GRAVITY = 9.81

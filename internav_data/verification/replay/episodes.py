@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from internav_data.physics import cache_disabled, get_engine
+from internav_data.physics import cache_disabled, get_solver
 from internav_data.verification.replay.elsewhere import TolerantExpect
 from internav_data.verification.replay.expert_replay import check_expert
 from internav_data.verification.replay.outcomes import check_outcomes
@@ -32,7 +32,7 @@ def _replay(scene: CheckedScene, episode: Episode, report: FindingCollector) -> 
         return report.expect(holds, predicate, expected, got, name)
 
     expect = exact if scene.config.same_hardware else TolerantExpect(episode, report)
-    engine = get_engine(scene.engine(episode))
+    engine = get_solver(scene.engine(episode))
     made = f"{episode.physics.engine} of {episode.physics.build}"
     here = f"{engine.name} of {engine.build}"
     if made != here:
