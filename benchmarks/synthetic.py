@@ -21,11 +21,13 @@ from internav_data.records import (
     Goal,
     House,
     Material,
+    MovedObject,
     NodePath,
     Obstacle,
     Outcome,
     Part,
     Physics,
+    Pose,
     Room,
     SceneObject,
     Start,
@@ -268,7 +270,17 @@ def _outcome(rng: np.random.Generator, action: str, asset: Asset, blocked: bool)
         bool(success and opened),
         round(int(rng.integers(100, 900)) / 240, 6),
         "",
+        pose=_pose(rng) if success and action != "pick" else None,
+        moved=(MovedObject(None, 1, _pose(rng)),) if success and rng.random() < 0.1 else (),
+        at_rest=True,
     )
+
+
+def _pose(rng: np.random.Generator) -> Pose:
+    half = float(rng.uniform(-math.pi / 2, math.pi / 2))
+    turn = (*rng.normal(0, 2e-5, 2).round(6).tolist(), *(math.sin(half), math.cos(half)))
+    x, y = rng.uniform(0, 15, 2).round(4).tolist()
+    return Pose(x, y, 0.001, (turn[0], turn[1], round(turn[2], 6), round(turn[3], 6)))
 
 
 def write_synthetic(out: Path, scenes: int, episodes: int, *, full: bool = False) -> Manifest:

@@ -20,7 +20,7 @@ from internav_data.dataset.encode import to_table
 from internav_data.records.errors import CorruptDataError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from typing import BinaryIO
 
     from internav_data.dataset.tables import TableSpec
@@ -90,13 +90,29 @@ def parquet_bytes(table: pa.Table, spec: TableSpec[Any]) -> bytes:
         spec.schema,
         compression="zstd",
         compression_level=_ZSTD_LEVEL,
-        use_dictionary=True,
+        use_dictionary=_repeating(spec),
         write_statistics=[*spec.filters],
         write_page_checksum=True,
     ) as writer:
         for start, stop in group_bounds(table):
             writer.write_table(table.slice(start, stop - start), row_group_size=stop - start)
     return with_checksums(sink.getvalue(), spec.schema)
+
+
+def _repeating(spec: TableSpec[Any]) -> list[str]:
+    """Return the Parquet paths of the leaf columns that are stored with a dictionary."""
+    paths = _leaf_paths(pa.struct(list(spec.schema)), "")
+    return [path for path in paths if not path.startswith(spec.plain)]
+
+
+def _leaf_paths(kind: pa.DataType, path: str) -> Iterator[str]:
+    if pa.types.is_struct(kind):
+        for field in kind:
+            yield from _leaf_paths(field.type, f"{path}.{field.name}".lstrip("."))
+    elif pa.types.is_list(kind):
+        yield from _leaf_paths(kind.value_type, f"{path}.list.element")
+    else:
+        yield path
 
 
 def file_info(path: str, data: bytes, table: pa.Table) -> FileInfo:

@@ -45,6 +45,8 @@ class TableSpec(Generic[R]):
     cls: type[R]
     filters: tuple[str, ...]
     """Top-level scalars that readers prune row groups by."""
+    plain: tuple[str, ...] = ()
+    """Parquet paths of structs whose numbers hardly ever repeat: a dictionary makes them larger."""
 
     @property
     def node(self) -> Record:
@@ -93,6 +95,7 @@ def arrow_type(node: Node) -> pa.DataType:
     return pa.list_(pa.field("element", arrow_type(node.item), nullable=False))
 
 
+_OUTCOME = "obstacles.list.element.outcomes.list.element"
 EPISODES: TableSpec[Episode] = TableSpec(
     "episodes",
     Episode,
@@ -106,6 +109,7 @@ EPISODES: TableSpec[Episode] = TableSpec(
             "obstructed_path_steps",
         ),
     ),
+    tuple(f"{_OUTCOME}.{name}" for name in ("pose.", "moved.list.element.pose.")),
 )
 SCENES: TableSpec[House] = TableSpec("scenes", House, ("scene_id", "scene", "area_m2"))
 ASSETS: TableSpec[Asset] = TableSpec("assets", Asset, ("asset_id",))

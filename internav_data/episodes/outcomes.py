@@ -7,11 +7,12 @@ way.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
 from internav_data.navigation import keeps_clear
-from internav_data.records import Outcome
+from internav_data.records import MovedObject, Outcome
 from internav_data.world.world import carries
 
 if TYPE_CHECKING:
@@ -104,7 +105,11 @@ def _pushed(world: World, index: int, heading: int, before: Distances, lifted: _
     # Without the agent: an outcome is a fact about the object, wherever an agent may stand.
     pushed = world.simulate_push(index, heading, agent=False)
     if not pushed.success:
-        return _failed(PUSH_DIRECTIONS[heading], pushed.reason, before, pushed.seconds)
+        return replace(
+            _failed(PUSH_DIRECTIONS[heading], pushed.reason, before),
+            seconds=pushed.seconds,
+            at_rest=pushed.at_rest,
+        )
     if pushed.moved:
         # Other objects moved too: the world without this one says nothing about their new poses.
         there = world.copy()
@@ -121,7 +126,18 @@ def _pushed(world: World, index: int, heading: int, before: Distances, lifted: _
         opened=before[0] is None and steps is not None,
         seconds=pushed.seconds,
         reason="",
+        pose=pushed.pose,
+        moved=tuple(_moved(world, key, pose) for key, pose in pushed.moved),
+        at_rest=pushed.at_rest,
     )
+
+
+def _moved(world: World, index: int, pose: Pose) -> MovedObject:
+    """Name an item of a world as its episode does: obstacles by index, furniture by object id."""
+    furniture = world.model.object_ids
+    if index < len(furniture):
+        return MovedObject(obstacle=None, object_id=furniture[index], pose=pose)
+    return MovedObject(obstacle=index - len(furniture), object_id=None, pose=pose)
 
 
 def _picked(world: World, index: int, before: Distances, lifted: _Lifted) -> Outcome:
@@ -141,10 +157,12 @@ def _picked(world: World, index: int, before: Distances, lifted: _Lifted) -> Out
         opened=opened,
         seconds=0.0,
         reason="",
+        moved=(),
+        at_rest=True,
     )
 
 
-def _failed(action: str, reason: str, before: Distances, seconds: float = 0.0) -> Outcome:
+def _failed(action: str, reason: str, before: Distances) -> Outcome:
     return Outcome(
         action=action,
         success=False,
@@ -152,6 +170,8 @@ def _failed(action: str, reason: str, before: Distances, seconds: float = 0.0) -
         path_steps_after=before[0],
         path_m_after=before[1],
         opened=False,
-        seconds=seconds,
+        seconds=0.0,
         reason=reason,
+        moved=(),
+        at_rest=True,
     )

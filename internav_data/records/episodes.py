@@ -61,6 +61,18 @@ class NodePath:
 
 
 @dataclass(frozen=True, slots=True)
+class MovedObject:
+    """Object that an interaction with another one moved, and its pose afterwards."""
+
+    obstacle: int | None
+    """Index of the episode's obstacle; null for an object of the scene."""
+    object_id: int | None
+    """Id of the scene's object; null for an obstacle."""
+    pose: Pose
+    """Pose of the asset's frame afterwards."""
+
+
+@dataclass(frozen=True, slots=True)
 class Outcome:
     """Result of one interaction with one obstacle, all other objects as the episode starts."""
 
@@ -80,6 +92,13 @@ class Outcome:
     """Simulated seconds until everything is at rest."""
     reason: str
     """Reason of the failure; empty on success."""
+    pose: Pose | None = None
+    """Pose of the obstacle's asset afterwards; null where it stays, or is in the agent's hand."""
+    moved: tuple[MovedObject, ...] | None = None
+    """Other objects that moved; empty where none did, null in datasets of earlier releases."""
+    at_rest: bool | None = None
+    """Whether all were at rest in the end, or time ran out; null in datasets of earlier releases.
+    """
 
 
 @dataclass(frozen=True, slots=True)

@@ -51,6 +51,7 @@ class _InteractionCheck:
             self.expect(actions == OUTCOMES, "outcomes.order", f"{what}: {OUTCOMES}", actions)
             for outcome in obstacle.outcomes:
                 self._outcome(obstacle, outcome, f"{what}, {outcome.action}")
+                self._poses(number, outcome, f"{what}, {outcome.action}")
 
     def _outcome(self, obstacle: Obstacle, outcome: Outcome, what: str) -> None:
         pick = outcome.action == PICK_OUTCOME
@@ -79,6 +80,35 @@ class _InteractionCheck:
             (seconds == 0.0) == idle, "outcomes.seconds", f"{what}: 0 unless pushed", seconds
         )
         self._distances(outcome, what, pick=pick)
+
+    def _poses(self, number: int, outcome: Outcome, what: str) -> None:
+        """Check which objects an outcome says have moved; earlier releases stored nothing."""
+        stored = outcome.moved is not None
+        pushed = outcome.success and outcome.action != PICK_OUTCOME
+        self.expect(
+            (outcome.pose is not None) == (stored and pushed),
+            "outcomes.pose",
+            f"{what}: {'a pose' if stored and pushed else 'null'}",
+            outcome.pose,
+        )
+        resting = (False, True) if outcome.seconds else (True,)
+        self.expect(
+            outcome.at_rest in (resting if stored else (None,)),
+            "outcomes.at_rest",
+            f"{what}: one of {resting if stored else None}",
+            outcome.at_rest,
+        )
+        moved = [(o.object_id, o.obstacle) for o in outcome.moved or ()]
+        others = set(range(len(self._episode.obstacles))) - {number}
+        known = all((a is None) != (b is None) and (b is None or b in others) for a, b in moved)
+        # Objects of the scene by id, then obstacles by index, each once.
+        keys = [(a is None, a or 0, b or 0) for a, b in moved]
+        self.expect(
+            known and keys == sorted(set(keys)) and (pushed or not moved),
+            "outcomes.moved",
+            f"{what}: other objects, then other obstacles, ascending; none unless pushed",
+            moved,
+        )
 
     def _distances(self, outcome: Outcome, what: str, *, pick: bool) -> None:
         episode = self._episode

@@ -60,6 +60,11 @@ SPLIT = Rule(choices=("train", "val", "test"))
 TURN = Rule(-1.0, 1.0, digits=TURNS)
 FROM_ZERO = Rule(0.0, 1.0)
 
+POSE_RULES: Mapping[str, Rule] = {
+    **dict.fromkeys("xyz", COORDINATE),
+    **{f"quaternion.{axis}": TURN for axis in "xyz"},
+    "quaternion.w": Rule(0.0, 1.0, digits=TURNS),
+}
 OUTCOME_RULES: Mapping[str, Rule] = {
     "action": Rule(choices=OUTCOMES),
     "displacement_m": Rule(0.0, 1e4, digits=METRES),
@@ -67,6 +72,10 @@ OUTCOME_RULES: Mapping[str, Rule] = {
     "path_m_after": Rule(0.0, 1e4, digits=METRES),
     "seconds": Rule(0.0, MAX_PUSH_S),
     "reason": Rule(choices=tuple(sorted({*PUSH_REASONS, *PICK_REASONS}))),
+    **{f"pose.{n}": rule for n, rule in POSE_RULES.items()},
+    "moved.element.obstacle": ID,
+    "moved.element.object_id": ID,
+    **{f"moved.element.pose.{n}": rule for n, rule in POSE_RULES.items()},
 }
 EPISODE_RULES: Mapping[str, Rule] = {
     "episode_id": Rule(pattern=r"scene-\d{6,}/\d{4,}"),
@@ -91,9 +100,7 @@ EPISODE_RULES: Mapping[str, Rule] = {
     **{f"node_paths.element.points.element.{axis}": COORDINATE for axis in "xy"},
     "obstacles.element.asset_id": NAME,
     "obstacles.element.type": NAME,
-    **{f"obstacles.element.{axis}": COORDINATE for axis in "xyz"},
-    **{f"obstacles.element.quaternion.{axis}": TURN for axis in "xyz"},
-    "obstacles.element.quaternion.w": Rule(0.0, 1.0, digits=TURNS),
+    **{f"obstacles.element.{name}": rule for name, rule in POSE_RULES.items()},
     "obstacles.element.mass_kg": MASS,
     "obstacles.element.friction": FRICTION,
     "obstacles.element.node_path_segment": Rule(0),

@@ -25,6 +25,13 @@ def test_every_dataset_ever_kept_loads(folder):
     assert all(episode.obstacles and dataset.scene(episode.scene_id) for episode in episodes)
 
 
+def test_outcomes_of_the_first_kept_dataset_have_no_poses():
+    episodes = list(load_dataset(KEPT[0]))
+    outcomes = [o for e in episodes for obstacle in e.obstacles for o in obstacle.outcomes]
+    assert any(outcome.success for outcome in outcomes)
+    assert {(o.pose, o.moved, o.at_rest) for o in outcomes} == {(None, None, None)}
+
+
 def test_there_is_a_kept_dataset():
     assert KEPT
 

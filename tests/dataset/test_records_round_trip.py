@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 
+import pyarrow.parquet as pq
 import pytest
 import strategies
 from hypothesis import HealthCheck, given, settings
@@ -54,6 +55,16 @@ def test_episodes_return_from_parquet(tmp_path_factory, records):
     assert [type(v) for v in dataclasses.astuple(back[0])] == [
         type(v) for v in dataclasses.astuple(records[0])
     ]
+
+
+def test_poses_of_outcomes_alone_have_no_dictionary(dataset_folder):
+    group = pq.read_metadata(next(dataset_folder.glob("data/episodes/*"))).row_group(0)
+    chunks = [group.column(k) for k in range(group.num_columns)]
+    plain = {c.path_in_schema for c in chunks if "RLE_DICTIONARY" not in c.encodings}
+    poses = {c.path_in_schema for c in chunks if ".pose." in c.path_in_schema}
+    flags = {c.path_in_schema for c in chunks if c.physical_type == "BOOLEAN"}
+    assert poses
+    assert plain == poses | flags
 
 
 @EASY

@@ -58,6 +58,24 @@ def test_failed_ones_leave_the_distances(tables):
     assert all(outcome.displacement_m >= 0.05 for outcome in pushed)
 
 
+def test_poses_are_those_that_the_push_leaves(tables):
+    for _, world, table in tables:
+        ids = world.model.object_ids
+        for index, outcomes in zip(world.obstacles, table, strict=True):
+            for heading, outcome in enumerate(outcomes):
+                if not outcome.success or outcome.action == PICK:
+                    assert (outcome.pose, outcome.moved) == (None, ())
+                    continue
+                pushed = world.simulate_push(index, heading, agent=False)
+                assert outcome.pose == pushed.pose
+                assert outcome.at_rest == pushed.at_rest
+                moved = {
+                    ids.index(o.object_id) if o.obstacle is None else o.obstacle + len(ids): o.pose
+                    for o in outcome.moved
+                }
+                assert tuple(moved.items()) == pushed.moved
+
+
 def test_distances_are_those_of_fresh_graphs(tables):
     checked = 0
     for episode, world, table in tables:

@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import physical
 import pytest
+from builders import UPRIGHT
 from scenery import write_dataset
 
+from internav_data.records import MovedObject, Pose
 from internav_data.verification import validate
 from internav_data.verification.findings import FindingCollector
 from internav_data.verification.interactions import check_interactions
@@ -37,6 +39,7 @@ def test_true_ones_pass(scenes):
             assert judged(episode, solvable=True) == set()
 
 
+SPOT = Pose(1.0, 1.0, 0.0, UPRIGHT)
 # scene, episode, place among the five, obstacle, changes
 OUTCOMES = {
     "order": ((0, 0, 0, 0, {"action": "push_south"}), "outcomes.order"),
@@ -70,6 +73,34 @@ OUTCOMES = {
         (2, 0, 4, 1, {"path_steps_after": 22}),
         "outcomes.path_steps_after",
     ),
+    "pushed nowhere": ((0, 0, 2, 0, {"pose": None}), "outcomes.pose"),
+    "a pose though it failed": ((2, 0, 0, 0, {"pose": SPOT}), "outcomes.pose"),
+    "a pose in the hand": ((2, 0, 4, 1, {"pose": SPOT}), "outcomes.pose"),
+    "a pose and nothing about others": (
+        (0, 0, 2, 0, {"moved": None, "at_rest": None}),
+        "outcomes.pose",
+    ),
+    "no word on rest": ((0, 0, 2, 0, {"at_rest": None}), "outcomes.at_rest"),
+    "restless though nobody pushed": ((2, 0, 4, 1, {"at_rest": False}), "outcomes.at_rest"),
+    "others moved though it failed": (
+        (2, 0, 0, 0, {"moved": (MovedObject(1, None, SPOT),)}),
+        "outcomes.moved",
+    ),
+    "it is among the others": (
+        (2, 0, 1, 1, {"moved": (MovedObject(1, None, SPOT),)}),
+        "outcomes.moved",
+    ),
+    "no such obstacle": ((2, 0, 1, 1, {"moved": (MovedObject(2, None, SPOT),)}), "outcomes.moved"),
+    "no object": ((2, 0, 1, 1, {"moved": (MovedObject(None, None, SPOT),)}), "outcomes.moved"),
+    "two objects in one": ((2, 0, 1, 1, {"moved": (MovedObject(0, 1, SPOT),)}), "outcomes.moved"),
+    "an object twice": (
+        (2, 0, 1, 1, {"moved": (MovedObject(None, 1, SPOT),) * 2}),
+        "outcomes.moved",
+    ),
+    "obstacles first": (
+        (2, 0, 1, 1, {"moved": (MovedObject(0, None, SPOT), MovedObject(None, 1, SPOT))}),
+        "outcomes.moved",
+    ),
 }
 
 
@@ -78,6 +109,22 @@ def test_outcome_cannot_be(scenes, case):
     (scene, index, shard_ref, number, changes), predicate = OUTCOMES[case]
     episode = with_outcome(scenes[scene][1][index], shard_ref, number, **changes)
     assert predicate in judged(episode)
+
+
+def test_outcomes_of_earlier_releases_say_nothing_about_poses(scenes):
+    for _, episodes in scenes:
+        for episode in episodes:
+            bare = [
+                replace(
+                    obstacle,
+                    outcomes=tuple(
+                        replace(outcome, pose=None, moved=None, at_rest=None)
+                        for outcome in obstacle.outcomes
+                    ),
+                )
+                for obstacle in episode.obstacles
+            ]
+            assert judged(replace(episode, obstacles=tuple(bare)), solvable=True) == set()
 
 
 def test_a_longer_way_once_something_is_gone(scenes):
@@ -151,6 +198,26 @@ RANGES = {
     "unrounded": (
         lambda e: with_outcome(e, 0, path_m_after=6.12345678),
         "outcomes.element.path_m_after",
+    ),
+    "an unrounded pose": (
+        lambda e: with_outcome(e, 0, pose=replace(SPOT, x=1.00004)),
+        "outcomes.element.pose.x",
+    ),
+    "a pose far away": (
+        lambda e: with_outcome(e, 0, pose=replace(SPOT, y=251.0)),
+        "outcomes.element.pose.y",
+    ),
+    "no rotation": (
+        lambda e: with_outcome(e, 0, pose=replace(SPOT, quaternion=(0.0, 0.0, 0.5, 0.5))),
+        "outcomes.element.pose.quaternion",
+    ),
+    "another's no rotation": (
+        lambda e: with_outcome(
+            e,
+            0,
+            moved=(MovedObject(None, 1, replace(SPOT, quaternion=(0.0, 0.0, 0.0, 0.9))),),
+        ),
+        "outcomes.element.moved.element.pose.quaternion",
     ),
 }
 

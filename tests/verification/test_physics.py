@@ -198,7 +198,7 @@ def test_what_topples_was_not_settled(scenes):
     assert "physics.settle-refused" in found_in(scenes, 1, 1, assets)
 
 
-FAILED = {"success": False, "displacement_m": 0.0, "opened": False}
+FAILED = {"success": False, "displacement_m": 0.0, "opened": False, "pose": None}
 OUTCOMES = {
     "another reason": (
         (2, 0, "push_east", 0, {"reason": "something is in the way"}),
@@ -224,7 +224,18 @@ OUTCOMES = {
         "physics.outcome-success",
     ),
     "success": (
-        (2, 0, "push_east", 0, {"success": True, "displacement_m": 0.1, "reason": ""}),
+        (
+            2,
+            0,
+            "push_east",
+            0,
+            {
+                "success": True,
+                "displacement_m": 0.1,
+                "reason": "",
+                "pose": Pose(3.5, 1.4, 0.001, UPRIGHT),
+            },
+        ),
         "physics.outcome-success",
     ),
     "farther": ((0, 0, "push_west", 0, {"displacement_m": 0.7}), "physics.outcome-displacement"),
@@ -261,6 +272,8 @@ OUTCOMES = {
         (2, 0, "pick", 1, {"path_steps_after": 26}),
         "physics.outcome-path-steps-after",
     ),
+    "never at rest": ((0, 0, "push_west", 0, {"at_rest": False}), "physics.outcome-at-rest"),
+    "furniture stays": ((2, 0, "push_north", 1, {"moved": ()}), "physics.outcome-moved"),
 }
 
 
@@ -300,6 +313,19 @@ def test_expert_does_not_get_there(scenes, case):
 
 def test_a_detour_is_no_untruth(scenes):
     assert not found_in(expert_changed(scenes, 2, 1, lambda actions: [1, 2, *actions]), 2, 1)
+
+
+def test_another_end_than_the_stored_one(scenes):
+    pushed = scenes[2][1][0].obstacles[1].outcomes[1]
+    (other,) = pushed.moved
+    assert (other.object_id, other.obstacle) == (1, None)
+    nudged = replace(other.pose, x=other.pose.x + 0.0001)
+    for changes, predicate in (
+        ({"pose": replace(pushed.pose, y=pushed.pose.y - 0.0001)}, "physics.outcome-pose"),
+        ({"moved": (replace(other, pose=nudged),)}, "physics.outcome-moved"),
+    ):
+        wrong = outcome_changed(scenes, 2, 0, "push_north", 1, **changes)
+        assert predicate in found_in(wrong, 2, 0)
 
 
 # the world itself is wrong: what the validator derives by its own means must say so

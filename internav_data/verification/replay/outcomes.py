@@ -70,13 +70,17 @@ class OutcomeCheck:
         item, outcome = world.items[index], self.outcome
         if not item.dynamics.pushable:
             self._ends("not pushable", 0.0, 0.0)
+            self._poses(None, (), at_rest=True)
             return
         pushed = world.simulate_push(index, PUSH_OUTCOMES.index(outcome.action), agent=False)
         far = pushed.displacement_m if pushed.success else 0.0
         if self._ends(pushed.reason, far, pushed.seconds) and pushed.success:
             ends: dict[int, Pose | None] = {index: pushed.pose, **dict(pushed.moved)}
+            self._poses(pushed.pose, pushed.moved, at_rest=pushed.at_rest)
             self._not_sunk(world, ends)
             self._distances(world, ends)
+        else:
+            self._poses(None, (), at_rest=pushed.at_rest)
 
     def pick(self, world: World, index: int) -> None:
         """Remove an obstacle and compare."""
@@ -84,6 +88,7 @@ class OutcomeCheck:
             reason = "not pickable"
         else:
             reason = "something rests on it" if self.carries(world.items, index) else ""
+        self._poses(None, (), at_rest=True)
         if self._ends(reason, 0.0, 0.0) and not reason:
             self._distances(world, {index: None})
 
@@ -94,6 +99,20 @@ class OutcomeCheck:
         self.expect("displacement", displacement_m, outcome.displacement_m)
         self.expect("seconds", seconds, outcome.seconds)
         return self.expect("success", not reason, outcome.success)
+
+    def _poses(
+        self, pose: Pose | None, moved: Sequence[tuple[int, Pose]], *, at_rest: bool
+    ) -> None:
+        """Check where everything ends, unless an earlier release stored no poses."""
+        outcome, ids = self.outcome, self.scene.model.object_ids
+        if outcome.moved is None:
+            return
+        self.expect("pose", pose, outcome.pose)
+        named = [(ids[k], None) if k < len(ids) else (None, k - len(ids)) for k, _ in moved]
+        ends = [(*name, end) for name, (_, end) in zip(named, moved, strict=True)]
+        stored = [(o.object_id, o.obstacle, o.pose) for o in outcome.moved]
+        self.expect("moved", ends, stored)
+        self.expect("at-rest", at_rest, outcome.at_rest)
 
     def carries(self, items: Sequence[MovableObject], index: int) -> bool:
         """Return whether another movable object rests on an item."""
