@@ -5,10 +5,14 @@ from __future__ import annotations
 import os
 import threading
 import weakref
-from typing import TYPE_CHECKING, Final
+from functools import wraps
+from typing import TYPE_CHECKING, Final, TypeVar
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from types import TracebackType
+
+V = TypeVar("V")
 
 
 class ThreadLock:
@@ -53,3 +57,26 @@ def _renew_all() -> None:
 
 if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork either
     os.register_at_fork(after_in_child=_renew_all)
+
+
+def once_per_process(make: Callable[[], V]) -> Callable[[], V]:
+    """Return a function that calls `make` the first time and returns the same value ever after.
+
+    A forked process makes a value of its own, and keeps the one that it inherits alive. The lock is
+    taken only until there is a value.
+    """
+    made: dict[int, V] = {}
+    lock = ThreadLock()
+
+    @wraps(make)
+    def value() -> V:
+        process = os.getpid()
+        try:
+            return made[process]
+        except KeyError:
+            with lock:
+                if process not in made:
+                    made[process] = make()
+                return made[process]
+
+    return value

@@ -82,7 +82,7 @@ class EpisodeDraft:
         return self.steps is not None and self.steps > self.shortest_path_steps
 
 
-@lru_cache(maxsize=16384)
+@lru_cache(maxsize=4096)
 def _standing(asset: Asset, yaw_deg: int) -> Polygons:
     """Return the footprint of an upright asset at the origin, for a test before the exact one."""
     return footprint(asset, Pose(0.0, 0.0, 0.0, yaw_quaternion(yaw_deg)))

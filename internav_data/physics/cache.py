@@ -113,6 +113,11 @@ class Solver:
         """Distance at which two bodies of the engine may already touch, metres."""
         return self.engine.contact_margin_m
 
+    @property
+    def bytes_in_memory(self) -> float:
+        """Bytes that the solutions in memory take, with their keys, by an estimate."""
+        return self._settled.weight + self._lone.weight + self._crowded.weight
+
     def settle(self, scene: PhysicsScene) -> SettleSolution:
         """Let the first body of the scene fall until it rests."""
 

@@ -46,7 +46,7 @@ class ConvexPrisms(NamedTuple):
     """Supports of each part along +x, +y, -x, -y, +z and -z, (parts, 6) float64."""
 
 
-@lru_cache(maxsize=8192)
+@lru_cache(maxsize=2048)
 def prisms_of(asset: Asset, pose: Pose) -> ConvexPrisms:
     """Return the prisms of an object at a pose; cached, read-only."""
     corners, starts = asset_corners(asset)

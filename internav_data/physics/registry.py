@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 from internav_data.core.locks import ThreadLock
@@ -21,6 +20,8 @@ if TYPE_CHECKING:
 _cache_off: ContextVar[bool] = ContextVar("_cache_off", default=False)
 """Of one thread: another one may read the cache meanwhile."""
 _MAKING: Final = ThreadLock()
+_CACHED: Final[dict[tuple[Engine, ResultCache | None], Solver]] = {}
+"""Solvers by engine and result cache: two a process, those that a fork inherits besides."""
 
 
 @contextmanager
@@ -46,12 +47,14 @@ def get_solver(name: str = DEFAULT_ENGINE) -> Solver:
     """
     if name not in ENGINES:
         raise UsageError(f"no physics engine is called {name!r}; known are {', '.join(ENGINES)}")
-    engine = ENGINES[name]()
+    engine, known = ENGINES[name](), None if _cache_off.get() else result_cache()
+    found = _CACHED.get((engine, known))  # every push asks: no lock where there is an engine
+    if found is not None:
+        return found
     with _MAKING:
-        return _cached(engine, None if _cache_off.get() else result_cache())
+        return _CACHED.setdefault((engine, known), _with_cache(engine, known))
 
 
-@lru_cache(maxsize=8)
-def _cached(engine: Engine, known: ResultCache | None) -> Solver:
+def _with_cache(engine: Engine, known: ResultCache | None) -> Solver:
     where = origin(engine)
     return Solver(engine, known if where else None, where or "")

@@ -18,13 +18,12 @@ import sqlite3
 import warnings
 import zlib
 from contextlib import suppress
-from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
 from platformdirs import user_cache_path
 
-from internav_data.core.locks import ThreadLock
+from internav_data.core.locks import ThreadLock, once_per_process
 from internav_data.physics.result_index import PREFIX, RowIndex, prefix_of
 
 FOLDER_VARIABLE: Final = "INTERNAV_CACHE_DIR"
@@ -292,17 +291,9 @@ def _checked(key: bytes, value: bytes) -> bytes:
     return zlib.crc32(value, zlib.crc32(key)).to_bytes(_CHECK, "little")
 
 
-_OPENING: Final = ThreadLock()
-
-
+@once_per_process
 def result_cache() -> ResultCache:
     """Return this process's result cache; a forked process opens its own."""
-    with _OPENING:
-        return _of_process(os.getpid())
-
-
-@cache  # unbounded: a forked process must not close what it inherits
-def _of_process(_pid: int) -> ResultCache:
     opened = ResultCache(cache_folder())
     atexit.register(opened.flush)
     return opened

@@ -31,7 +31,7 @@ EVERYTHING: Final = (1 << MAX_OBJECTS) - 1
 """Bits of all objects: with them banned, a field is that of the lattice as objects lie."""
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=2)
 def _static_blockers(model: HouseModel) -> Masks:
     """Return what fixed objects close, (3, nodes) uint8; cached, read-only."""
     nx, ny = model.lattice.shape

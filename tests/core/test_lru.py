@@ -43,6 +43,22 @@ def test_the_entries_used_last_stay(keys, capacity, weights):
     assert evicted == expected_evicted + latest
 
 
+def test_a_known_value_costs_one_hash_of_its_key():
+    """Keys are problems of physics: hashing one takes longer than all else."""
+    hashed = []
+
+    class Key:
+        def __hash__(self):
+            hashed.append(self)
+            return 1
+
+    cache, key = LRUCache(4), Key()
+    cache.get(key, int)
+    hashed.clear()
+    cache.get(key, int)
+    assert len(hashed) == 1
+
+
 def test_the_newest_entry_stays_however_heavy():
     cache = LRUCache(1, weigh=len)
     assert cache.get("a", lambda: "heavy") == "heavy"

@@ -7,14 +7,12 @@ costs nothing that threads could gain: pybullet holds the interpreter while it s
 
 from __future__ import annotations
 
-import os
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, cast
 
-from internav_data.core.locks import ThreadLock
+from internav_data.core.locks import ThreadLock, once_per_process
 from internav_data.core.temporary import process_folder
 from internav_data.physics.engines.bullet_scene import HULL_MARGIN_M, STEP_S, Builder, pybullet
 
@@ -102,12 +100,7 @@ class BulletSimulation:
         return max([0.0, *(-contact[8] for contact in contacts)])
 
 
+@once_per_process  # forked ones would overwrite each other's files
 def bullet() -> Bullet:
     """Return this process's Bullet, connected at first use; its files are removed at exit."""
-    with _ENGINE_LOCK:
-        return _of_process(os.getpid())
-
-
-@cache  # by process: forked ones would overwrite each other's files
-def _of_process(_pid: int) -> Bullet:
     return Bullet(Builder(pybullet.connect(pybullet.DIRECT), process_folder()))
