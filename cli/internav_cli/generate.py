@@ -107,7 +107,7 @@ def command(
         episodes_per_scene=episodes_per_scene,
         episodes__unseen_assets=unseen_assets,
         episodes__keep_unsolvable=keep_unsolvable,
-        episodes__push_model=push_model,
+        world__push_model=push_model,
     )
     if print_config:
         from internav_data.core.config import config_toml

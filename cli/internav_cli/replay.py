@@ -98,14 +98,14 @@ def command(
         if path.exists() and not force:
             raise UsageError(f"{path}: is there already; choose another name, or pass --force")
     folder = dataset_to_read(dataset)
-    house, task, assets, model = _stored(folder, *place)
+    house, task, assets, config = _stored(folder, *place)
     if given is None and task.expert is None:
         raise UsageError(
             f"{folder}: {name} has no expert (none was found, or the dataset is of a version "
             "without); choose another episode, or pass --actions FILE"
         )
     actions = None if given is None else given.actions
-    film = Replay.of(house, task, assets, actions, push_model=model)
+    film = Replay.of(house, task, assets, actions, config=config)
     for path, kind in zip(paths, kinds, strict=True):
         pixels, rate = size or DEFAULTS[kind][0], fps if fps is not None else DEFAULTS[kind][1]
         count = write_video(path, film.frames(size=pixels, fps=rate), rate)
@@ -139,9 +139,10 @@ def _place(episode_id: str | None, scene: int | None, episode: int | None) -> tu
 
 
 def _stored(dataset: Path, scene: int, episode: int) -> tuple[Any, Episode, Any, Any]:
-    """Return a house, an episode, the assets, and how its dataset answers pushes."""
+    """Return a house, an episode, the assets, and the settings of its dataset's world."""
     from internav_data.dataset import load_dataset
     from internav_data.records.errors import UsageError
+    from internav_data.world.config import WorldConfig
 
     scene_id = f"scene-{scene:06d}"
     filters = [("scene_id", "=", scene_id), ("index", "=", episode)]
@@ -151,5 +152,5 @@ def _stored(dataset: Path, scene: int, episode: int) -> tuple[Any, Episode, Any,
             f"{dataset}: has no episode {scene_id}/{episode:04d}; `internav-gen stats {dataset}` "
             "tells how many scenes and episodes there are"
         )
-    model = data.manifest.config.get("episodes", {}).get("push_model", "force")
-    return data.scene(scene_id), data[0], data.assets, model
+    config = WorldConfig.of_dataset(data.manifest.config)
+    return data.scene(scene_id), data[0], data.assets, config

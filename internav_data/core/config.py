@@ -167,7 +167,8 @@ def from_mapping(
     ----------
     config
         A frozen dataclass. Its class may have `RENAMED`, which maps names of earlier versions to
-        those of fields: an old name is refused with a line that gives the new one.
+        those of fields, or to dotted keys from the top where a field has gone to another config:
+        an old name is refused with a line that gives the new one.
     values
         Nested values by field name.
     where
@@ -190,7 +191,9 @@ def from_mapping(
     for name, value in values.items():
         key = prefix + name
         if name in renamed:
-            raise UsageError(f"{where}: '{key}' is called '{prefix}{renamed[name]}' now")
+            now = renamed[name]
+            now = now if "." in now else prefix + now
+            raise UsageError(f"{where}: '{key}' is called '{now}' now")
         if name not in fields:
             raise _unknown(key, where, known_keys(config, prefix), elsewhere)
         current = getattr(config, name)

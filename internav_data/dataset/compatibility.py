@@ -1,18 +1,33 @@
-"""Columns of another release read as this one's: unknown ones left out, new ones null.
+"""Columns and settings of another release read as this one's.
 
 From format version 2 on columns are only added, nullable. A reader takes the columns that it knows
 from a file; what the file's writer did not know yet is null. What a reader must know to understand
-a dataset stands in the manifest's `requires`.
+a dataset stands in the manifest's `requires`. Settings that have moved are read at their present
+place.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
 import pyarrow as pa
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
+
+MOVED_SETTINGS: Final = {("episodes", "push_model"): ("world", "push_model")}
+"""Section and name of settings of earlier releases, and where they are today."""
+
+
+def present_settings(config: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a dataset's config with the settings of earlier releases at their present place."""
+    moved = dict(config)
+    for (section, name), (now_section, now_name) in MOVED_SETTINGS.items():
+        before, now = moved.get(section), moved.get(now_section, {})
+        if isinstance(before, dict) and isinstance(now, dict) and name in before:
+            moved[section] = {key: value for key, value in before.items() if key != name}
+            moved[now_section] = {now_name: before[name], **now}
+    return moved
 
 
 def problems(got: pa.Schema, wanted: pa.Schema) -> list[str]:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from internav_data.core.config import MAX_SEED
 from internav_data.core.files import FileLimits, check_sha256, json_sha256, parse_json
 from internav_data.core.storage import Store, StoreLike, exists, store_of
+from internav_data.dataset.compatibility import present_settings
 from internav_data.dataset.consistency import inconsistencies
 from internav_data.dataset.location import making_command
 from internav_data.dataset.parquet import TableFile, footer_sha256, open_parquet
@@ -256,6 +257,8 @@ def _parse(path: str, raw: dict[str, Any]) -> Manifest:
         values = dict(raw)
         values["counts"] = {str(k): _made(Counts, v) for k, v in raw["counts"].items()}
         values["quarantined"] = tuple(_made(Quarantined, q) for q in raw["quarantined"])
+        if isinstance(raw["config"], dict):
+            values["config"] = present_settings(raw["config"])
         values["files"] = tuple(_made(DataFile, f) for f in raw["files"])
         values["requires"] = tuple(map(str, raw.get("requires", ())))
         values["hardware"] = tuple(map(str, raw.get("hardware") or ()))

@@ -108,7 +108,7 @@ class EpisodeRun:
     ) -> None:
         episode = task.prepare(episode)
         self.episode, self.loaded_house, self._config = episode, loaded_house, config
-        self.world = World.of_episode(loaded_house.model, episode, assets, config.push_model)
+        self.world = World.of_episode(loaded_house.model, episode, assets, config.world)
         if start is not None:
             self._place_agent(start)
         self.start = None if start is None else (start[0], start[1], start[2] % 4)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, TypedDict
 
 from internav_data.envs.auxiliary import next_start
@@ -150,10 +150,13 @@ class EnvSlot:
         tasks = [TASKS[name] for name in task_names(arguments, count)]
         LOADED_HOUSES.capacity = max(LOADED_HOUSES.capacity, kept)
         source = open_source(dataset, arguments.get("split"), arguments.get("filters"))
+        world = source.world_config
+        if "push_model" in arguments:
+            world = replace(world, push_model=arguments["push_model"])
         config = TaskConfig(
             arguments.get("max_steps", TaskConfig().max_steps),
             arguments.get("failed_done_reward", 0.0),
-            arguments.get("push_model", source.push_model),
+            world,
         )
         config.check()
         shuffle = arguments.get("shuffle", True)

@@ -26,6 +26,7 @@ from internav_data.navigation import SPACING_M
 from internav_data.records.errors import UsageError
 from internav_data.render.camera import StaticScene
 from internav_data.world import HouseModel
+from internav_data.world.config import WorldConfig
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 
     from internav_data.dataset import Dataset
     from internav_data.envs.auxiliary import AuxiliaryStart, InteractionKind
-    from internav_data.records import Episode, House, PushModel
+    from internav_data.records import Episode, House
 
 
 FIELDS_KEPT: Final = 64
@@ -127,13 +128,10 @@ class Source:
                 f"filters={dataset.filters!r}; there are {dataset.manifest.counts}: choose others"
             )
 
-    @property
-    def push_model(self) -> PushModel:
-        """Push model of the dataset's outcomes and experts."""
-        model: PushModel = self.dataset.manifest.config.get("episodes", {}).get(
-            "push_model", "force"
-        )
-        return model
+    @cached_property
+    def world_config(self) -> WorldConfig:
+        """Settings of the world that the dataset's outcomes and experts were made with."""
+        return WorldConfig.of_dataset(self.dataset.manifest.config)
 
     @cached_property
     def bounds(self) -> NDArray[np.int64]:

@@ -15,9 +15,8 @@ from internav_data.core.config import Bounds, check_bounds
 from internav_data.dataset.summary_statistics import path_efficiency
 from internav_data.envs.auxiliary import is_cleared
 from internav_data.navigation import SPACING_M
-from internav_data.records import PushModel  # noqa: TC001 - fields' types are read at run time
-from internav_data.records.errors import UsageError
 from internav_data.world.actions import INTERACTION_KINDS, ActionKind
+from internav_data.world.config import WorldConfig
 
 if TYPE_CHECKING:
     from internav_data.envs.auxiliary import InteractionKind
@@ -43,8 +42,8 @@ class TaskConfig:
     """Number of steps after which an episode is truncated."""
     failed_done_reward: Annotated[float, Bounds(-1000.0, 1000.0)] = 0.0
     """Reward of Done away from the goal, besides the step's; -1 in the released configuration."""
-    push_model: PushModel = "force"
-    """Model of pushes."""
+    world: WorldConfig = field(default_factory=WorldConfig)
+    """Settings of the world."""
 
     def check(self) -> None:
         """Refuse settings that are out of their bounds.
@@ -55,8 +54,7 @@ class TaskConfig:
             A setting is out of its bounds.
         """
         check_bounds(self, "{key}: expected {expected}, got {value}")
-        if self.push_model not in {"force", "kick"}:
-            raise UsageError(f"push_model: expected 'force' or 'kick', got {self.push_model!r}")
+        self.world.check("")
 
 
 class TaskStep(NamedTuple):

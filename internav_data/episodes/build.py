@@ -33,6 +33,7 @@ from internav_data.records import (
 )
 from internav_data.records.errors import QuarantineError
 from internav_data.world import World
+from internav_data.world.config import DEFAULT_WORLD
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 
     from internav_data.episodes.spawn import Spawned
     from internav_data.records import Asset, Expert, House, Outcome, Redraw
+    from internav_data.world.config import WorldConfig
 
 PAIRS = 64
 """Maximum number of pairs of nodes drawn for one start and goal; most are far enough apart."""
@@ -62,6 +64,7 @@ def build_episodes(
     count: int,
     pool: Sequence[Asset],
     config: EpisodeConfig | None = None,
+    world_config: WorldConfig = DEFAULT_WORLD,
     *,
     first: int = 0,
     attempt: int = 0,
@@ -81,6 +84,8 @@ def build_episodes(
         Assets to draw obstacles from, in a fixed order.
     config
         Settings; None for the calibrated defaults.
+    world_config
+        Settings of the world.
     attempt
         Sub-seed: 0 unless an earlier attempt at the scene failed.
 
@@ -92,7 +97,7 @@ def build_episodes(
         An episode cannot be made within the bounds of the settings.
 
     """
-    batch = build_batch(house, count, pool, config, first=first, attempt=attempt)
+    batch = build_batch(house, count, pool, config, world_config, first=first, attempt=attempt)
     return batch.episodes
 
 
@@ -101,6 +106,7 @@ def build_batch(
     count: int,
     pool: Sequence[Asset],
     config: EpisodeConfig | None = None,
+    world_config: WorldConfig = DEFAULT_WORLD,
     *,
     first: int = 0,
     attempt: int = 0,
@@ -114,7 +120,7 @@ def build_batch(
     redraws: Counter[Redraw] = Counter()
     episodes = []
     for index in range(first, first + count):
-        episode, again = _build_episode(site, index, pool, config, attempt)
+        episode, again = _build_episode(site, index, pool, config, world_config, attempt)
         episodes.append(episode)
         redraws += again
     return EpisodeBatch(tuple(episodes), dict(sorted(redraws.items())))
@@ -129,13 +135,18 @@ def mode_of(scene: int, index: int) -> Mode:
 
 
 def _build_episode(
-    site: SpawnSite, index: int, pool: Sequence[Asset], config: EpisodeConfig, attempt: int
+    site: SpawnSite,
+    index: int,
+    pool: Sequence[Asset],
+    config: EpisodeConfig,
+    world_config: WorldConfig,
+    attempt: int,
 ) -> tuple[Episode, Counter[Redraw]]:
     """Draw until an episode is complete; return it and the reasons of the discarded draws."""
     house = site.house
     again: Counter[Redraw] = Counter()
     for draw in range(config.max_redraws):
-        drawn = _draw(site, index, pool, config, (house.scene, attempt, index, draw))
+        drawn = _draw(site, index, pool, config, world_config, (house.scene, attempt, index, draw))
         if isinstance(drawn, Episode):
             return drawn, again
         again[drawn] += 1
@@ -152,6 +163,7 @@ def _draw(
     index: int,
     pool: Sequence[Asset],
     config: EpisodeConfig,
+    world_config: WorldConfig,
     key: tuple[int, int, int, int],
 ) -> Episode | Redraw:
     """Draw a start, a goal and obstacles: return an episode, or the reason to draw again."""
@@ -170,7 +182,7 @@ def _draw(
         [Body.of(o.asset, o.settled.pose) for o in draft.obstacles],
         (*draft.start, yaw_deg // 90),
         draft.goal,
-        config.push_model,
+        world_config,
         config.engine,
     )
     # The expert comes first: an episode without one is discarded and needs no outcomes.

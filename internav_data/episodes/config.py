@@ -8,7 +8,6 @@ from typing import Annotated, ClassVar
 from internav_data.core.config import Bounds, check_bounds
 from internav_data.physics.engines import DEFAULT_ENGINE, ENGINES
 from internav_data.records.errors import UsageError
-from internav_data.records.physics import PUSH_SPECS, PushModel
 
 ObstacleCount = Annotated[int, Bounds(1)]
 
@@ -18,6 +17,7 @@ class EpisodeConfig:
     """Settings of the episodes; the defaults are calibrated to Table 2 of the paper."""
 
     RENAMED: ClassVar[dict[str, str]] = {
+        "push_model": "world.push_model",
         "redraws": "max_redraws",
         "sideways_m": "lateral_std_m",
         "spots": "max_spawn_tries",
@@ -39,9 +39,6 @@ class EpisodeConfig:
     """Maximum number of starts and goals tried for one episode."""
     keep_unsolvable: bool = False
     """Keep episodes for which the expert finds no plan, their `expert` null; else draw again."""
-    push_model: PushModel = "force"
-    """Push of outcomes, expert and environments: `force`, 200 N up to 2 m/s, or `kick`, 2 m/s at
-    once for every mass."""
     engine: str = DEFAULT_ENGINE
     """Physics engine of settling, outcomes, expert and environments; `bullet` is the only one."""
     unseen_assets: bool = False
@@ -53,18 +50,14 @@ class EpisodeConfig:
         Raises
         ------
         UsageError
-            A value is out of its bounds, or no push model or engine has the name.
+            A value is out of its bounds, or no engine has the name.
 
         """
         check_bounds(self, "{key}: expected {expected}, got {value}", "episodes.")
-        for key, value, names in (
-            ("push_model", self.push_model, PUSH_SPECS),
-            ("engine", self.engine, ENGINES),
-        ):
-            if value not in names:
-                raise UsageError(
-                    f"episodes.{key}: expected one of {', '.join(names)}, got {value!r}"
-                )
+        if self.engine not in ENGINES:
+            raise UsageError(
+                f"episodes.engine: expected one of {', '.join(ENGINES)}, got {self.engine!r}"
+            )
 
     def max_obstacles_for(self, room_count: int) -> int:
         """Return the maximum number of obstacles in a house with a number of rooms."""

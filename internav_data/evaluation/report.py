@@ -26,6 +26,7 @@ from internav_data.evaluation.tables import (
     table_4,
     table_5,
 )
+from internav_data.world.config import WorldConfig
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -257,11 +258,6 @@ def episodes_by_id(dataset: Dataset[Episode], wanted: Sequence[str]) -> dict[str
     return {episode.episode_id: episode for episode in dataset.__getitems__(numbers)}
 
 
-def push_model_of(dataset: Dataset[Episode]) -> Any:  # noqa: ANN401 - PushModel, from JSON
-    """Return the push model of the dataset's config."""
-    return dataset.manifest.config.get("episodes", {}).get("push_model", "force")
-
-
 def _add_table(page: Page, table: Table) -> None:
     page.heading(table.title)
     spans = [(f"{name} (n = {count})", len(table.columns)) for name, count in table.groups]
@@ -294,7 +290,7 @@ def _pictures(results: Sequence[EpisodeResult], dataset: Dataset[Episode]) -> li
         episode = episodes[result.episode_id]
         image = draw_trajectory(
             dataset.scene(episode.scene_id), episode, dataset.assets, result.actions,
-            pixels=_PIXELS, push_model=push_model_of(dataset),
+            pixels=_PIXELS, config=WorldConfig.of_dataset(dataset.manifest.config),
         )  # fmt: skip
         end = "success" if result.success else f"failed, {result.distance_m:.2f} m away"
         pictures.append(

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from internav_data.dataset import load_dataset
 from internav_data.evaluation.evaluator import EvaluationConfig, evaluate
-from internav_data.evaluation.report import episodes_by_id, picked, push_model_of
+from internav_data.evaluation.report import episodes_by_id, picked
+from internav_data.world.config import WorldConfig
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -79,7 +80,7 @@ def videos(
         panel = bars_panel(steps, SIZE) if any(steps) else None
         replay = Replay.of(
             only.scene(episode.scene_id), episode, only.assets, again.actions,
-            title=policy.name, push_model=push_model_of(only),
+            title=policy.name, config=WorldConfig.of_dataset(only.manifest.config),
         )  # fmt: skip
         path = folder / f"{word}-{result.episode_id.replace('/', '-')}.{kind}"
         write_video(path, replay.frames(size=SIZE, fps=FPS, panel=panel), FPS)

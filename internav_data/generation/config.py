@@ -22,6 +22,7 @@ from internav_data.episodes.config import EpisodeConfig
 from internav_data.houses.config import HouseConfig
 from internav_data.houses.plan_file import FLOOR_PLAN, load_floor_plan
 from internav_data.records.errors import UsageError
+from internav_data.world.config import WorldConfig
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -51,6 +52,8 @@ class GenerationConfig:
     """Settings of the houses."""
     episodes: EpisodeConfig = field(default_factory=EpisodeConfig)
     """Settings of the episodes."""
+    world: WorldConfig = field(default_factory=WorldConfig)
+    """Settings of the world that outcomes, experts and environments share."""
 
     def check(self) -> None:
         """Check all values, and that the files they name are there.
@@ -63,6 +66,7 @@ class GenerationConfig:
         """
         self.house.check()
         self.episodes.check()
+        self.world.check()
         check_bounds(self)
         for folder in self.assets:
             if not Path(folder).is_dir():

@@ -64,7 +64,7 @@ def build_scene(
             house = build_house(config.seed, scene, config.house, catalogue, attempt)
             count = config.episodes_of(house.split) if episodes is None else episodes
             pool = obstacle_pool(catalogue, config, house.split)
-            made = build_batch(house, count, pool, config.episodes, attempt=attempt)
+            made = build_batch(house, count, pool, config.episodes, config.world, attempt=attempt)
         except QuarantineError as error:
             reason = str(error)
         else:

@@ -89,7 +89,9 @@ def generate_episodes(
     reason = ""
     for attempt in range(ATTEMPTS):
         try:
-            return build_episodes(house, count, pool, config.episodes, first=first, attempt=attempt)
+            return build_episodes(
+                house, count, pool, config.episodes, config.world, first=first, attempt=attempt
+            )
         except QuarantineError as error:
             reason = str(error)
     raise QuarantineError(reason)

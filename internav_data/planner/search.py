@@ -34,14 +34,16 @@ from internav_data.planner.push_heuristic import clearing_pushes, path_marks
 from internav_data.records import Expert
 from internav_data.world import Action, World
 from internav_data.world.actions import HORIZONS_DEG, PUSHES
+from internav_data.world.config import DEFAULT_WORLD
 from internav_data.world.occlusion import placed_occlusion_shape
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from internav_data.core.typing import Costs, Ints
-    from internav_data.records import Asset, Episode, Pose, PushModel
+    from internav_data.records import Asset, Episode, Pose
     from internav_data.world import HouseModel
+    from internav_data.world.config import WorldConfig
 
 
 ALIKE_M: Final = 0.05
@@ -447,7 +449,7 @@ def expert_of_episode(
     model: HouseModel,
     episode: Episode,
     assets: Mapping[str, Asset],
-    push_model: PushModel = "force",
+    config: WorldConfig = DEFAULT_WORLD,
 ) -> Expert | None:
     """Solve an episode from its start.
 
@@ -459,7 +461,7 @@ def expert_of_episode(
         The model is of another house.
 
     """
-    return solve(World.of_episode(model, episode, assets, push_model))
+    return solve(World.of_episode(model, episode, assets, config))
 
 
 def replay(world: World, actions: Sequence[int]) -> Expert | None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Final, Literal
 
@@ -40,11 +41,29 @@ class PushSpec:
     seconds: float
 
 
+FORCE_N: Final = 200.0
+"""Force of a push, newtons, unless a config names another."""
 PUSH_SPECS: Final[Mapping[PushModel, PushSpec]] = MappingProxyType(
     {
-        "force": PushSpec(force_n=200.0, speed_m_s=2.0, seconds=0.5),
+        "force": PushSpec(force_n=FORCE_N, speed_m_s=2.0, seconds=0.5),
         "kick": PushSpec(force_n=math.inf, speed_m_s=2.0, seconds=0.5),
     }
 )
 """Parameters by push model: the paper's constant force, and the released code's 2 m/s for every
 mass."""
+
+
+@lru_cache(maxsize=64)
+def push_spec(model: PushModel, force_n: float = FORCE_N) -> PushSpec:
+    """Return the parameters of a push model, with another force where it has a finite one.
+
+    Parameters
+    ----------
+    model
+        Name of the push model.
+    force_n
+        Force, newtons.
+
+    """
+    spec = PUSH_SPECS[model]
+    return spec if math.isinf(spec.force_n) else replace(spec, force_n=force_n)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -18,6 +19,8 @@ class CheckedConfig:
     """Generation settings that decide which predicates hold."""
 
     push_model: Literal["force", "kick"] = "force"
+    force_n: float = 200.0
+    """Force of the agent's pushes, newtons."""
     gap_m: float = GAP_M
     """Minimum distance of a spawned obstacle from everything else, metres."""
     solvable: bool = False
@@ -35,16 +38,27 @@ def checked_config(config: Mapping[str, Any]) -> CheckedConfig:
         A value that no generator writes.
 
     """
-    episodes = config.get("episodes")
-    values: Mapping[str, Any] = episodes if isinstance(episodes, dict) else {}
-    model, gap = values.get("push_model", "force"), values.get("gap_m", GAP_M)
+    values, world = _section(config, "episodes"), _section(config, "world")
+    model, force = world.get("push_model", "force"), world.get("force_n", 200.0)
+    gap = values.get("gap_m", GAP_M)
     if model not in ("force", "kick"):
         raise CorruptDataError(
-            f"manifest.json: config.episodes.push_model: expected force or kick, got {model!r}; "
+            f"manifest.json: config.world.push_model: expected force or kick, got {model!r}; "
             "generate the dataset again"
+        )
+    if type(force) not in (int, float) or not 0 < force < math.inf:
+        raise CorruptDataError(
+            f"manifest.json: config.world.force_n: expected newtons, got {force!r}; generate the "
+            "dataset again"
         )
     return CheckedConfig(
         push_model=model,
+        force_n=float(force),
         gap_m=float(gap) if isinstance(gap, int | float) else GAP_M,
         solvable=values.get("keep_unsolvable") is False,
     )
+
+
+def _section(config: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    values = config.get(name)
+    return values if isinstance(values, dict) else {}

@@ -21,12 +21,14 @@ from internav_data.views.replay_painters import (
 )
 from internav_data.views.replay_story import Moment, Shot, Story, play, shots
 from internav_data.world import HouseModel
+from internav_data.world.config import DEFAULT_WORLD
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from internav_data.core.typing import Image
-    from internav_data.records import RGB, Asset, Episode, House, PushModel
+    from internav_data.records import RGB, Asset, Episode, House
+    from internav_data.world.config import WorldConfig
 
     Panel = Callable[["Moment"], Image]
 
@@ -60,12 +62,12 @@ class Replay:
         actions: Sequence[int] | None = None,
         *,
         title: str | None = None,
-        push_model: PushModel = "force",
+        config: WorldConfig = DEFAULT_WORLD,
     ) -> Self:
         """Play an episode, to draw it any number of times; parameters as in `replay_frames`."""
         model = house if isinstance(house, HouseModel) else HouseModel.of(house)
         who = title or ("expert" if actions is None else "given actions")
-        return cls(play(model, episode, assets, actions, push_model), who)
+        return cls(play(model, episode, assets, actions, config), who)
 
     @property
     def success(self) -> bool:
@@ -115,7 +117,7 @@ def replay_frames(
     fps: float = FPS,
     panel: Panel | None = None,
     title: str | None = None,
-    push_model: PushModel = "force",
+    config: WorldConfig = DEFAULT_WORLD,
 ) -> Iterator[Image]:
     """Play an episode and draw it: camera, map, words.
 
@@ -136,8 +138,8 @@ def replay_frames(
         returns a picture (size, w, 3) uint8 RGB of constant width, drawn beside the map.
     title
         Name of the policy, for the title card.
-    push_model
-        Physics of pushes: "force" or "kick".
+    config
+        Settings of the world: those of the episode's dataset.
 
     Yields
     ------
@@ -148,7 +150,7 @@ def replay_frames(
     UsageError
         No expert, an unknown action, another house's episode, a size or rate out of bounds.
     """
-    made = Replay.of(house, episode, assets, actions, title=title, push_model=push_model)
+    made = Replay.of(house, episode, assets, actions, title=title, config=config)
     return made.frames(size=size, fps=fps, panel=panel)
 
 

@@ -11,12 +11,14 @@ from internav_data.records import Pose
 from internav_data.records.errors import UsageError
 from internav_data.world import ACTION_COUNT, Action, HouseModel, World
 from internav_data.world.actions import INTERACTION_KINDS
+from internav_data.world.config import DEFAULT_WORLD
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from internav_data.records import Asset, Episode, PushModel, Quaternion, Vec2
+    from internav_data.records import Asset, Episode, Quaternion, Vec2
     from internav_data.world import StepResult
+    from internav_data.world.config import WorldConfig
 
 
 MAX_ACTIONS: Final = 10_000
@@ -85,7 +87,7 @@ def play(
     episode: Episode,
     assets: Mapping[str, Asset],
     actions: Sequence[int] | None = None,
-    push_model: PushModel = "force",
+    config: WorldConfig = DEFAULT_WORLD,
 ) -> Story:
     """Play actions from an episode's start; those of its expert by default.
 
@@ -97,8 +99,8 @@ def play(
         The episode, and the assets of its obstacles by asset_id.
     actions
         Numbers of `Action`; -1 waits, as in an environment. Actions after a Done are ignored.
-    push_model
-        Physics of pushes: "force" or "kick".
+    config
+        Settings of the world: those of the episode's dataset.
 
     Raises
     ------
@@ -120,7 +122,7 @@ def play(
             f"{episode.episode_id}: obstacle {missing[0]}: its asset is not known; pass the "
             "dataset's assets or the catalogue that the episode was made with"
         )
-    world = World.of_episode(model, episode, assets, push_model)
+    world = World.of_episode(model, episode, assets, config)
     chosen = [Action(action) for action in _checked(actions)]
     if Action.DONE in chosen:
         chosen = chosen[: chosen.index(Action.DONE) + 1]

@@ -28,14 +28,16 @@ from internav_data.views.replay_story import play
 from internav_data.views.silhouettes import shaded, silhouettes
 from internav_data.world import Action, HouseModel
 from internav_data.world.actions import INTERACTION_KINDS
+from internav_data.world.config import DEFAULT_WORLD
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from internav_data.core.typing import Floats, Image
-    from internav_data.records import RGB, Asset, Episode, House, Pose, PushModel, Vec2
+    from internav_data.records import RGB, Asset, Episode, House, Pose, Vec2
     from internav_data.views.canvas import Canvas
     from internav_data.views.replay_story import Story
+    from internav_data.world.config import WorldConfig
 
 EARLY: Final[RGB] = (240, 150, 190)
 LATE: Final[RGB] = (160, 16, 92)
@@ -54,7 +56,7 @@ def draw_trajectory(
     *,
     pixels: int = 700,
     lines: Sequence[str] = (),
-    push_model: PushModel = "force",
+    config: WorldConfig = DEFAULT_WORLD,
 ) -> Image:
     """Draw an episode from above as it was played, north (y) up.
 
@@ -73,8 +75,8 @@ def draw_trajectory(
         Longer side of the plan; legend and caption are added below it.
     lines
         Lines of the caption.
-    push_model
-        Physics of pushes: "force" or "kick".
+    config
+        Settings of the world: those of the episode's dataset.
 
     Returns
     -------
@@ -86,7 +88,7 @@ def draw_trajectory(
         The house or an asset is another's, there is no expert, or no such action.
     """
     model = house if isinstance(house, HouseModel) else HouseModel.of(house)
-    story = play(model, episode, assets, actions, push_model)
+    story = play(model, episode, assets, actions, config)
     canvas = house_canvas(model.house, pixels)
     on_path = episode.room_paths[0] if episode.room_paths else None
     paint_house(canvas, model.house, on_path)

@@ -15,6 +15,7 @@ from internav_data.world.actions import (
 )
 
 if TYPE_CHECKING:
+    from internav_data.world.config import WorldConfig
     from internav_data.world.house_model import HouseModel, MovableObject
     from internav_data.world.world import World
 
@@ -28,9 +29,15 @@ __all__ = [
     "Reason",
     "StepResult",
     "World",
+    "WorldConfig",
 ]
 
 # The table of actions needs neither numba nor Bullet.
 __getattr__, __dir__ = lazy_imports(
-    __name__, {"house_model": ["HouseModel", "MovableObject"], "world": ["World"]}
+    __name__,
+    {
+        "config": ["WorldConfig"],
+        "house_model": ["HouseModel", "MovableObject"],
+        "world": ["World"],
+    },
 )

@@ -19,7 +19,6 @@ from internav_data.physics.engines import DEFAULT_ENGINE
 from internav_data.physics.kdop import dop8_of_square, grown, touching
 from internav_data.physics.pushing import AGENT_M, count_movers, push
 from internav_data.physics.scene import Body
-from internav_data.records import PUSH_SPECS
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import (
     HORIZONS_DEG,
@@ -29,6 +28,7 @@ from internav_data.world.actions import (
     Reason,
     StepResult,
 )
+from internav_data.world.config import DEFAULT_WORLD
 from internav_data.world.drop import DropObstructions, drop
 from internav_data.world.house_model import HouseModel, MovableObject, dop8_rows
 from internav_data.world.occlusion import placed_occlusion_shape
@@ -43,8 +43,9 @@ if TYPE_CHECKING:
     from internav_data.navigation import Lattice, TangentGraph
     from internav_data.physics.kdop import Dop8
     from internav_data.physics.pushing import PushResult
-    from internav_data.records import Asset, Episode, Pose, PushModel, PushSpec, Vec2
+    from internav_data.records import Asset, Episode, Pose, PushSpec, Vec2
     from internav_data.world.actions import Interaction
+    from internav_data.world.config import WorldConfig
 
 
 GOAL_M: Final = 0.2
@@ -232,8 +233,8 @@ class World:
         Lattice among all objects at their present poses; replaced, never changed.
     goal : (int, int)
         Lattice node to reach.
-    push_model : str
-        "force" or "kick", a key of `PUSH_SPECS`.
+    config : WorldConfig
+        Settings: what a push does.
     engine : str
         Name of the physics engine.
     interaction : Interaction or None
@@ -244,6 +245,7 @@ class World:
     __slots__ = (
         "_dop8s",
         "_handles",
+        "config",
         "engine",
         "goal",
         "held",
@@ -254,7 +256,6 @@ class World:
         "j",
         "lattice",
         "model",
-        "push_model",
         "quarter",
     )
 
@@ -270,7 +271,7 @@ class World:
         obstacles: Iterable[Body],
         start: tuple[int, int, int],
         goal: tuple[int, int],
-        push_model: PushModel = "force",
+        config: WorldConfig = DEFAULT_WORLD,
         engine: str = DEFAULT_ENGINE,
     ) -> None:
         """Put obstacles and an agent into a house.
@@ -285,8 +286,8 @@ class World:
             The agent's lattice node i, j and quarter turns counter-clockwise from +x.
         goal
             Lattice node to reach.
-        push_model
-            "force" or "kick".
+        config
+            Settings of the world.
         engine
             Name of the physics engine.
 
@@ -301,7 +302,7 @@ class World:
         self.horizon_deg = START_HORIZON_DEG
         self.held = -1
         self.goal = goal
-        self.push_model: PushModel = push_model
+        self.config = config
         self.engine = engine
         self.interaction: Interaction | None = None
 
@@ -310,7 +311,7 @@ class World:
         model: HouseModel,
         episode: Episode,
         assets: Mapping[str, Asset],
-        push_model: PushModel = "force",
+        config: WorldConfig = DEFAULT_WORLD,
         engine: str | None = None,
     ) -> World:
         """Set up an episode at its start, its obstacles with their stored dynamics.
@@ -323,8 +324,8 @@ class World:
             Episode to set up.
         assets
             Assets by id, those of the obstacles among them.
-        push_model
-            "force" or "kick".
+        config
+            Settings of the world.
         engine
             Name of the physics engine; None for the one that the episode was made with.
 
@@ -345,7 +346,7 @@ class World:
             [Body.of_obstacle(obstacle, assets) for obstacle in episode.obstacles],
             (start.i, start.j, start.yaw_deg // 90),
             (goal.i, goal.j),
-            push_model,
+            config,
             engine or episode.physics.engine,
         )
 
@@ -524,13 +525,14 @@ class World:
     @property
     def push_spec(self) -> PushSpec:
         """Parameters of a push by the agent."""
-        return PUSH_SPECS[self.push_model]
+        return self.config.push_spec
 
     def digest(self) -> str:
         """Return the SHA-256 (hex) of the state: equal worlds have equal digests."""
         # Each part is preceded by its length, so that no two states give the same bytes.
         node = (self.i, self.j, self.quarter, self.horizon_deg, self.held, *self.goal)
-        parts = [self.model.house.scene_id.encode(), self.push_model.encode(), self.engine.encode()]
+        texts = (self.model.house.scene_id, repr(self.config), self.engine)
+        parts = [text.encode() for text in texts]
         parts += [struct.pack("<7i", *node), repr(self.interaction).encode()]
         for item in self.items:
             own = item.dynamics

@@ -186,6 +186,7 @@ def test_a_finished_dataset_is_left_alone(dataset):
 
 def test_options_of_episodes_are_settings():
     result = run("generate", "--push-model", "kick", "--keep-unsolvable", "--print-config")
+    assert "[world]" in result.stdout
     assert 'push_model = "kick"' in result.stdout
     assert "keep_unsolvable = true" in result.stdout
 

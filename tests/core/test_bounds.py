@@ -19,6 +19,7 @@ CONFIGS = {
     "generation.config": "GenerationConfig",
     "houses.config": "HouseConfig",
     "episodes.config": "EpisodeConfig",
+    "world.config": "WorldConfig",
     "evaluation.evaluator": "EvaluationConfig",
     "envs.tasks": "TaskConfig",
     "camp.config": "CampConfig",

@@ -260,10 +260,10 @@ def test_experts_reach_the_goal_by_the_push_model_of_their_dataset(small, tmp_pa
     out = small
     if model == "kick":
         out = tmp_path / "d"
-        overrides = ["episodes_per_scene=3", "house.rooms=1-2", "episodes.push_model=kick"]
+        overrides = ["episodes_per_scene=3", "house.rooms=1-2", "world.push_model=kick"]
         generate(out, load_config(overrides=overrides), 3, workers=1)
     env = make(out)
-    assert open_source(out).push_model == model
+    assert open_source(out).world_config.push_model == model
     pushed = None
     for episode in load_dataset(out):
         if episode.expert.pushes:

@@ -13,6 +13,7 @@ from internav_data.physics import Body, get_solver, settle
 from internav_data.planner.search import expert_of_episode
 from internav_data.records import Pose
 from internav_data.world import HouseModel, World
+from internav_data.world.config import DEFAULT_WORLD
 
 
 def settled(one):
@@ -32,7 +33,7 @@ def settled(one):
     )
 
 
-def played(house, episode, model="force"):
+def played(house, episode, config=DEFAULT_WORLD):
     """An episode with settled obstacles, outcomes and expert."""
     engine = get_solver()
     resting = tuple(settled(one) for one in episode.obstacles)
@@ -48,7 +49,7 @@ def played(house, episode, model="force"):
         ),
     )
     stage = HouseModel.of(replace(house, assets=ASSETS))
-    world = World.of_episode(stage, episode, ASSETS, model)
+    world = World.of_episode(stage, episode, ASSETS, config)
     # A tenth of a millimetre of settling may show in the way.
     episode = replace(
         episode,
@@ -61,7 +62,7 @@ def played(house, episode, model="force"):
         obstacles=tuple(
             replace(o, outcomes=five) for o, five in zip(resting, outcomes, strict=True)
         ),
-        expert=expert_of_episode(stage, episode, ASSETS, model),
+        expert=expert_of_episode(stage, episode, ASSETS, config),
     )
 
 
@@ -82,7 +83,7 @@ def crowded():
     return house, [shut, longer]
 
 
-def physical_scenes(model="force"):
+def physical_scenes(config=DEFAULT_WORLD):
     """Three scenes: a bar in a door, a box on the way, and `crowded`."""
     raw = [*small_scenes()[:2], crowded()]
-    return [(house, [played(house, e, model) for e in episodes]) for house, episodes in raw]
+    return [(house, [played(house, e, config) for e in episodes]) for house, episodes in raw]

@@ -28,7 +28,7 @@ from internav_data.verification.replay import CheckedScene, replay_episode
 from internav_data.verification.replay.outcomes import OutcomeCheck
 from internav_data.verification.scenes import check_scene
 from internav_data.verification.shapes import Shapes
-from internav_data.world import MovableObject, World
+from internav_data.world import MovableObject, World, WorldConfig
 
 FORCE = CheckedConfig()
 
@@ -467,7 +467,7 @@ def test_untrue_schema_is_not_played(tmp_path, scenes):
 
 
 def test_kicks_are_judged_as_kicks(tmp_path, scenes):
-    kicked = physical.physical_scenes("kick")
+    kicked = physical.physical_scenes(WorldConfig("kick"))
     assert kicked != scenes
     kick = {"episodes": {"push_model": "kick"}}
     assert judged(tmp_path / "a", kicked, config=kick).ok
@@ -475,9 +475,21 @@ def test_kicks_are_judged_as_kicks(tmp_path, scenes):
     assert "physics.outcome-success" in untrue  # a kick moves the safe
 
 
-def test_unknown_push_model(tmp_path, scenes):
-    with pytest.raises(CorruptDataError, match="push_model"):
-        judged(tmp_path, scenes, config={"episodes": {"push_model": "shove"}})
+def test_weak_pushes_are_judged_as_weak(tmp_path, scenes):
+    weak = physical.physical_scenes(WorldConfig(force_n=20.0))
+    assert weak != scenes
+    config = {"world": {"force_n": 20.0}}
+    assert judged(tmp_path / "a", weak, config=config).ok
+    assert not judged(tmp_path / "b", weak).ok
+
+
+@pytest.mark.parametrize(
+    "world", [{"push_model": "shove"}, {"force_n": 0}, {"force_n": "much"}, {"force_n": True}]
+)
+def test_unknown_pushes(tmp_path, scenes, world):
+    (name,) = world
+    with pytest.raises(CorruptDataError, match=f"config.world.{name}: expected"):
+        judged(tmp_path, scenes, config={"world": world})
 
 
 def test_geometry_needs_no_engine(tmp_path, scenes):

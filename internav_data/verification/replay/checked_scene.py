@@ -13,6 +13,7 @@ from internav_data.physics import DEFAULT_ENGINE, ENGINES
 from internav_data.verification.objects import wall_slabs
 from internav_data.verification.overlaps import overlapping_slabs
 from internav_data.world import HouseModel, World
+from internav_data.world.config import WorldConfig
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,8 +52,8 @@ class CheckedScene:
 
     def world(self, episode: Episode) -> World:
         """Return the world of an episode at its start."""
-        push_model, engine = self.config.push_model, self.engine(episode)
-        return World.of_episode(self.model, episode, self.assets, push_model, engine)
+        config = WorldConfig(self.config.push_model, self.config.force_n)
+        return World.of_episode(self.model, episode, self.assets, config, self.engine(episode))
 
     def engine(self, episode: Episode) -> str:
         """Return the name of the physics engine that checks an episode: its own, if known here."""

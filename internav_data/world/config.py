@@ -1,0 +1,76 @@
+"""Settings of the world: how an agent's pushes act on the objects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Final
+
+from internav_data.core.config import Bounds, check_bounds, from_mapping
+from internav_data.records.errors import CorruptDataError, UsageError
+from internav_data.records.physics import FORCE_N, PUSH_SPECS, PushModel, push_spec
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
+
+    from internav_data.records import PushSpec
+
+
+@dataclass(frozen=True, slots=True)
+class WorldConfig:
+    """Settings of the world that outcomes, experts and environments share."""
+
+    push_model: PushModel = "force"
+    """Push: `force`, `force_n` up to 2 m/s, or `kick`, 2 m/s at once for every mass."""
+    force_n: Annotated[float, Bounds(1.0, 2000.0)] = FORCE_N
+    """Force of the agent's pushes, newtons; `kick` has none."""
+
+    def check(self, prefix: str = "world.") -> None:
+        """Check all values.
+
+        Raises
+        ------
+        UsageError
+            A value is out of its bounds, or no push model has the name.
+
+        """
+        check_bounds(self, "{key}: expected {expected}, got {value}", prefix)
+        if self.push_model not in PUSH_SPECS:
+            raise UsageError(
+                f"{prefix}push_model: expected one of {', '.join(PUSH_SPECS)}, "
+                f"got {self.push_model!r}"
+            )
+
+    @property
+    def push_spec(self) -> PushSpec:
+        """Parameters of a push."""
+        return push_spec(self.push_model, self.force_n)
+
+    @staticmethod
+    def of_dataset(config: Mapping[str, Any]) -> WorldConfig:
+        """Return the settings in a dataset's config; missing ones have their defaults.
+
+        Parameters
+        ----------
+        config
+            Config of a dataset's manifest.
+
+        Raises
+        ------
+        CorruptDataError
+            A value that no generator writes.
+
+        """
+        given, names = config.get("world"), WorldConfig.__dataclass_fields__
+        values = given if isinstance(given, dict) else {}
+        known = {name: value for name, value in values.items() if name in names}
+        try:
+            made = from_mapping(DEFAULT_WORLD, known, "manifest.json", prefix="world.")
+            made.check()
+        except UsageError as error:
+            raise CorruptDataError(f"config: {error}; generate the dataset again") from error
+        return made
+
+
+DEFAULT_WORLD: Final = WorldConfig()
+"""Settings of a world that names none."""
