@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from internav_data.core.hardware import hardware
 from internav_data.core.storage import StoreLike, exists, final_of, store_of
+from internav_data.dataset.compatibility import present_settings
 from internav_data.dataset.journal import Journal, journal_names
 from internav_data.dataset.manifest import (
     MANIFEST,
@@ -138,7 +139,9 @@ def _refuse_strangers(store: Store, ours: Iterable[str] = ()) -> None:
 
 
 def _same(out: str, there: Identity, wanted: Identity, defaults: Mapping[str, Any]) -> None:
-    there = replace(there, config=_filled(there.config, defaults), rules=wanted.rules)
+    there = replace(
+        there, config=_filled(present_settings(there.config), defaults), rules=wanted.rules
+    )
     old, new = (json.loads(json.dumps(asdict(i))) for i in (there, wanted))
     if difference := _first_difference(old, new, ""):
         raise UsageError(

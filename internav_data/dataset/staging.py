@@ -18,7 +18,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -26,7 +26,6 @@ import pyarrow as pa
 from internav_data.core.files import FileLimits, parse_json
 from internav_data.core.processes import end_if_orphaned
 from internav_data.core.storage import Store, StoreLike, exists, final_of, store_of
-from internav_data.dataset.compatibility import present_settings
 from internav_data.dataset.encode import to_table
 from internav_data.dataset.tables import EPISODES, SCENES
 from internav_data.records.errors import CorruptDataError, InternavError
@@ -95,7 +94,7 @@ def read_identity(root: StoreLike) -> Identity:
         raise _FILE.refusal(place, f"damaged, or of another program ({error})") from error
     if not isinstance(identity.config, dict):
         raise _FILE.refusal(place, "damaged, or of another program (config: expected an object)")
-    return replace(identity, config=present_settings(identity.config))
+    return identity
 
 
 @dataclass(frozen=True, slots=True)

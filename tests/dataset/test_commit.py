@@ -255,6 +255,18 @@ def test_a_setting_that_is_younger_than_the_dataset_has_its_default(tmp_path):
         open_staging(tmp_path, today, {"house": {"roof": "steep"}})
 
 
+def test_a_setting_that_has_moved_is_the_same_setting(tmp_path):
+    values = {f: getattr(IDENTITY, f) for f in IDENTITY.__slots__}
+    before = Identity(**{**values, "config": {"episodes": {"push_model": "kick"}}})
+    today = Identity(**{**values, "config": {"episodes": {}, "world": {"push_model": "kick"}}})
+    staging = open_staging(tmp_path, before)
+    staging.check()
+    open_staging(tmp_path, today)
+    other = Identity(**{**values, "config": {"episodes": {}, "world": {"push_model": "force"}}})
+    with pytest.raises(UsageError, match=r"config\.world\.push_model"):
+        open_staging(tmp_path, other)
+
+
 def test_tuples_in_a_configuration_are_lists_on_disk(tmp_path):
     values = {f: getattr(IDENTITY, f) for f in IDENTITY.__slots__}
     same = Identity(**{**values, "config": {"house": {"scale": 1.5}, "list": (1, 2)}})
