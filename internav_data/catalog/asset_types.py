@@ -52,7 +52,8 @@ class AssetType(NamedTuple):
     likeness: float
     """Correlation of the three sizes. 0: drawn independently; 1: the widest is also the highest."""
     blocks: bool = True
-    """Whether the agent's disc must keep clear of it: rugs can be driven over."""
+    """Whether the agent's disc must keep clear of it. Rugs are floor: bodies of no physics, drawn
+    4 mm high at most, so that what stands on the floor below them does not look sunk."""
 
     @property
     def asset_count(self) -> int:
@@ -114,7 +115,7 @@ FURNITURE: tuple[AssetType, ...] = (
     AssetType(45, "FilingCabinet", storage.filing_cabinet, 0, 0, 5, 32., (.38, .42, .80), (.45, .56, .62), (.60, .72, 1.32), .3),  # noqa: E501
     AssetType(46, "CoatRack", storage.coat_rack, 0, 0, 4, 5., (.36, .44, .52), (.36, .44, .52), (1.6, 1.74, 1.85), .6),  # noqa: E501
     AssetType(47, "ShoeCabinet", storage.shoe_cabinet, 0, 0, 5, 20., (.60, .80, 1.10), (.22, .30, .36), (.50, .85, 1.2), .3),  # noqa: E501
-    AssetType(48, "Rug", rooms.rug, 0, 0, 12, 6., (.60, 1.60, 3.0), (.50, 1.20, 2.2), (.006, .01, .014), .8, blocks=False),  # noqa: E501
+    AssetType(48, "Rug", rooms.rug, 0, 0, 12, 6., (.60, 1.60, 3.0), (.50, 1.20, 2.2), (.002, .0028, .004), .8, blocks=False),  # noqa: E501
     AssetType(49, "Painting", rooms.painting, 0, 0, 10, 3., (.40, .81, 1.4), (.024, .03, .04), (.36, .62, 1.0), .6),  # noqa: E501
     AssetType(50, "Mirror", rooms.mirror, 0, 0, 6, 6., (.40, .60, .90), (.02, .026, .04), (.60, .90, 1.3), .4),  # noqa: E501
     AssetType(51, "Piano", storage.piano, 0, 0, 3, 200., (1.4, 1.48, 1.54), (.56, .60, .66), (1.06, 1.16, 1.3), .4),  # noqa: E501

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from internav_data.records import Asset
 
-VERSION = 1
+VERSION = 2
 """Version of the catalogue, raised with every change of an asset: datasets name it."""
 
 

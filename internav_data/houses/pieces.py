@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from internav_data.geometry import asset_corners
+from internav_data.geometry.footprints import convex_hull
 from internav_data.houses.fitting import GroupBoxes, any_overlap, turn_box
 
 if TYPE_CHECKING:
@@ -28,8 +30,14 @@ BACK_GAP_M = 0.01
 FACING_ROOM, FACING_WALL, FACING_RIGHT, FACING_LEFT = 2, 0, 1, 3
 """Quarter turns of an asset (its front looks along -y) in a group's frame."""
 
+EDGE_M = 5e-4
+"""Depth by which a thing may stick out over the edge of the top that carries it: rounding."""
+
 _BOXES: dict[tuple[str, str], Floats] = {}
 """Boxes around the parts of assets by (catalogue digest, asset id): a cache, never cleared."""
+_PLANS: dict[tuple[str, str], tuple[Floats, ...]] = {}
+"""Plan of an asset, then tops of its parts: corners of convex polygons (n, 2), counter-clockwise.
+A cache by (catalogue digest, asset id), never cleared."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,12 +176,14 @@ class Picker:
         dy: float,
         turn: int = FACING_ROOM,
     ) -> PlacedAsset | None:
-        """Stand an asset on an item, (dx, dy) from its middle; None where it finds no flat top."""
+        """Stand an asset on an item, (dx, dy) from its middle; None where it finds no flat top.
+
+        All of its plan lies within the top of the highest part below it: nothing stands on a
+        chair's back or over a table's edge.
+        """
         item = PlacedAsset(asset, below.x + dx, below.y + dy, turn, support=index)
         hx, hy = item.half
         parts = self.parts(below)
-        # The small asset rests on the highest part below it, and that part must carry its whole
-        # rectangle, up to `slack`: nothing stands on a chair's back or over a table's edge.
         over = (
             (parts[:, 0] < item.x + hx)
             & (parts[:, 2] > item.x - hx)
@@ -183,16 +193,25 @@ class Picker:
         if not over.any():
             return None
         top = float(parts[over, 5].max())
-        slack = 0.02
-        carries = (
-            over
-            & (parts[:, 5] > top - 1e-3)
-            & (parts[:, 0] <= item.x - hx + slack)
-            & (parts[:, 2] >= item.x + hx - slack)
-            & (parts[:, 1] <= item.y - hy + slack)
-            & (parts[:, 3] >= item.y + hy - slack)
+        plan = _turned(self._plans(asset)[0], item.turn, item.x, item.y)
+        tops = self._plans(below.asset)[1:]
+        carried = any(
+            _holds(_turned(tops[k], below.turn, below.x, below.y), plan)
+            for k in np.flatnonzero(over & (parts[:, 5] > top - 1e-3))
         )
-        return replace(item, z=top) if carries.any() else None
+        return replace(item, z=top) if carried else None
+
+    def _plans(self, asset: Asset) -> tuple[Floats, ...]:
+        """Return the plan of an asset, then the tops of its parts, in its own frame."""
+        key = (self.catalogue.digest, asset.asset_id)
+        if key not in _PLANS:
+            corners, starts = asset_corners(asset)
+            parts = [corners[a:b] for a, b in pairwise(starts)]
+            tops = [part[part[:, 2] > part[:, 2].max() - 1e-3, :2] for part in parts]
+            _PLANS[key] = tuple(
+                convex_hull(np.ascontiguousarray(p)) for p in (corners[:, :2], *tops)
+            )
+        return _PLANS[key]
 
     def tucked(self, table: PlacedAsset, chair: Asset, side: int, along: float) -> PlacedAsset:
         """Push a chair under a table from a side (quarter turns from +y) as far as it goes.
@@ -218,19 +237,42 @@ class Picker:
         return best
 
 
+def _turned(corners: Floats, turn: int, x: float, y: float) -> Floats:
+    """Return corners (n, 2) turned by quarter turns about the origin, then moved."""
+    u, v = corners[:, 0], corners[:, 1]
+    moved = ((u, v), (-v, u), (-u, -v), (v, -u))[turn % 4]
+    return np.column_stack([moved[0] + x, moved[1] + y])
+
+
+def _holds(outer: Floats, inner: Floats) -> bool:
+    """Return whether a convex polygon (n, 2), counter-clockwise, holds points, up to `EDGE_M`."""
+    if len(outer) < 3:  # noqa: PLR2004 - a part with a point or an edge on top
+        return False
+    sides = np.roll(outer, -1, axis=0) - outer
+    away = inner[:, None, :] - outer[None, :, :]
+    left = sides[None, :, 0] * away[:, :, 1] - sides[None, :, 1] * away[:, :, 0]
+    return bool((left >= -EDGE_M * np.hypot(sides[:, 0], sides[:, 1])).all())
+
+
 def overlap(first: Floats, second: Floats, gap: float = 0.005) -> bool:
     """Return whether boxes (n, 6) of one item come nearer than a gap (m) to those of another."""
     return bool(any_overlap(first, second, gap))
 
 
 def consistent(picker: Picker, group: Group) -> bool:
-    """Return whether no two items of a group share volume: a chair may stand under a table."""
+    """Return whether no two items of a group share volume: a chair may stand under a table.
+
+    Rugs are floor: what stands on one stands on the floor that it covers.
+    """
     boxes = group.boxes
     count = len(boxes)
     for a in range(count):
         for b in range(a + 1, count):
-            if overlap(boxes[a : a + 1], boxes[b : b + 1], 0.0) and overlap(
-                picker.parts(group.items[a]), picker.parts(group.items[b]), 0.0005
+            if (
+                group.items[a].asset.blocks
+                and group.items[b].asset.blocks
+                and overlap(boxes[a : a + 1], boxes[b : b + 1], 0.0)
+                and overlap(picker.parts(group.items[a]), picker.parts(group.items[b]), 0.0005)
             ):
                 return False
     return True

@@ -26,19 +26,27 @@ if TYPE_CHECKING:
 def seating(p: Picker, room: RoomContext) -> list[Group]:
     """Make a sofa facing a television, a coffee table between, an armchair beside."""
     stand = p.one("TVStand")
-    screen = p.one("Television", lambda a: stand is not None and a.size[0] <= stand.size[0] + 0.05)
     sofa = p.one("Sofa", narrow(max(1.6, 0.6 * room.long_m)), any_size=True)
     if sofa is None:
         return []
     out: list[Group] = []
     if stand is not None:
-        base = against(stand)
-        resting = p.resting(base, 0, screen, 0.0, 0.0) if screen is not None else None
-        screens = (base,) if resting is None else (base, resting)
+        screen = _screen(p, stand)
         for distance in _viewing_distances(room, stand, sofa):
-            out += _around(p, screens, sofa, distance)
-        out.append(Group((*screens,), (in_front(base, 0.5),)))
+            out += _around(p, screen, sofa, distance)
+        out.append(screen.with_clearance(in_front(screen.items[0], 0.5)))
     return out
+
+
+def _screen(p: Picker, stand: Asset) -> Group:
+    """Make a stand with a television on it; no picture hangs behind the television."""
+    base = against(stand)
+    asset = p.one("Television", lambda a: a.size[0] <= stand.size[0] and a.size[1] <= stand.size[1])
+    screen = p.resting(base, 0, asset, 0.0, 0.0) if asset is not None else None
+    if screen is None:
+        return Group((base,))
+    (hx, hy), wall = screen.half, BACK_GAP_M
+    return Group((base, screen), ((screen.x - hx, wall, screen.x + hx, max(wall, screen.y - hy)),))
 
 
 def _viewing_distances(room: RoomContext, stand: Asset, sofa: Asset) -> list[float]:
@@ -51,13 +59,13 @@ def _viewing_distances(room: RoomContext, stand: Asset, sofa: Asset) -> list[flo
     return [*gaps, 2.4, 1.9, 1.5]
 
 
-def _around(p: Picker, screens: tuple[PlacedAsset, ...], sofa: Asset, gap: float) -> list[Group]:
+def _around(p: Picker, screen: Group, sofa: Asset, gap: float) -> list[Group]:
     """Make a sofa across from a screen, with and without coffee table, rug and armchair."""
-    base = screens[0]
+    base = screen.items[0]
     front = base.y + base.half[1]
     seat = PlacedAsset(sofa, base.x, front + gap + sofa.size[1] / 2.0, FACING_WALL)
     lane = (base.x - 0.4, front, base.x + 0.4, front + 0.5)
-    plain = Group((*screens, seat), (lane,))
+    plain = screen.with_items(seat).with_clearance(lane)
     coffee = p.one("CoffeeTable", lambda a: a.size[1] <= gap - 1.1 and a.size[0] <= sofa.size[0])
     if coffee is None:
         return [plain]
@@ -70,9 +78,7 @@ def _around(p: Picker, screens: tuple[PlacedAsset, ...], sofa: Asset, gap: float
     )
     if carpet is not None and p.chance(0.7):
         lying = PlacedAsset(carpet, base.x, middle, FACING_WALL)
-        on_it = p.resting(lying, len(plain.items), coffee, 0.0, 0.0, FACING_WALL)
-        if on_it is not None:
-            with_table = plain.with_items(lying, on_it)
+        with_table = plain.with_items(lying, table)
     chair = p.one("ArmChair", narrow(1.0))
     if chair is None:
         return [with_table, plain]
@@ -100,13 +106,11 @@ def sofa_alone(p: Picker, room: RoomContext) -> list[Group]:
 def television(p: Picker, room: RoomContext) -> list[Group]:
     """Make a television on its stand."""
     del room
-    stand, screen = p.one("TVStand"), p.one("Television")
+    stand = p.one("TVStand")
     if stand is None:
         return []
-    base = against(stand)
-    resting = p.resting(base, 0, screen, 0.0, 0.0) if screen else None
-    items = (base,) if resting is None else (base, resting)
-    return [Group(items, (in_front(base, 0.5),))]
+    screen = _screen(p, stand)
+    return [screen.with_clearance(in_front(screen.items[0], 0.5))]
 
 
 def dining(p: Picker, room: RoomContext) -> list[Group]:

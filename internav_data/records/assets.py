@@ -66,7 +66,8 @@ class Asset:
     spawnable: bool
     """Whether it may be spawned as an obstacle: the 20 obstacle types, and a user's own assets."""
     blocks: bool
-    """Whether it has a footprint: false for assets that an agent walks over (rugs) or under."""
+    """Whether it has a footprint: false for rugs, which are floor. They are bodies of no physics,
+    drawn 4 mm high at most."""
     parts: tuple[Part, ...]
     """Convex pieces; the asset is their union."""
 

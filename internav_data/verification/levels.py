@@ -63,6 +63,7 @@ class Unit:
     root: Path
     assets: DataFile
     shard_refs: tuple[ShardRef, ...]
+    catalogue_version: int
     physics: CheckedConfig | None = None
     """Settings for the level `physics`; None to omit it."""
 
@@ -233,7 +234,13 @@ def _check_scenes(
         chosen = sorted(rng.permutation(len(shard_refs))[:sample].tolist())
         shard_refs = [shard_refs[k] for k in chosen]
     units = [
-        Unit(root, assets[0], tuple(shard_refs[k : k + SCENES_A_UNIT]), physics)
+        Unit(
+            root,
+            assets[0],
+            tuple(shard_refs[k : k + SCENES_A_UNIT]),
+            manifest.catalogue_version,
+            physics,
+        )
         for k in range(0, len(shard_refs), SCENES_A_UNIT)
     ]
     done = 0
@@ -334,7 +341,11 @@ def check_unit(unit: Unit) -> FindingCollector:
         report = FindingCollector(file, shard_ref.scene_id)
         with report.guard(CHECKABLE):
             house, episodes = reader.house(shard_ref), reader.episodes(shard_ref)
-            report.absorb(check_scene(house, episodes, _shapes(unit), file, unit.physics))
+            report.absorb(
+                check_scene(
+                    *(house, episodes, _shapes(unit), file, unit.physics, unit.catalogue_version)
+                )
+            )
         reports.append(report)
     return join(reports)
 

@@ -9,6 +9,7 @@ from internav_data.verification.episodes import check_episode
 from internav_data.verification.findings import FindingCollector
 from internav_data.verification.houses import check_doors, check_rooms, check_walls
 from internav_data.verification.objects import check_objects, check_passages
+from internav_data.verification.surfaces import SINCE, check_surfaces
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,6 +27,7 @@ def check_scene(
     shapes: Shapes,
     file: str = "",
     physics: CheckedConfig | None = None,
+    catalogue_version: int = SINCE,
 ) -> FindingCollector:
     """Check a house and its episodes.
 
@@ -42,11 +44,15 @@ def check_scene(
         Path of the episodes' file, for findings.
     physics
         Generation settings for the level `physics`; None to omit it.
+    catalogue_version
+        Version of the dataset's catalogue: early ones had thick rugs, and things overhung.
 
     """
     report = FindingCollector(file, house.scene_id)
     report.counts["scenes"] += 1
     layout = _check_house(house, shapes, report)
+    if layout is not None and catalogue_version >= SINCE:
+        check_surfaces(house, shapes, report)
     true: list[Episode] = []
     if layout is not None:
         sound = not report.by_predicate

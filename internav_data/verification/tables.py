@@ -17,6 +17,7 @@ from internav_data.verification.findings import FindingCollector
 from internav_data.verification.house_config import check_house_config, house_request
 from internav_data.verification.interactions import check_interactions
 from internav_data.verification.ranges import check_ranges
+from internav_data.verification.surfaces import SINCE, check_flat
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -102,7 +103,7 @@ def _check_table(
             unsafe.discard(file.path)
     with report.guard("schema.checkable"):
         if file.table == "assets":
-            _check_assets(table, keys, report)
+            _check_assets(table, manifest, keys, report)
         elif file.table == "scenes":
             _check_scenes(table, manifest, file, keys, report)
         else:
@@ -110,7 +111,9 @@ def _check_table(
     return report
 
 
-def _check_assets(table: pa.Table, keys: DatasetKeys, report: FindingCollector) -> None:
+def _check_assets(
+    table: pa.Table, manifest: Manifest, keys: DatasetKeys, report: FindingCollector
+) -> None:
     ids = table.column("asset_id").to_pylist()
     report.expect(ids == sorted(ids), "schema.assets.order", "rows by asset_id", "another order")
     report.expect(len(set(ids)) == len(ids), "schema.assets.unique", "each asset once", "one twice")
@@ -123,6 +126,8 @@ def _check_assets(table: pa.Table, keys: DatasetKeys, report: FindingCollector) 
             f"{asset.asset_id}: corners of hulls and of no other part",
             [(part.shape, len(part.corners)) for part in asset.parts],
         )
+        if manifest.catalogue_version >= SINCE and asset.parts:
+            check_flat(asset, report)
 
 
 def _check_scenes(

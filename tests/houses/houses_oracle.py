@@ -139,6 +139,14 @@ def check_walls(house):
     assert abs(volume - (expected.area * ceiling - holes)) < 1e-3
 
 
+def check_carried(house, thing, own, below):
+    """What stands on furniture lies within a top of it, and never on a rug."""
+    assert house.assets[house.objects[thing.support].asset_id].blocks, thing
+    tops = shapely.union_all([plan for plan, _, high in below if abs(high - thing.z) < 1e-3])
+    plan = shapely.union_all([plan for plan, _, _ in own])
+    assert tops.buffer(1e-3, join_style="mitre").covers(plan), thing
+
+
 def check_things(house):
     parts = [parts_of(house, thing) for thing in house.objects]
     bounds = [shapely.union_all([plan for plan, _, _ in ps]).bounds for ps in parts]
@@ -154,7 +162,16 @@ def check_things(house):
             tops = [high for _, _, high in parts[thing.support]]
             assert below.room == thing.room
             assert any(abs(top - thing.z) < 1e-3 for top in tops), (thing, below)
-    for a, b in itertools.combinations(range(len(parts)), 2):
+            check_carried(house, thing, parts[k], parts[thing.support])
+        elif not house.assets[thing.asset_id].blocks:
+            assert max(high for _, _, high in parts[k]) <= 0.004, "a rug that things sink into"
+    check_apart(house, parts, bounds)
+
+
+def check_apart(house, parts, bounds):
+    """No two things share volume, but for rugs, which are floor."""
+    solid = [k for k, t in enumerate(house.objects) if house.assets[t.asset_id].blocks]
+    for a, b in itertools.combinations(solid, 2):
         if house.objects[a].room != house.objects[b].room:
             continue
         ax, ay, bx, by = bounds[a]

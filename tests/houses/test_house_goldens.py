@@ -16,10 +16,10 @@ SCENES = 33
 ALL_TYPES = "hall,living,dining,kitchen,laundry,office,storage,studio,bathroom,bedroom"
 
 GOLDEN = {
-    "paper": "ec7fad4be25c66c4f68c8839c3342018037a4c3dc48f216fda8490387ac1b730",
-    "paper, every type": "d15d7c5a5654a0e5aae875a7e866c49c5d59f011ed1514d1d0e172b382b6fc6d",
-    "realistic": "5642e9e7a94c67cfa386cc44b3de82b3959347c8898bf2301b543b77bc1a4a0a",
-    "realistic, every type": "aed07ac302baf40c3f45e4dedbffeb125f2166888e8b6b431ebb35d50e8e02b4",
+    "paper": "66e26d5d3d70f169bab18f7ddcd8a8cb2c5ed409339e5b6172753e90b8d871b1",
+    "paper, every type": "7b781de379683a2b58f68a09102ae1fa2a518ec812191f1f9d9c62b3fdb613cc",
+    "realistic": "1836a3e4b1e963fc46fbc0789a897e9dcdb0a617744cb46c48eadba56097a006",
+    "realistic, every type": "470c51bf08a94e6239ac52ab91525811908558ed0cbbb2dcdc8648f39d04eabc",
 }
 
 
