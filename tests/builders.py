@@ -155,6 +155,13 @@ def apple() -> Asset:
     return asset("Apple_0", ball, size=size, mass_kg=0.2, pushable=False, pickable=True)
 
 
+def screen(asset_id: str = "Screen_0", **changes: Any) -> Asset:
+    """Return a screen on a flat foot that reaches 18 cm beyond its footprint to both sides."""
+    foot = box((0.0, 0.0, 0.009), (0.6, 0.4, 0.018))
+    panel = box((0.0, 0.0, 0.259), (0.6, 0.04, 0.482))
+    return asset(asset_id, foot, panel, **changes)
+
+
 def rug() -> Asset:
     """Return a rug, which blocks nothing."""
     made = crate("Rug_0", (2.0, 1.4, 0.01), colour=(170, 120, 110))

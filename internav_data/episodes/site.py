@@ -9,12 +9,14 @@ import numpy as np
 
 from internav_data.geometry import Polygons, house_footprints
 from internav_data.navigation import SPACING_M, room_paths, rooms_of
+from internav_data.physics.narrow_phase import joined_prisms, prisms_of
 from internav_data.world import HouseModel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.navigation import Lattice, TangentGraph
+    from internav_data.physics.narrow_phase import ConvexPrisms
     from internav_data.records import House, Vec2
 
 
@@ -27,6 +29,8 @@ class SpawnSite:
     """Model that the worlds of all episodes share."""
     footprints: Polygons
     """Footprints of all walls and furniture, walls first, metres."""
+    prisms: ConvexPrisms
+    """Prisms of all walls and furniture but rugs: entire hulls, at all heights."""
     lattice: Lattice
     """Lattice of `model`, without obstacles. Never changed: copy it."""
     tangent_graph: TangentGraph
@@ -53,6 +57,7 @@ class SpawnSite:
             house=house,
             model=model,
             footprints=house_footprints(house),
+            prisms=_prisms(model),
             lattice=lattice,
             tangent_graph=model.tangent_graph(),
             nodes=nodes.astype(np.int64),
@@ -79,3 +84,8 @@ class SpawnSite:
         if key not in self._room_paths:
             self._room_paths[key] = room_paths(self.house, first, second)
         return self._room_paths[key]
+
+
+def _prisms(model: HouseModel) -> ConvexPrisms:
+    movable = [prisms_of(item.asset, item.pose) for item in model.items if item.pose is not None]
+    return joined_prisms([*(prisms_of(b.asset, b.pose) for b in model.fixed), *movable])

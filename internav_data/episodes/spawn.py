@@ -15,15 +15,16 @@ from internav_data.geometry import (
     clearance,
     footprint,
     round_m,
-    wall_footprints,
     yaw_quaternion,
 )
 from internav_data.navigation import room_of
 from internav_data.physics import Body, settle, wall_body
+from internav_data.physics.fall_clearance import fall_clearance, touches
+from internav_data.physics.narrow_phase import prisms_of
 from internav_data.records import Pose
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.random import Generator
 
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from internav_data.episodes.site import SpawnSite
     from internav_data.navigation import Lattice
     from internav_data.physics import SettleResult
+    from internav_data.physics.narrow_phase import ConvexPrisms
     from internav_data.records import Asset, Mode, NodePath, Vec2
 
 YAW_STEP_DEG = 15
@@ -49,6 +51,8 @@ class Spawned:
     """Segment of the node path on which it was spawned, 0 at the start."""
     footprint: Polygons
     """Footprint at the rounded pose, as a reader of the file derives it, metres."""
+    prisms: ConvexPrisms
+    """Prisms of its entire hull at the rounded pose."""
 
 
 @dataclass(slots=True)
@@ -131,20 +135,23 @@ def _try_spot(draft: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> Non
     if spot is None:
         return
     pose = Pose(round_m(spot[0]), round_m(spot[1]), 0.0, yaw_quaternion(yaw_deg))
-    # Cheapest test first: upright footprint, then physics, then the footprint at the rounded rest.
+    # Cheapest test first: upright footprint, entire hull, physics, then both at the rounded rest.
     gap = draft.config.gap_m
     standing = _standing(asset, yaw_deg)
     shifted = Polygons(standing.vertices + np.array([pose.x, pose.y]), standing.offsets)
     if _distance(draft, shifted, gap) < gap:
         return
-    settled = settle(Body.of(asset, pose), gap, lambda: _near(draft, shifted), draft.config.engine)
+    upright = prisms_of(asset, pose)
+    if any(fall_clearance(upright, other, gap) < gap for other in _solids(draft)):
+        return
+    settled = settle(Body.of(asset, pose), gap, lambda: _near(draft, upright), draft.config.engine)
     if settled.refusal:
         return
     # Settling may have moved it by up to 5 cm: it must still not touch anything.
-    exact = footprint(asset, settled.pose)
-    if _distance(draft, exact, gap) <= 0.0:
+    exact, entire = footprint(asset, settled.pose), prisms_of(asset, settled.pose)
+    if _distance(draft, exact, gap) <= 0.0 or any(touches(entire, s) for s in _solids(draft)):
         return
-    _place(draft, Spawned(asset, settled, segment, exact))
+    _place(draft, Spawned(asset, settled, segment, exact, entire))
 
 
 def _spot(
@@ -187,22 +194,27 @@ def _place(draft: EpisodeDraft, spawned: Spawned) -> None:
     draft.steps = steps
 
 
-def _near(draft: EpisodeDraft, here: Polygons) -> list[Body]:
-    """Return the furniture, obstacles and walls near a footprint, as fixed bodies."""
+def _solids(draft: EpisodeDraft) -> Iterator[ConvexPrisms]:
+    """Yield the prisms of the house, then those of each obstacle so far."""
+    yield draft.site.prisms
+    for other in draft.obstacles:
+        yield other.prisms
+
+
+def _near(draft: EpisodeDraft, here: ConvexPrisms) -> list[Body]:
+    """Return the furniture, obstacles and walls whose plans are near an object's, fixed."""
     house = draft.site.house
     bodies = [
         Body.of(house.assets[placed.asset_id], placed.pose, moves=False)
         for placed in house.objects
-        if _is_near(here, footprint(house.assets[placed.asset_id], placed.pose))
+        if house.assets[placed.asset_id].blocks
     ]
-    bodies += [
-        Body.of(other.asset, other.settled.pose, moves=False)
-        for other in draft.obstacles
-        if _is_near(here, other.footprint)
-    ]
-    bodies += [wall_body(wall) for wall in house.walls if _is_near(here, wall_footprints([wall]))]
-    return bodies
+    bodies += [Body.of(other.asset, other.settled.pose, moves=False) for other in draft.obstacles]
+    bodies += [wall_body(wall) for wall in house.walls]
+    return [body for body in bodies if _is_near(here, prisms_of(body.asset, body.pose))]
 
 
-def _is_near(here: Polygons, there: Polygons) -> bool:
-    return clearance(here, there, NEAR_M) < NEAR_M
+def _is_near(here: ConvexPrisms, there: ConvexPrisms) -> bool:
+    """Return whether the plans of two objects come near, at whatever heights their parts are."""
+    plans = Polygons(here.vertices, here.starts), Polygons(there.vertices, there.starts)
+    return clearance(*plans, NEAR_M) < NEAR_M

@@ -57,6 +57,18 @@ def prisms_of(asset: Asset, pose: Pose) -> ConvexPrisms:
     return ConvexPrisms(vertices, firsts, boxes[:-1].copy())
 
 
+def joined_prisms(objects: Sequence[ConvexPrisms]) -> ConvexPrisms:
+    """Return the prisms of several objects as those of one, in order."""
+    if not objects:
+        return ConvexPrisms(np.empty((0, 2)), np.zeros(1, dtype=np.int64), np.empty((0, 6)))
+    sizes = np.concatenate([np.diff(prisms.starts) for prisms in objects])
+    return ConvexPrisms(
+        np.concatenate([prisms.vertices for prisms in objects]),
+        np.concatenate([[0], np.cumsum(sizes)]),
+        np.concatenate([prisms.boxes for prisms in objects]),
+    )
+
+
 def prisms_of_collider(x: float, y: float, radius: float, low: float, high: float) -> ConvexPrisms:
     """Return the prism around an upright cylinder, axis at (x, y), metres."""
     # The polygon's sides touch the circle from outside.
@@ -214,7 +226,7 @@ def met_on_path(
     """
     if not others:
         return []
-    sizes = np.concatenate([np.diff(other.starts) for other in others])
+    joined = joined_prisms(others)
     owners = np.repeat(np.arange(len(others)), [len(other.boxes) for other in others])
     _, starts = asset_corners(asset)
     met: list[bool] = _met(
@@ -223,9 +235,9 @@ def met_on_path(
         starts,
         HEADINGS[frame.heading],
         (frame.x, frame.y),
-        np.concatenate([other.vertices for other in others]),
-        np.concatenate([[0], np.cumsum(sizes)]),
-        np.concatenate([other.boxes for other in others]),
+        joined.vertices,
+        joined.starts,
+        joined.boxes,
         owners,
         margin,
     ).tolist()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from internav_data.geometry import multiply, rotation_matrix, round_m, round_quaternion
 from internav_data.physics.engines import DEFAULT_ENGINE
+from internav_data.physics.fall_clearance import DROP_M
 from internav_data.physics.registry import get_solver
 from internav_data.physics.scene import UPRIGHT, Body, PhysicsScene
 from internav_data.records import Pose
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
 
     from internav_data.physics.scene import SettleSolution
 
-DROP_M = 0.01
-"""Height above the floor from which an object is released, metres."""
 MAX_SHIFT_M = 0.05
 MAX_TILT_DEG = 5.0
 MAX_PENETRATION_M = 0.002
@@ -54,7 +53,8 @@ def settle(
     body
         Object to release at an upright pose; z is the height of the floor below it.
     clearance_m
-        Distance in the plane from its footprint to everything else, metres.
+        Distance in the plane from its parts to everything that they could touch, metres, at every
+        height: that of `fall_clearance`, as a footprint leaves out what lies below 2 cm.
     neighbours
         Gathers the objects and walls that can be touched; called only if the free fall reaches
         farther than the clearance less the engine's contact margin.

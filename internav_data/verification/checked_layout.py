@@ -14,8 +14,9 @@ from shapely import Point, Polygon, box
 
 from internav_data.records import OUTSIDE
 from internav_data.verification.checked_lattice import KEEP_M, CheckedLattice
+from internav_data.verification.overlaps import WALL_ID, Solids
 from internav_data.verification.portals import Portals
-from internav_data.verification.shapes import AGENT_HEIGHT_M, STEP_OVER_M
+from internav_data.verification.shapes import AGENT_HEIGHT_M, STEP_OVER_M, wall_slabs
 from internav_data.verification.visibility_graph import COARSE, FINE, VisibilityGraph, inflate
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from shapely import Geometry
 
     from internav_data.records import House
-    from internav_data.verification.shapes import Shapes
+    from internav_data.verification.shapes import Shapes, Slab
 
 MAX_PATHS = 64
 """Maximum number of room paths, and of node paths, that are listed."""
@@ -55,6 +56,27 @@ class CheckedLayout:
         self.blockers = self.walls + [plan for plans in self.footprints.values() for plan in plans]
         self.lattice = CheckedLattice(self.blockers, self.outline)
         self._room_paths: dict[tuple[int, int], tuple[RoomPaths, bool]] = {}
+
+    @cached_property
+    def wall_slabs(self) -> list[Slab]:
+        """Walls as slabs, lintels and window breasts among them."""
+        return wall_slabs(self.house.walls)
+
+    @cached_property
+    def object_slabs(self) -> dict[int, list[Slab]]:
+        """Slabs of each object, by object id."""
+        return {t.object_id: self.shapes.slabs(t.asset_id, t.pose) for t in self.house.objects}
+
+    @cached_property
+    def solids(self) -> Solids:
+        """Walls and all objects but rugs, entire, at all heights."""
+        assets = self.shapes.assets
+        objects = (
+            (t.object_id, self.object_slabs[t.object_id])
+            for t in self.house.objects
+            if assets[t.asset_id].blocks
+        )
+        return Solids.of([(WALL_ID, self.wall_slabs), *objects])
 
     def without(self, gone: frozenset[int]) -> CheckedLayout:
         """Return the layout without some of the house's objects (ids)."""

@@ -9,8 +9,12 @@ import numpy as np
 import shapely
 from shapely import Polygon, box
 
-from internav_data.verification.overlaps import DEPTH_M, overlapping_slabs, plans_overlap
-from internav_data.verification.shapes import Slab
+from internav_data.verification.overlaps import (
+    DEPTH_M,
+    WALL_ID,
+    overlapping_slabs,
+    plans_overlap,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,44 +22,33 @@ if TYPE_CHECKING:
 
     from internav_data.records import Door, House, SceneObject
     from internav_data.verification.checked_lattice import CheckedLattice
+    from internav_data.verification.checked_layout import CheckedLayout
     from internav_data.verification.findings import FindingCollector
-    from internav_data.verification.shapes import Shapes
+    from internav_data.verification.shapes import Slab
 
 DOOR_CLEAR_M = 0.65
 """Free depth before a door, from the wall's face."""
 HALF_WALL_M = 0.06
 HANGS_M = 0.05
 """Maximum distance of a hanging object from its wall or ceiling."""
-WALL_ID = -1
-"""Owner of the slabs of walls."""
 REACHED = 0.5
 """Share of a room's free nodes that the house's largest component must exceed."""
 
 
-def wall_slabs(house: House) -> list[Slab]:
-    """Return the walls as slabs."""
-    slabs = []
-    for w in house.walls:
-        plan = box(w.x_min, w.y_min, w.x_max, w.y_max)
-        flat = shapely.get_coordinates(plan)[:-1]
-        corners = np.vstack([np.column_stack([flat, np.full(4, z)]) for z in (w.z_min, w.z_max)])
-        slabs.append(Slab(corners, plan, w.z_min, w.z_max))
-    return slabs
-
-
 def check_objects(
-    house: House, rooms: dict[int, Polygon], shapes: Shapes, report: FindingCollector
+    layout: CheckedLayout, rooms: dict[int, Polygon], report: FindingCollector
 ) -> None:
     """Check objects: inside their rooms, clear of walls and each other, supported."""
+    house, shapes = layout.house, layout.shapes
     slabs: list[Slab] = []
     owners: list[int] = []
-    for slab in wall_slabs(house):
+    for slab in layout.wall_slabs:
         slabs.append(slab)
         owners.append(WALL_ID)
     within = {room: shapely.buffer(shape, DEPTH_M) for room, shape in rooms.items()}
     shapely.prepare(list(within.values()))
     groups = {scene_object.object_id: scene_object.group for scene_object in house.objects}
-    own = {t.object_id: shapes.slabs(t.asset_id, t.pose) for t in house.objects}
+    own = layout.object_slabs
     for scene_object in house.objects:
         name = f"object {scene_object.object_id} ({scene_object.asset_id})"
         asset = shapes.assets[scene_object.asset_id]

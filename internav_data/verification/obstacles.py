@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Protocol
 
 import shapely
 
-from internav_data.verification.overlaps import DEPTH_M, overlapping_plans
+from internav_data.verification.overlaps import (
+    DEPTH_M,
+    WALL_ID,
+    Solids,
+    intruded,
+    overlapping_plans,
+)
 
 if TYPE_CHECKING:
     from shapely import Geometry
@@ -46,6 +52,7 @@ def check_obstacles(
     expect(count > 0, "episode.obstacle-count", "at least one obstacle", count)
     segments = max((len(path.points) - 1 for path in episode.node_paths), default=0)
     footprints: list[list[Geometry]] = []
+    solids: list[Solids] = []
     for number, obstacle in enumerate(episode.obstacles):
         what = f"obstacle {number} ({obstacle.asset_id})"
         known = obstacle.asset_id in layout.shapes.assets
@@ -59,7 +66,8 @@ def check_obstacles(
             obstacle.node_path_segment,
         )
         _check_rest(obstacle, what, expect)
-        low = min(slab.low for slab in layout.shapes.slabs(obstacle.asset_id, obstacle.pose))
+        slabs = layout.shapes.slabs(obstacle.asset_id, obstacle.pose)
+        low = min(slab.low for slab in slabs)
         expect(
             FLOOR_M[0] <= low <= FLOOR_M[1],
             "obstacle.floor",
@@ -68,6 +76,8 @@ def check_obstacles(
         )
         footprints.append(layout.shapes.footprint(obstacle.asset_id, obstacle.pose))
         _check_place(layout, footprints, number, what, expect)
+        solids.append(Solids.of([(number, slabs)]))
+        _check_hull(layout, solids, what, expect)
     physics = episode.physics
     if episode.obstacles:
         slowest = max(o.settle_s for o in episode.obstacles)
@@ -137,4 +147,24 @@ def _check_place(
             "obstacle.overlap",
             f"{what} clear of obstacle {other}",
             f"{len(hits)} overlaps",
+        )
+
+
+def _check_hull(layout: CheckedLayout, solids: list[Solids], what: str, expect: Expect) -> None:
+    """Check the last obstacle in space: a footprint leaves out what lies below 2 cm."""
+    *others, own = solids
+    hits = intruded(own, layout.solids)
+    names = ["a wall" if owner == WALL_ID else f"object {owner}" for owner in hits]
+    expect(
+        not hits,
+        "obstacle.overlap-house-3d",
+        f"{what} nowhere over {DEPTH_M} m inside the house's walls and objects",
+        f"inside {', '.join(names)}",
+    )
+    for other, solid in enumerate(others):
+        expect(
+            not intruded(own, solid),
+            "obstacle.overlap-3d",
+            f"{what} nowhere over {DEPTH_M} m inside obstacle {other}",
+            "inside it",
         )

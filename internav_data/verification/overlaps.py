@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,13 +11,15 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, QhullError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from shapely import Geometry
 
     from internav_data.core.typing import Floats
     from internav_data.verification.shapes import Slab
 
+WALL_ID = -1
+"""Owner of the slabs of walls."""
 DEPTH_M = 0.001
 """Overlaps below this depth count as contact: poses are rounded to 0.1 mm."""
 GRID_M = 1e-9
@@ -94,4 +97,58 @@ def overlapping_slabs(
             one.corners, two.corners, depth_m
         ):
             found.add(pair)
+    return sorted(found)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solids:
+    """Slabs of several bodies, with the boxes around them for a fast test."""
+
+    slabs: tuple[Slab, ...]
+    owners: tuple[int, ...]
+    """Number of each slab's body."""
+    boxes: Floats
+    """Lowest, then highest corner of each slab, (n, 6) float64, metres."""
+
+    @staticmethod
+    def of(bodies: Iterable[tuple[int, Sequence[Slab]]]) -> Solids:
+        """Gather bodies, each with its number."""
+        owned = [(owner, slab) for owner, slabs in bodies for slab in slabs]
+        boxes = [(*s.corners.min(axis=0), *s.corners.max(axis=0)) for _, s in owned]
+        return Solids(
+            tuple(slab for _, slab in owned),
+            tuple(owner for owner, _ in owned),
+            np.array(boxes, dtype=np.float64).reshape(-1, 6),
+        )
+
+    def near(self, others: Solids, grow: Floats) -> list[tuple[int, int]]:
+        """Return index pairs of slabs whose boxes share a point, in order.
+
+        `grow` (6,) widens these boxes: downwards, then upwards along x, y and z, metres.
+        """
+        if not self.slabs or not others.slabs:
+            return []
+        mine = self.boxes + grow * (-1.0, -1.0, -1.0, 1.0, 1.0, 1.0)
+        # First all of them as one box, which few of a house's slabs meet.
+        low, high = mine[:, :3].min(axis=0), mine[:, 3:].max(axis=0)
+        some = np.flatnonzero(
+            ((others.boxes[:, :3] <= high) & (others.boxes[:, 3:] >= low)).all(axis=1)
+        )
+        there = others.boxes[some]
+        meet = (mine[:, None, :3] <= there[None, :, 3:]) & (mine[:, None, 3:] >= there[None, :, :3])
+        return [(int(a), int(some[b])) for a, b in np.argwhere(meet.all(axis=2))]
+
+
+def intruded(first: Solids, second: Solids, depth_m: float = DEPTH_M) -> list[int]:
+    """Return the bodies of `second`, ascending, in which a slab of `first` is over `depth_m` deep.
+
+    Slabs count in space, at all heights: also those that no footprint holds.
+    """
+    found: set[int] = set()
+    for a, b in first.near(second, np.full(6, -depth_m)):
+        owner = second.owners[b]
+        if owner not in found and hulls_overlap(
+            first.slabs[a].corners, second.slabs[b].corners, depth_m
+        ):
+            found.add(owner)
     return sorted(found)

@@ -80,7 +80,7 @@ def _check_house(house: House, shapes: Shapes, report: FindingCollector) -> Chec
     if len(rooms) < len(house.rooms) or "house.outline-polygon" in report.by_predicate:
         return None  # nothing can be measured in a house without proper rooms
     layout = CheckedLayout(house, shapes)
-    check_objects(house, rooms, layout.shapes, report)
+    check_objects(layout, rooms, report)
     check_passages(house, rooms, layout.footprints, layout.lattice, report)
     return layout
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from shapely import Geometry
 
     from internav_data.core.typing import Floats, Ints
-    from internav_data.records import Asset, Part, Pose, Quaternion
+    from internav_data.records import Asset, Part, Pose, Quaternion, Wall
 
 STEP_OVER_M = 0.02
 """Height below which the agent steps over an object."""
@@ -138,6 +138,17 @@ def _uncovered(plans: list[Geometry]) -> list[Geometry]:
     shapely.prepare(largest)
     covered = shapely.covers(largest, np.array(plans, dtype=object))
     return [largest, *(plan for plan, inside in zip(plans, covered, strict=True) if not inside)]
+
+
+def wall_slabs(walls: Sequence[Wall]) -> list[Slab]:
+    """Return walls as slabs."""
+    slabs = []
+    for w in walls:
+        plan = shapely.box(w.x_min, w.y_min, w.x_max, w.y_max)
+        flat = shapely.get_coordinates(plan)[:-1]
+        corners = np.vstack([np.column_stack([flat, np.full(4, z)]) for z in (w.z_min, w.z_max)])
+        slabs.append(Slab(corners, plan, w.z_min, w.z_max))
+    return slabs
 
 
 class Shapes:

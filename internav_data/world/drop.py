@@ -20,7 +20,9 @@ from internav_data.geometry.headings import TURNS, turned
 from internav_data.geometry.planar import segment_polygon_distance
 from internav_data.navigation import CLEARANCE_M
 from internav_data.physics.engines import DEFAULT_ENGINE
+from internav_data.physics.fall_clearance import fall_clearance, touches
 from internav_data.physics.kdop import dop8_of_square
+from internav_data.physics.narrow_phase import joined_prisms, prisms_of
 from internav_data.physics.scene import Body
 from internav_data.physics.settling import settle
 from internav_data.records import Pose
@@ -142,12 +144,18 @@ def _let_go(
 ) -> SettleResult | None:
     asset, pose = body.asset, body.pose
     reach = math.hypot(asset.size[0], asset.size[1]) / 2.0 + NEAR_M
-    around = dop8_of_square(pose.x, pose.y, reach)
-    settled = settle(body, ROOM_M, lambda: obstructions.bodies(around), engine)
+    near = obstructions.bodies(dop8_of_square(pose.x, pose.y, reach))
+    # Footprints leave out what lies below 2 cm: the entire hull must have room, too.
+    solid = joined_prisms([prisms_of(other.asset, other.pose) for other in near])
+    if fall_clearance(prisms_of(asset, pose), solid, ROOM_M) < ROOM_M:
+        return None
+    settled = settle(body, ROOM_M, lambda: near, engine)
     if settled.refusal:
         return None
     # Judged again at rest, on the rounded pose: falling, it may have slid or tilted.
     exact = footprint(asset, settled.pose)
     if any(clearance(exact, other, ROOM_M) <= 0.0 for other in obstructions.solid):
+        return None
+    if touches(prisms_of(asset, settled.pose), solid):
         return None
     return settled if axis_distance(*agent, exact) >= CLEARANCE_M else None

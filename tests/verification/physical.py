@@ -66,10 +66,15 @@ def played(house, episode, config=DEFAULT_WORLD):
     )
 
 
-def crowded():
-    """A safe and a pot before the door, and furniture where the pot goes when it is pushed."""
+def crowded_house():
+    """A table, and furniture where a pot before the door goes when it is pushed."""
     things = (scene_object(0, "Table_1", 0, 1.0, 0.6), scene_object(1, "Box_2", 0, 3.4, 2.7))
-    house = Grid(2, 1).house(2, things)
+    return Grid(2, 1).house(2, things)
+
+
+def crowded():
+    """A safe and a pot before the door of `crowded_house`."""
+    house = crowded_house()
     pot = obstacle("Pot_1", 3.4, 2.1)
     safe = obstacle("Safe_1", 3.4, 1.4)
     shut = scenery.episode(

@@ -4,6 +4,7 @@ import json
 import re
 from dataclasses import replace
 
+import builders
 import pytest
 from builders import crate, scene_object
 from manifests import edit_manifest
@@ -327,6 +328,43 @@ def test_obstacles_in_each_other(tmp_path, scenes):
     assert "obstacle.overlap" in predicates(
         judged(tmp_path, change_episode(scenes, 0, 1, **changes))
     )
+
+
+def with_screen(scenes, x, y, z=0.0, *others):
+    """An episode whose obstacles are a screen on a flat foot and others."""
+    made = builders.obstacle(builders.screen(), x, y, penetration_m=0.0001)
+    obstacles = (*others, replace(made, z=z))
+    return change_episode(scenes, 0, 1, obstacles=obstacles, obstacle_count=len(obstacles))
+
+
+FEET = {
+    "in a wall": ((2.5, 0.17), "obstacle.overlap-house-3d"),
+    "in a cupboard": ((5.5, 3.15), "obstacle.overlap-house-3d"),
+    "clear of all": ((2.5, 1.0), None),
+    "beside a wall": ((2.5, 0.2), None),
+}
+
+
+@pytest.mark.parametrize("case", FEET)
+def test_foot_that_no_footprint_holds(tmp_path, scenes, case):
+    (x, y), predicate = FEET[case]
+    assets = builders.by_id(*ASSETS.values(), builders.screen())
+    findings = judged(tmp_path, with_screen(scenes, x, y), assets)
+    seen = predicates(findings) & {
+        *("obstacle.overlap-house", "obstacle.overlap-house-3d"),
+        *("obstacle.overlap", "obstacle.overlap-3d"),
+    }
+    assert seen == ({predicate} if predicate else set()), findings.summary()
+
+
+@pytest.mark.parametrize(("y", "inside"), [(1.51, True), (1.49, False)])
+def test_foot_in_another_obstacle(tmp_path, scenes, y, inside):
+    """Box_1 at (2.5, 2.0) begins at y = 1.7; the foot reaches 0.2 m from the screen's middle."""
+    assets = builders.by_id(*ASSETS.values(), builders.screen())
+    changed = with_screen(scenes, 2.5, y, 0.0, scenes[0][1][1].obstacles[0])
+    seen = predicates(judged(tmp_path, changed, assets))
+    assert ("obstacle.overlap-3d" in seen) == inside
+    assert not seen & {"obstacle.overlap", "obstacle.overlap-house-3d"}
 
 
 def test_episode_dropped(tmp_path, scenes):

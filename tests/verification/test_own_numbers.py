@@ -6,9 +6,11 @@ import pytest
 
 from internav_data.core.field_docs import descriptions
 from internav_data.houses import standards
+from internav_data.physics import fall_clearance
 from internav_data.records import Material, Part
 from internav_data.verification import houses, interactions, objects, ranges
 from internav_data.verification.ranges import EPISODE_RULES
+from internav_data.verification.replay import settling
 from internav_data.verification.replay.expert_replay import TURNS
 from internav_data.world.actions import ACTION_COUNT, ACTIONS, PUSHES, Action
 
@@ -54,6 +56,10 @@ def test_the_validator_accepts_every_action_and_no_other():
 def test_the_validators_lengths_are_those_of_houses():
     assert houses.HALF_WALL_M == objects.HALF_WALL_M == standards.HALF_WALL_CM / 100
     assert objects.DOOR_CLEAR_M == standards.DOOR_CLEAR_CM / 100
+
+
+def test_the_validator_lets_obstacles_fall_from_where_settling_does():
+    assert settling.FALL_M == fall_clearance.DROP_M
 
 
 def test_the_validators_surfaces_are_those_of_the_records():

@@ -5,16 +5,21 @@ import struct
 import subprocess
 import sys
 from dataclasses import replace
+from functools import cache
 
 import physical
 import pytest
 import scenery
-from builders import UPRIGHT, asset, part, scene_object
+from builders import UPRIGHT, asset, by_id, obstacle, part, scene_object, screen, yaw
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scenery import ASSETS, Grid, brute_steps, write_dataset
 
 import internav_data.world.world
 from internav_data.navigation import Lattice
-from internav_data.physics import Body
+from internav_data.physics import Body, wall_body
+from internav_data.physics.fall_clearance import fall_clearance
+from internav_data.physics.narrow_phase import joined_prisms, prisms_of
 from internav_data.physics.result_cache import ResultCache
 from internav_data.records import Pose
 from internav_data.records.errors import CorruptDataError
@@ -24,7 +29,7 @@ from internav_data.verification.checked_layout import CheckedLayout
 from internav_data.verification.checked_path import CheckedPath
 from internav_data.verification.findings import FindingCollector
 from internav_data.verification.interactions import check_interactions
-from internav_data.verification.replay import CheckedScene, replay_episode
+from internav_data.verification.replay import CheckedScene, replay_episode, settling
 from internav_data.verification.replay.outcomes import OutcomeCheck
 from internav_data.verification.scenes import check_scene
 from internav_data.verification.shapes import Shapes
@@ -188,6 +193,44 @@ def test_settled_otherwise(scenes, case):
     found = found_in(obstacle_changed(scenes, 0, 0, **changes), 0, 0)
     assert predicate in found
     assert all(name.startswith("physics.") for name in found)
+
+
+@cache
+def scene_with_screens():
+    """A house whose gap is 0.2 m, and all that stands in it: walls, furniture, one screen."""
+    assets = by_id(*ASSETS.values(), screen())
+    house = replace(physical.crowded_house(), assets=assets)
+    scene = CheckedScene(CheckedLayout(house, Shapes(assets)), CheckedConfig(gap_m=0.2))
+    bodies = [wall_body(wall) for wall in house.walls]
+    bodies += [Body.of(assets[o.asset_id], o.pose) for o in house.objects]
+    return scene, [*bodies, Body.of(screen(), Pose(3.0, 2.0, 0.0, UPRIGHT))]
+
+
+@settings(max_examples=40)
+@given(st.integers(500, 7400), st.integers(300, 3700), st.integers(0, 23))
+def test_a_falls_clearance_is_that_of_the_generator(x, y, turn):
+    """Two codes, one distance: all parts count, those below 2 cm too."""
+    scene, bodies = scene_with_screens()
+    spot = Pose(x / 1000, y / 1000, 0.0, yaw(15 * turn))
+    solid = joined_prisms([prisms_of(body.asset, body.pose) for body in bodies])
+    theirs = fall_clearance(prisms_of(screen(), spot), solid, 0.2)
+    mine = settling.clearance_m(scene, "Screen_0", spot, bodies[-1:])
+    assert mine == pytest.approx(theirs, abs=settling.SPOT_M)
+
+
+def test_a_foot_in_a_wall_does_not_fall_freely(scenes):
+    """Its certificate would be that of a free fall if footprints alone were asked."""
+    assets = by_id(*ASSETS.values(), screen())
+    house, episodes = scenes[0]
+    scene = CheckedScene(CheckedLayout(house, Shapes(assets)), FORCE)
+
+    def fallen(y):
+        one = obstacle(screen(), 2.9, y)
+        return settling.fall_again(scene, replace(episodes[0], obstacles=(one,)), 0)
+
+    free, inside = fallen(1.0), fallen(0.18)
+    assert not free.refusal
+    assert inside.refusal or inside.penetration_m != free.penetration_m
 
 
 def test_what_topples_was_not_settled(scenes):

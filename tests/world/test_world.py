@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 import shapely
-from builders import UPRIGHT
+from builders import UPRIGHT, one_room, screen
 
 from internav_data.catalog import catalogue
 from internav_data.episodes import build_episodes
@@ -17,6 +17,8 @@ from internav_data.geometry import Polygons, footprint, wall_footprints, yaw_qua
 from internav_data.houses import HouseConfig, build_house
 from internav_data.navigation import CLEARANCE_M, Lattice
 from internav_data.physics import Body
+from internav_data.physics.fall_clearance import touches
+from internav_data.physics.narrow_phase import joined_prisms, prisms_of
 from internav_data.records import Pose
 from internav_data.records.errors import UsageError
 from internav_data.world import (
@@ -264,6 +266,29 @@ def test_pick_and_drop(hand_house):
     gap = math.dist((pose.x, pose.y), world.position) - 0.2 - 0.05
     assert gap == pytest.approx(0.05, abs=0.011)  # the first gap, straight ahead
     assert (pose.y, pose.z) == pytest.approx((1.0, 0.0), abs=0.01)
+
+
+def dropped_in(room):
+    """Where a screen comes to rest that an agent at (1, 1) drops ahead, and the room's walls."""
+    thing = screen(pushable=False, pickable=True)
+    model = HouseModel.of(room)
+    world = World(model, [Body.of(thing, Pose(3.0, 1.0, 0.0, UPRIGHT))], (4, 4, 0), (12, 4))
+    world.put([(0, None)])
+    world.held = 0
+    assert world.step(Action.DROP).success
+    prisms = prisms_of(thing, world.items[0].pose)
+    walls = joined_prisms([prisms_of(wall.asset, wall.pose) for wall in model.fixed])
+    return world.items[0].pose, prisms, walls
+
+
+def test_a_flat_foot_is_not_dropped_into_walls():
+    """Between two posts a screen's footprint has room, its foot has none."""
+    pose, *_ = dropped_in(one_room(4.0, 2.0))
+    assert (pose.x, pose.y) == pytest.approx((1.55, 1.0), abs=0.005)
+    posts = (1.5, 0.5, 1.6, 0.93), (1.5, 1.07, 1.6, 1.5)
+    pose, prisms, walls = dropped_in(one_room(4.0, 2.0, *posts))
+    assert math.dist((pose.x, pose.y), (1.55, 1.0)) > 0.1
+    assert not touches(prisms, walls)
 
 
 def test_what_carries_something_is_not_picked(hand_house):

@@ -10,7 +10,6 @@ import shapely
 from shapely import Point
 
 from internav_data.physics import DEFAULT_ENGINE, ENGINES
-from internav_data.verification.objects import wall_slabs
 from internav_data.verification.overlaps import overlapping_slabs
 from internav_data.world import HouseModel, World
 from internav_data.world.config import WorldConfig
@@ -45,7 +44,6 @@ class CheckedScene:
         self.config = config
         self.assets: dict[str, Asset] = dict(layout.shapes.assets)
         self.model = HouseModel.of(replace(layout.house, assets=self.assets))
-        self._walls = wall_slabs(layout.house)
         self._layouts: dict[frozenset[int], CheckedLayout] = {}
         self._footprints: dict[tuple[str, Pose], tuple[Geometry, ...]] = {}
         self._spans: dict[tuple[str, Pose], tuple[float, float]] = {}
@@ -105,7 +103,7 @@ class CheckedScene:
         """
         own = self.layout.shapes.slabs(asset_id, pose)
         plan = shapely.union_all([slab.plan for slab in own])
-        near = [slab for slab in self._walls if shapely.intersects(slab.plan, plan)]
+        near = [slab for slab in self.layout.wall_slabs if shapely.intersects(slab.plan, plan)]
         owners = [0] * len(near) + [1] * len(own)
         return bool(overlapping_slabs([*near, *own], owners, lambda *_: False, depth_m))
 

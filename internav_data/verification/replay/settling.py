@@ -16,24 +16,31 @@ import shapely
 from internav_data.physics import Body, settle, wall_body
 from internav_data.records import Pose
 from internav_data.verification.findings import ELSEWHERE_M
+from internav_data.verification.overlaps import Solids
 from internav_data.verification.replay.elsewhere import TURN_TOLERANCE
-from internav_data.verification.shapes import AGENT_HEIGHT_M, STEP_OVER_M
 
 if TYPE_CHECKING:
-    from shapely import Geometry
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
 
     from internav_data.physics import SettleResult
     from internav_data.records import Episode, Obstacle
     from internav_data.verification.obstacles import Expect
     from internav_data.verification.replay.checked_scene import CheckedScene
+    from internav_data.verification.shapes import Slab
 
 YAW_STEP_DEG = 15
+FALL_M = 0.01
+"""Height from which an obstacle falls."""
 NEAR_M = 0.5
 """Distance beyond which an object cannot be touched while another one settles."""
 ROUNDED_M = 1.5e-4
 """Tolerance along each axis of a pose that falls from a derived spawn pose: 1.5 roundings."""
 ROUNDED = 2e-6
 """Tolerance of its quaternion."""
+SPOT_M = 5e-4
+"""Tolerance of the clearance: the derived spawn pose is rounded, and so was the true one."""
 TRIES = 3
 """Number of falls: each improves the spawn pose, as a neighbour may deflect the fall."""
 
@@ -44,7 +51,7 @@ def check_settling(scene: CheckedScene, episode: Episode, expect: Expect) -> Non
     most_m, most_turned = (ROUNDED_M, ROUNDED) if same else (ELSEWHERE_M, TURN_TOLERANCE)
     for number, obstacle in enumerate(episode.obstacles):
         what = f"obstacle {number} ({obstacle.asset_id})"
-        settled = _fall(scene, episode, number)
+        settled = fall_again(scene, episode, number)
         if not expect(
             not settled.refusal, "physics.settle-refused", f"{what} may stay", settled.refusal
         ):
@@ -63,17 +70,18 @@ def check_settling(scene: CheckedScene, episode: Episode, expect: Expect) -> Non
             expect(found == stored, f"physics.settle-{name}", f"{what}: {found}", stored)
 
 
-def _fall(scene: CheckedScene, episode: Episode, number: int) -> SettleResult:
+def fall_again(scene: CheckedScene, episode: Episode, number: int) -> SettleResult:
     """Let an obstacle fall from the spawn pose that leads to its stored pose."""
     obstacle = episode.obstacles[number]
     asset = scene.assets[obstacle.asset_id]
     x, y, turn = obstacle.x, obstacle.y, _upright(obstacle)
+    earlier = [Body.of_obstacle(o, scene.assets, moves=False) for o in episode.obstacles[:number]]
     for _ in range(TRIES):
         spot = Pose(round(x, 4), round(y, 4), 0.0, turn)
         settled = settle(
             Body(asset, spot, obstacle.dynamics),
-            scene.config.gap_m,
-            lambda: _near(scene, episode, number, spot),  # noqa: B023 - asked at once
+            clearance_m(scene, asset.asset_id, spot, earlier),
+            lambda: _near(scene, asset.asset_id, spot, earlier),  # noqa: B023 - asked at once
             scene.engine(episode),
         )
         if _apart(settled.pose, obstacle.pose)[0] <= ROUNDED_M:
@@ -99,24 +107,42 @@ def _apart(first: Pose, second: Pose) -> tuple[float, float]:
     return off, float(min(np.abs(p - q).max(), np.abs(p + q).max()))
 
 
-def _near(scene: CheckedScene, episode: Episode, number: int, spot: Pose) -> list[Body]:
+def clearance_m(scene: CheckedScene, asset_id: str, spot: Pose, earlier: Sequence[Body]) -> float:
+    """Return the distance in the plane to all that a fall at a spot could touch, metres.
+
+    At most `gap_m`, which holds for every obstacle of the generator: in space, not of footprints.
+    """
+    gap = scene.config.gap_m
+    shapes = scene.layout.shapes
+    own = Solids.of([(0, shapes.slabs(asset_id, spot))])
+    others = [scene.layout.solids]
+    others += [Solids.of([(0, shapes.slabs(b.asset.asset_id, b.pose))]) for b in earlier]
+    grow = np.array([gap, gap, gap, gap, gap, gap + FALL_M])
+    least = gap + SPOT_M
+    for other in others:
+        for a, b in own.near(other, grow):
+            plans = own.slabs[a].plan, other.slabs[b].plan
+            least = min(least, float(shapely.distance(*plans)))
+    return gap if least > gap - SPOT_M else least
+
+
+def _near(scene: CheckedScene, asset_id: str, spot: Pose, earlier: Sequence[Body]) -> list[Body]:
     """List the bodies that could be touched: objects, earlier obstacles, walls."""
-    asset_id = episode.obstacles[number].asset_id
-    here = shapely.union_all(list(scene.footprint(asset_id, spot)))
+    layout, assets = scene.layout, scene.assets
+    here = _plans(layout.shapes.slabs(asset_id, spot))
 
-    def near(plans: list[Geometry] | tuple[Geometry, ...]) -> bool:
-        return bool(shapely.dwithin(here, np.array(plans, dtype=object), NEAR_M).any())
+    def near(slabs: Sequence[Slab]) -> bool:
+        return bool(shapely.dwithin(here[:, None], _plans(slabs)[None, :], NEAR_M).any())
 
-    assets = scene.assets
-    placed = [
-        *(Body.of(assets[o.asset_id], o.pose, moves=False) for o in scene.layout.house.objects),
-        *(Body.of_obstacle(o, assets, moves=False) for o in episode.obstacles[:number]),
+    bodies = [
+        Body.of(assets[o.asset_id], o.pose, moves=False)
+        for o in layout.house.objects
+        if assets[o.asset_id].blocks and near(layout.object_slabs[o.object_id])
     ]
-    bodies = [b for b in placed if near(scene.footprint(b.asset.asset_id, b.pose))]
-    walls = [
-        wall
-        for wall in scene.layout.house.walls
-        if wall.z_min < AGENT_HEIGHT_M and wall.z_max > STEP_OVER_M
-    ]
-    plans = [shapely.box(w.x_min, w.y_min, w.x_max, w.y_max) for w in walls]
-    return bodies + [wall_body(w) for w, plan in zip(walls, plans, strict=True) if near([plan])]
+    bodies += [b for b in earlier if near(layout.shapes.slabs(b.asset.asset_id, b.pose))]
+    walls = zip(layout.house.walls, layout.wall_slabs, strict=True)
+    return bodies + [wall_body(wall) for wall, slab in walls if near([slab])]
+
+
+def _plans(slabs: Sequence[Slab]) -> NDArray[np.object_]:
+    return np.array([slab.plan for slab in slabs], dtype=object)

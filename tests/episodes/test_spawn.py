@@ -1,0 +1,68 @@
+"""Obstacles stand in nothing: not in what footprints leave out, either."""
+
+from dataclasses import replace
+from itertools import combinations
+
+import builders
+import numpy as np
+import pytest
+from builders import crate, scene_object, screen
+
+from internav_data.episodes import EpisodeConfig
+from internav_data.episodes.build import _draw_endpoints
+from internav_data.episodes.site import SpawnSite
+from internav_data.episodes.spawn import spawn
+from internav_data.geometry import clearance, footprint
+from internav_data.physics import wall_body
+from internav_data.records import Pose
+from internav_data.verification.checked_layout import CheckedLayout
+from internav_data.verification.overlaps import Solids, intruded
+from internav_data.verification.shapes import Shapes
+
+SHELF = crate("Shelf_0", (0.8, 0.3, 1.2), spawnable=False, pushable=False)
+LEGGED = builders.table("SideTable_0", (0.5, 0.5, 0.5), leg_m=0.04)
+ASSETS = builders.by_id(SHELF, LEGGED, screen())
+INNER = (2.0, 1.2, 2.1, 2.0), (0.9, 1.5, 1.0, 2.2)
+HOUSE = replace(
+    builders.one_room(5.0, 3.0, *INNER),
+    objects=(
+        scene_object(0, "Shelf_0", 0, 1.5, 0.3),
+        scene_object(1, "Screen_0", 0, 3.6, 0.3),
+    ),
+    assets=ASSETS,
+)
+
+
+@pytest.fixture(scope="module")
+def drafts():
+    """Drafts with as many screens and side tables as find room."""
+    site, config = SpawnSite.of(HOUSE), EpisodeConfig(max_obstacles=(12, 12, 12), lateral_std_m=1.0)
+    made = []
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        draft = _draw_endpoints(site, "lengthened" if seed % 2 else "blocked", config, rng)
+        spawn(draft, (screen(), LEGGED), rng)
+        made.append(draft)
+    return made
+
+
+def test_no_part_of_an_obstacle_is_in_anything(drafts):
+    shapes = Shapes(ASSETS)
+    still, count = CheckedLayout(HOUSE, shapes).solids, 0
+    for draft in drafts:
+        own = [
+            Solids.of([(0, shapes.slabs(o.asset.asset_id, o.settled.pose))])
+            for o in draft.obstacles
+        ]
+        count += len(own)
+        assert not any(intruded(solid, still) for solid in own)
+        assert not any(intruded(*pair) for pair in combinations(own, 2))
+    assert count > 50
+
+
+def test_their_footprints_alone_would_let_them_in():
+    wall, spot = wall_body(HOUSE.walls[0]), Pose(3.0, 0.1, 0.0, builders.UPRIGHT)
+    assert clearance(footprint(screen(), spot), footprint(wall.asset, wall.pose)) > 0.01
+    shapes = Shapes(ASSETS)
+    own = Solids.of([(0, shapes.slabs("Screen_0", spot))])
+    assert intruded(own, CheckedLayout(HOUSE, shapes).solids) == [-1]
