@@ -70,8 +70,9 @@ workers gives the same bytes.""",
 )
 @click.option(
     "--push-model",
-    type=click.Choice(["force", "kick"]),
-    help="200 N up to 2 m/s, or 2 m/s at once for every mass.  [default: force]",
+    type=click.Choice(["force", "kick", "step"]),
+    help="200 N up to 2 m/s; 2 m/s at once for every mass; or 200 N held at 0.5 m/s for 0.22 m.  "
+    "[default: force]",
 )
 @click.option(
     "--retry-quarantined",

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from internav_data.physics.engines.protocol import Engine, Simulation
     from internav_data.physics.scene import Body, PhysicsScene
     from internav_data.physics.sweep import SweepRecorder
-    from internav_data.records import PushSpec, Quaternion
+    from internav_data.records import PushSpec, Quaternion, Vec3
 
 RULES: Final = 4
 """Number of the rules by which scenes are built and solved, whatever the engine. Raised with every
@@ -75,6 +75,7 @@ def solve_push(engine: Engine, scene: PhysicsScene, spec: PushSpec) -> PushSolut
     rest = _RestRule(recorders, engine.step_s)
     steps = 0
     with engine.load(scene) as simulation:
+        pusher.begin(simulation.placement(0)[0])
         for k, recorder in movers:
             recorder.follow(*simulation.placement(k))
         while steps < limit and not rest.holds:
@@ -97,28 +98,42 @@ def solve_push(engine: Engine, scene: PhysicsScene, spec: PushSpec) -> PushSolut
 
 
 class _Pusher:
-    """The agent's hand on the first body, as a `PushSpec` moves it."""
+    """The agent's hand on the first body, as a `PushSpec` moves it along +x."""
 
     def __init__(self, spec: PushSpec, mass_kg: float, step_s: float) -> None:
         self._spec = spec
+        self._full = spec.force_n / mass_kg * step_s
+        """Speed gained in one step of the full force, m/s; inf for a kick."""
+        self._goal = math.inf
+        """Where along x it lets go of a body that it holds at a speed, metres."""
         self.steps_left = round(spec.seconds / step_s)
         """Number of steps until the body is let go at the latest; 0 once it is."""
-        self._gain = spec.force_n / mass_kg * step_s
-        """Speed gained in one step of pushing; inf for a kick."""
+
+    def begin(self, middle: Vec3) -> None:
+        """Take hold of the body, whose centre of mass is here."""
+        if self._spec.distance_m:
+            self._goal = middle[0] + self._spec.distance_m
 
     def act(self, simulation: Simulation) -> None:
-        """Push for one step."""
+        """Push for one step, or let go."""
         if not self.steps_left:
             return
         spec = self._spec
         speed, spin = simulation.velocity(0)
-        if speed[0] + self._gain >= spec.speed_m_s:
+        if self._goal < math.inf and simulation.placement(0)[0][0] >= self._goal:
+            self.steps_left = 0
+            return
+        self.steps_left -= 1
+        missing = spec.speed_m_s - speed[0]
+        if missing > self._full:
+            simulation.apply_force(0, (spec.force_n, 0.0, 0.0))
+        elif self._goal < math.inf:
+            part = max(0.0, missing / self._full)
+            simulation.apply_force(0, (part * spec.force_n, 0.0, 0.0))
+        else:
             # The last impulse is scaled: it gives just the speed that is missing.
             simulation.set_velocity(0, (spec.speed_m_s, speed[1], speed[2]), spin)
             self.steps_left = 0
-            return
-        simulation.apply_force(0, (spec.force_n, 0.0, 0.0))
-        self.steps_left -= 1
 
 
 @dataclass(slots=True)

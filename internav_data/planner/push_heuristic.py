@@ -6,6 +6,7 @@ until it meets another footprint. The search orders its candidates by this; the 
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -33,7 +34,7 @@ def slide_m(world: World, index: int) -> float:
     """Return the distance that a pushed object slides on free ground, metres.
 
     By Coulomb friction: the force accelerates it at `gain` up to a speed v, over v² / 2 gain, then
-    friction brakes it over v² / 2 brake.
+    friction brakes it over v² / 2 brake. A push with a distance holds it at v in between.
     """
     dynamics, spec = world.items[index].dynamics, world.push_spec
     brake = dynamics.friction * GRAVITY
@@ -41,6 +42,11 @@ def slide_m(world: World, index: int) -> float:
     if gain <= 0.0:
         return 0.0
     speed = min(spec.speed_m_s, gain * spec.seconds)
+    if spec.distance_m:
+        longest = speed * (spec.seconds - speed / (2.0 * gain))
+        held = min(spec.distance_m, longest)
+        speed = min(speed, math.sqrt(2.0 * gain * held))
+        return held + speed * speed / 2.0 / brake
     return speed * speed / 2.0 * (1.0 / gain + 1.0 / brake)
 
 

@@ -9,7 +9,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Final, Literal
 
-PushModel = Literal["force", "kick"]
+PushModel = Literal["force", "kick", "step"]
 """Name of a push in configs and options: a key of `PUSH_SPECS`."""
 
 
@@ -33,12 +33,18 @@ class PushSpec:
 
     The force acts until the object has reached the speed (the last impulse is scaled to give
     exactly this speed) or the time is over; then the object is let go. An infinite force gives the
-    speed at once, whatever the mass.
+    speed at once, whatever the mass. With a distance, the push goes on: it holds the object at the
+    speed, by a part of the force, until the object has moved that far.
     """
 
     force_n: float
+    """Largest force, newtons."""
     speed_m_s: float
+    """Largest speed that the push gives, m/s."""
     seconds: float
+    """Time after which the object is let go at the latest, seconds."""
+    distance_m: float = 0.0
+    """Distance along the push after which it is let go, metres; 0 to let it go at the speed."""
 
 
 FORCE_N: Final = 200.0
@@ -47,10 +53,11 @@ PUSH_SPECS: Final[Mapping[PushModel, PushSpec]] = MappingProxyType(
     {
         "force": PushSpec(force_n=FORCE_N, speed_m_s=2.0, seconds=0.5),
         "kick": PushSpec(force_n=math.inf, speed_m_s=2.0, seconds=0.5),
+        "step": PushSpec(force_n=FORCE_N, speed_m_s=0.5, seconds=1.0, distance_m=0.22),
     }
 )
-"""Parameters by push model: the paper's constant force, and the released code's 2 m/s for every
-mass."""
+"""Parameters by push model: the paper's constant force, the released code's 2 m/s for every mass,
+and a slow push that ends about a lattice step (0.25 m) away."""
 
 
 @lru_cache(maxsize=64)

@@ -18,7 +18,7 @@ GAP_M = 0.01
 class CheckedConfig:
     """Generation settings that decide which predicates hold."""
 
-    push_model: Literal["force", "kick"] = "force"
+    push_model: Literal["force", "kick", "step"] = "force"
     force_n: float = 200.0
     """Force of the agent's pushes, newtons."""
     gap_m: float = GAP_M
@@ -41,9 +41,10 @@ def checked_config(config: Mapping[str, Any]) -> CheckedConfig:
     values, world = _section(config, "episodes"), _section(config, "world")
     model, force = world.get("push_model", "force"), world.get("force_n", 200.0)
     gap = values.get("gap_m", GAP_M)
-    if model not in ("force", "kick"):
+    if model not in ("force", "kick", "step"):
         raise CorruptDataError(
-            f"manifest.json: config.world.push_model: expected force or kick, got {model!r}; "
+            f"manifest.json: config.world.push_model: expected force, kick or step, "
+            f"got {model!r}; "
             "generate the dataset again"
         )
     if type(force) not in (int, float) or not 0 < force < math.inf:

@@ -21,7 +21,8 @@ class WorldConfig:
     """Settings of the world that outcomes, experts and environments share."""
 
     push_model: PushModel = "force"
-    """Push: `force`, `force_n` up to 2 m/s, or `kick`, 2 m/s at once for every mass."""
+    """Push: `force`, `force_n` up to 2 m/s; `kick`, 2 m/s at once for every mass; or `step`, at
+    most `force_n`, held at 0.5 m/s for 0.22 m."""
     force_n: Annotated[float, Bounds(1.0, 2000.0)] = FORCE_N
     """Force of the agent's pushes, newtons; `kick` has none."""
 

@@ -154,6 +154,7 @@ def test_every_difference_in_what_is_asked_is_another_question(tmp_path):
     asked = [
         (LONE, FORCE),
         (LONE, PUSH_SPECS["kick"]),
+        (LONE, PUSH_SPECS["step"]),
         (PAIR, FORCE),
         (PhysicsScene((replace(body, dynamics=replace(body.dynamics, friction=0.6)),)), FORCE),
         (PhysicsScene((replace(body, dynamics=replace(body.dynamics, mass_kg=3.5)),)), FORCE),

@@ -61,6 +61,41 @@ def test_free_slides_go_as_far_as_coulomb_says(mass_kg, friction):
         assert forced.displacement_m == pytest.approx(kicked.displacement_m, rel=0.05)
 
 
+@pytest.mark.parametrize("friction", [0.3, 0.6, 0.8])
+@pytest.mark.parametrize("mass_kg", [0.3, 2.0, 20.0])
+def test_a_step_is_held_until_its_distance_and_slides_as_far_as_coulomb_says(mass_kg, friction):
+    spec = PUSH_SPECS["step"]
+    stepped = push(Body.of(low_box(mass_kg, friction), STANDING), 0, alone, spec)
+    slide = spec.speed_m_s**2 / (2 * friction * GRAVITY)
+    # Let go up to one time step late, at the speed less what friction takes in a time step.
+    assert stepped.displacement_m == pytest.approx(spec.distance_m + slide, abs=0.004)
+    assert not stepped.toppled
+
+
+def test_a_step_moves_the_heaviest_as_far_as_its_time_allows():
+    friction, spec = 0.5, PUSH_SPECS["step"]
+    heavy = low_box(round(200.0 / (friction * GRAVITY + 0.2), 2), friction)  # gains 0.2 m/s²
+    stepped = push(Body.of(heavy, STANDING), 0, alone, spec)
+    assert stepped.displacement_m == pytest.approx(0.5 * 0.2 * spec.seconds**2, abs=0.01)
+    assert not push(Body.of(low_box(42.0, friction), STANDING), 0, alone, spec).success
+
+
+def test_steps_of_whatever_does_not_topple_end_about_a_lattice_step_away():
+    from internav_data.catalog import catalogue
+
+    ends, toppled = [], 0
+    for k, thing in enumerate(asset for asset in catalogue().spawnable[::9] if asset.pushable):
+        pose = Pose(3.0, 4.0, 0.001, yaw_quaternion(15 * k))
+        stepped = push(Body.of(thing, pose), k % 4, alone, PUSH_SPECS["step"])
+        toppled += stepped.toppled
+        if stepped.success and not stepped.toppled:
+            ends.append(stepped.displacement_m)
+    assert len(ends) > 15
+    assert np.quantile(ends, 0.95) < 0.27
+    assert np.median(ends) > 0.22
+    assert toppled < len(ends)
+
+
 @pytest.mark.parametrize("friction", [0.4, 0.6, 0.8])
 def test_friction_decides_who_is_too_heavy(friction):
     threshold = 200.0 / (friction * GRAVITY)
