@@ -43,6 +43,7 @@ def command(*, dataset: Path | None, split: str | None, as_json: bool) -> int:
     click.echo(
         f"obstacles: {stats['obstacles_pushable']} pushable, {stats['obstacles_pickable']} "
         f"pickable, {stats['obstacles_fixed']} fixed"
+        + ("" if stats["relevant_share"] is None else f"; {stats['relevant_share']:.1%} relevant")
     )
     click.echo(
         f"shortest_path_m: {_spread(stats['shortest_path_m'])}; "

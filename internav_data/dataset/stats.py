@@ -39,7 +39,9 @@ _SCALARS = (
         "obstructed_path_steps",
     ),
 )
-_OBSTACLES = tuple(f"obstacles.list.element.{n}" for n in ("type", "pushable", "pickable"))
+_OBSTACLES = tuple(
+    f"obstacles.list.element.{n}" for n in ("type", "pushable", "pickable", "relevant")
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +96,11 @@ class Stats:
     obstacles_pushable: int
     obstacles_pickable: int
     obstacles_fixed: int
+    obstacles_relevant: int | None
+    """Obstacles in a smallest set that makes the path longer or blocks it; null where no obstacle
+    states whether it is, as in datasets of earlier releases."""
+    relevant_share: float | None
+    """Share of these among the obstacles that state it; null likewise."""
     shortest_path_m: Spread
     shortest_path_steps: Spread
     detour_steps: Spread
@@ -171,7 +178,8 @@ def _no_rows() -> pa.Table:
 
 
 def _no_obstacles() -> pa.Table:
-    types = {"type": pa.string(), "pushable": pa.bool_(), "pickable": pa.bool_()}
+    booleans = dict.fromkeys(("pushable", "pickable", "relevant"), pa.bool_())
+    types = {"type": pa.string(), **booleans}
     return pa.schema(types).empty_table()
 
 
@@ -190,6 +198,7 @@ def _stats(
     )
     longer = detours.filter(pc.equal(table.column("mode"), "lengthened")).drop_null()
     push, pick = (kinds.column(name).to_numpy().astype(bool) for name in ("pushable", "pickable"))
+    relevant = kinds.column("relevant").drop_null().to_numpy().astype(bool)
     held = {k: v for k, v in manifest.counts.items() if split in (None, k)}
     return Stats(
         scenes=sum(count.scenes for count in held.values()),
@@ -205,6 +214,8 @@ def _stats(
         obstacles_pushable=int(push.sum()),
         obstacles_pickable=int(pick.sum()),
         obstacles_fixed=int((~(push | pick)).sum()),
+        obstacles_relevant=int(relevant.sum()) if len(relevant) else None,
+        relevant_share=mean(relevant) if len(relevant) else None,
         shortest_path_m=spread(table.column("shortest_path_m").to_numpy()),
         shortest_path_steps=spread(table.column("shortest_path_steps").to_numpy()),
         detour_steps=spread(longer.to_numpy()),

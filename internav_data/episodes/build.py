@@ -15,6 +15,7 @@ import numpy as np
 
 from internav_data.episodes.config import EpisodeConfig
 from internav_data.episodes.outcomes import outcomes_of
+from internav_data.episodes.relevance import relevant_obstacles
 from internav_data.episodes.site import SpawnSite
 from internav_data.episodes.spawn import EpisodeDraft, spawn
 from internav_data.geometry import round_m
@@ -267,6 +268,7 @@ def _recorded(draft: EpisodeDraft, index: int, world: World, expert: Expert | No
     # The lattice distance is known from spawning; outcomes need both distances before any of them.
     house, obstructed_path_m = draft.site.house, world.obstructed_path_m()
     outcomes = outcomes_of(world, (draft.steps, obstructed_path_m))
+    relevant = _relevant(draft)
     return Episode(
         episode_id=f"{house.scene_id}/{index:04d}",
         scene_id=house.scene_id,
@@ -288,13 +290,19 @@ def _recorded(draft: EpisodeDraft, index: int, world: World, expert: Expert | No
         room_paths_truncated=draft.room_paths_truncated,
         node_paths=draft.node_paths,
         node_paths_truncated=draft.node_paths_truncated,
-        obstacles=tuple(map(_obstacle, draft.obstacles, outcomes)),
+        obstacles=tuple(map(_obstacle, draft.obstacles, outcomes, relevant)),
         expert=expert,
         physics=_physics(draft),
     )
 
 
-def _obstacle(spawned: Spawned, outcomes: tuple[Outcome, ...]) -> Obstacle:
+def _relevant(draft: EpisodeDraft) -> tuple[bool, ...]:
+    """Return for each obstacle of a finished draft whether it is relevant."""
+    footprints = [obstacle.footprint for obstacle in draft.obstacles]
+    return relevant_obstacles(draft.site.lattice, footprints, draft.start, draft.goal, draft.steps)
+
+
+def _obstacle(spawned: Spawned, outcomes: tuple[Outcome, ...], relevant: bool) -> Obstacle:
     asset, pose = spawned.asset, spawned.settled.pose
     dynamics = asset.dynamics
     return Obstacle(
@@ -312,6 +320,7 @@ def _obstacle(spawned: Spawned, outcomes: tuple[Outcome, ...]) -> Obstacle:
         settle_s=spawned.settled.seconds,
         settle_penetration_m=spawned.settled.penetration_m,
         outcomes=outcomes,
+        relevant=relevant,
     )
 
 

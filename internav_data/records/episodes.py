@@ -133,6 +133,9 @@ class Obstacle:
     """Certificate of the settle check: deepest contact at rest, metres."""
     outcomes: tuple[Outcome, ...] | None
     """Outcomes of the four pushes and of pick; null where none were computed."""
+    relevant: bool | None = None
+    """Whether some smallest set of obstacles without which the goal is nearer on the lattice
+    includes it (docs/dataset.md); null in datasets of earlier releases."""
 
     @property
     def dynamics(self) -> Dynamics:

@@ -63,7 +63,9 @@ class CheckedLattice:
             ]
         )
         # A swept edge contains its ends: only edges between free nodes can be free.
-        self._pairs = pairs[nodes[pairs].all(axis=1)]
+        pairs = pairs[nodes[pairs].all(axis=1)]
+        # By first node, as the rows of a sparse matrix: each graph of a subset takes two sums.
+        self._pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].astype(np.int32)
         self._edge_tree = shapely.STRtree(
             list(shapely.get_parts(shapely.multilinestrings(self._xy[self._pairs])))
         )
@@ -92,10 +94,11 @@ class CheckedLattice:
         return i * self.shape[1] + j if inside else -1
 
     def _graph(self, free: FreeSpace) -> csr_array:
-        pairs = self._pairs[free.edges]
-        ones = np.ones(len(pairs), dtype=np.int8)
-        count = len(self._xy)
-        return csr_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+        pairs, count = self._pairs[free.edges], len(self._xy)
+        ends = np.cumsum(np.bincount(pairs[:, 0], minlength=count), dtype=np.int32)
+        rows = np.concatenate([np.zeros(1, np.int32), ends])
+        columns = np.ascontiguousarray(pairs[:, 1])
+        return csr_array((np.ones(len(pairs)), columns, rows), shape=(count, count))
 
     def distances(self, goal: int, free: FreeSpace) -> NDArray[np.float64]:
         """Return the number of steps from every node to a goal, inf if none, shape (n,)."""

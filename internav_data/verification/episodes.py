@@ -10,6 +10,7 @@ from shapely import Point, Polygon
 from internav_data.verification.checked_lattice import SPACING_M
 from internav_data.verification.checked_path import CheckedPath
 from internav_data.verification.obstacles import check_obstacles
+from internav_data.verification.relevance import Removals, check_relevance
 
 if TYPE_CHECKING:
     from shapely import Geometry
@@ -42,7 +43,7 @@ def check_episode(
         footprints = check_obstacles(layout, episode, report)
         if footprints is not None:
             check.steps(footprints)
-            check.lengths(footprints, exact=exact)
+            check.lengths([plan for plans in footprints for plan in plans], exact=exact)
     return sum(report.by_predicate.values()) == before
 
 
@@ -139,15 +140,15 @@ class _EpisodeCheck:
             points = (self.from_xy, *(centres[d] for d in path.doors), self.to_xy)
             self.expect(path.points == points, "node-path-points", points, path.points)
 
-    def steps(self, footprints: list[Geometry]) -> None:
-        """Check the lattice distances with and without obstacles."""
+    def steps(self, footprints: list[list[Geometry]]) -> None:
+        """Check the lattice distances with and without obstacles, and which of these matter."""
         layout, episode = self.layout, self.episode
         unobstructed = layout.lattice.distances(self.goal, layout.lattice.free)[self.start]
-        free = layout.lattice.with_obstacles(footprints)
+        removals = Removals(layout.lattice, footprints, self.start, self.goal)
+        free = removals.free()
         for name, node in (("start", self.start), ("goal", self.goal)):
             self.expect(free.nodes[node], f"{name}-uncovered", "no obstacle over it", "one")
-        found = layout.lattice.distances(self.goal, free)[self.start]
-        steps = int(found) if math.isfinite(found) else None
+        steps = int(removals.steps) if math.isfinite(removals.steps) else None
         self.expect(
             episode.shortest_path_steps == unobstructed,
             "shortest-path-steps",
@@ -165,6 +166,7 @@ class _EpisodeCheck:
         else:
             longer = steps is not None and steps > unobstructed
             self.expect(longer, "lengthened", f"more than {unobstructed} steps", steps)
+        check_relevance(episode, removals, self.report)
 
     def lengths(self, footprints: list[Geometry], *, exact: bool) -> None:
         """Check the Euclidean distances with and without obstacles."""

@@ -40,8 +40,8 @@ class Expect(Protocol):
 
 def check_obstacles(
     layout: CheckedLayout, episode: Episode, report: FindingCollector
-) -> list[Geometry] | None:
-    """Check the obstacles; return their footprints, or None if an asset is unknown."""
+) -> list[list[Geometry]] | None:
+    """Check the obstacles; return the footprint of each, or None if an asset is unknown."""
     name = episode.episode_id
 
     def expect(holds: object, predicate: str, expected: object, got: object) -> bool:
@@ -90,7 +90,7 @@ def check_obstacles(
             physics.penetration_m,
         )
     expect(bool(physics.engine and physics.build), "physics.engine", "a name and a build", physics)
-    return [plan for plans in footprints for plan in plans]
+    return footprints
 
 
 def _check_asset(layout: CheckedLayout, obstacle: Obstacle, what: str, expect: Expect) -> None:

@@ -15,6 +15,7 @@ from internav_data.episodes.outcomes import outcomes_of
 from internav_data.episodes.spawn import NEAR_M
 from internav_data.geometry import asset_corners, footprint, house_footprints, transform
 from internav_data.houses import HouseConfig, build_house
+from internav_data.navigation import Lattice
 from internav_data.physics import Body, PhysicsScene, get_solver, wall_body
 from internav_data.physics.result_cache import ResultCache
 from internav_data.physics.scene import UPRIGHT
@@ -122,6 +123,33 @@ def test_the_last_obstacle_is_what_made_the_difference(houses, episodes):
         steps = steps_by_networkx(house, before, start, goal)
         assert steps is not None
         assert steps == episode.shortest_path_steps or episode.mode == "blocked"
+
+
+def test_obstacles_are_relevant_that_belong_to_a_minimal_set_without_which_the_path_is_shorter(
+    houses, episodes
+):
+    stated = set()
+    for scene, batch in episodes.items():
+        still = house_footprints(houses[scene])
+        for episode in batch:
+            plans = [footprint(catalogue().assets[o.asset_id], o.pose) for o in episode.obstacles]
+            before, changing = episode.obstructed_path_steps, []
+            if len(plans) > 6:
+                continue
+            for size in range(1, len(plans) + 1):
+                for removed in map(set, itertools.combinations(range(len(plans)), size)):
+                    lattice = Lattice.of_polygons(still, houses[scene].outline)
+                    for k in set(range(len(plans))) - removed:
+                        lattice.add(plans[k])
+                    ends = ((e.i, e.j) for e in (episode.start, episode.goal))
+                    steps = lattice.distance(*ends)
+                    if steps is not None and (before is None or steps < before):
+                        changing.append(removed)
+            minimal = [s for s in changing if not any(other < s for other in changing)]
+            relevant = [any(k in s for s in minimal) for k in range(len(plans))]
+            assert [obstacle.relevant for obstacle in episode.obstacles] == relevant
+            stated |= set(relevant)
+    assert stated == {True, False}
 
 
 def test_obstacles_touch_nothing(houses, episodes):
