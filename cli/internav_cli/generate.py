@@ -32,6 +32,7 @@ Examples:
   internav-gen generate --out data/demo --scenes 120 --episodes-per-scene 10
   internav-gen generate --out data/demo --scenes 240          extends it
   internav-gen generate --out data/flats --rooms kitchen,living,bedroom:2 --preset realistic
+  internav-gen generate --out data/confounded --attributes hidden
   internav-gen generate --dry-run --workers 8                 how long, how large
   internav-gen generate --scene 17 --episode 3                one episode again, as JSON
   internav-gen generate --print-config > mine.toml            all settings, to be changed
@@ -75,6 +76,16 @@ workers gives the same bytes.""",
     "[default: force]",
 )
 @click.option(
+    "--attributes",
+    type=click.Choice(["look", "hidden"]),
+    help="Mass, friction and fixedness go by an object's look, or are hidden.  [default: look]",
+)
+@click.option(
+    "--strength",
+    type=float,
+    help="With hidden attributes: share that is independent of the look.  [default: 1]",
+)
+@click.option(
     "--retry-quarantined",
     is_flag=True,
     help="Try all quarantined scenes again; without it, those whose workers died.",
@@ -94,6 +105,8 @@ def command(
     unseen_assets: bool | None,
     keep_unsolvable: bool | None,
     push_model: str | None,
+    attributes: str | None,
+    strength: float | None,
     retry_quarantined: bool,
     dry_run: bool,
     print_config: bool,
@@ -109,6 +122,8 @@ def command(
         episodes__unseen_assets=unseen_assets,
         episodes__keep_unsolvable=keep_unsolvable,
         world__push_model=push_model,
+        catalog__attributes=attributes,
+        catalog__strength=strength,
     )
     if print_config:
         from internav_data.core.config import config_toml

@@ -64,9 +64,9 @@ def auxiliary_starts(
     """
     world = World.of_episode(model, episode, assets)
     starts: list[AuxiliaryStart] = []
-    for number, obstacle in enumerate(episode.obstacles):
-        wanted = obstacle.pickable if kind == "pick" else obstacle.pushable
-        if wanted:
+    for number, index in enumerate(world.obstacles):
+        # Where attributes are hidden, a start must not tell them: that of a fixed obstacle is one.
+        if world.items[index].affords(kind):
             poses = list(_poses(world, episode, number, kind))
             strict = [start for opposite, start in poses if opposite]
             starts += strict or [start for _, start in poses]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from internav_data.catalog.attributes import DRAWS
 from internav_data.episodes.config import EpisodeConfig
 from internav_data.episodes.outcomes import outcomes_of
 from internav_data.episodes.relevance import relevant_obstacles
@@ -20,7 +21,7 @@ from internav_data.episodes.site import SpawnSite
 from internav_data.episodes.spawn import EpisodeDraft, spawn
 from internav_data.geometry import round_m
 from internav_data.navigation import SPACING_M, node_paths
-from internav_data.physics import Body, get_solver
+from internav_data.physics import get_solver
 from internav_data.planner.search import solve
 from internav_data.records import (
     Episode,
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 
     from numpy.random import Generator
 
+    from internav_data.catalog.attributes import HiddenAttributes
     from internav_data.episodes.spawn import Spawned
     from internav_data.records import Asset, Expert, House, Outcome, Redraw
     from internav_data.world.config import WorldConfig
@@ -69,6 +71,7 @@ def build_episodes(
     *,
     first: int = 0,
     attempt: int = 0,
+    hidden: HiddenAttributes | None = None,
 ) -> tuple[Episode, ...]:
     """Build the episodes first … first + count - 1 of a house.
 
@@ -89,6 +92,8 @@ def build_episodes(
         Settings of the world.
     attempt
         Sub-seed: 0 unless an earlier attempt at the scene failed.
+    hidden
+        Distribution of the obstacles' attributes; None where their look tells them.
 
     Raises
     ------
@@ -98,7 +103,9 @@ def build_episodes(
         An episode cannot be made within the bounds of the settings.
 
     """
-    batch = build_batch(house, count, pool, config, world_config, first=first, attempt=attempt)
+    batch = build_batch(
+        house, count, pool, config, world_config, first=first, attempt=attempt, hidden=hidden
+    )
     return batch.episodes
 
 
@@ -111,13 +118,14 @@ def build_batch(
     *,
     first: int = 0,
     attempt: int = 0,
+    hidden: HiddenAttributes | None = None,
 ) -> EpisodeBatch:
     """Build episodes and count the discarded draws.
 
     Parameters and errors as in `build_episodes`.
     """
     config = config or EpisodeConfig()
-    site = SpawnSite.of(house)
+    site = SpawnSite.of(house, hidden)
     redraws: Counter[Redraw] = Counter()
     episodes = []
     for index in range(first, first + count):
@@ -174,17 +182,22 @@ def _draw(
     draft = _draw_endpoints(site, mode_of(site.house.scene, index), config, place)
     if draft is None:
         return "no two nodes far enough apart"
+    if site.hidden is not None:
+        count = config.max_obstacles_for(len(site.house.rooms))
+        numbers = generator(seed, Purpose.OBSTACLE_ATTRIBUTES, *key)
+        draft.attribute_draws = numbers.random((count, DRAWS))
     if not spawn(draft, pool, generator(seed, Purpose.SPAWN, *key)):
         return "condition not reached"
     # Drawn last, from the first stream: spawning does not depend on the agent's heading.
     yaw_deg = QUARTER_TURNS[int(place.integers(4))]
     world = World(
         site.model,
-        [Body.of(o.asset, o.settled.pose) for o in draft.obstacles],
+        [obstacle.body for obstacle in draft.obstacles],
         (*draft.start, yaw_deg // 90),
         draft.goal,
         world_config,
         config.engine,
+        [obstacle.affordance for obstacle in draft.obstacles],
     )
     # The expert comes first: an episode without one is discarded and needs no outcomes.
     expert = solve(world)
@@ -268,6 +281,7 @@ def _recorded(draft: EpisodeDraft, index: int, world: World, expert: Expert | No
     # The lattice distance is known from spawning; outcomes need both distances before any of them.
     house, obstructed_path_m = draft.site.house, world.obstructed_path_m()
     outcomes = outcomes_of(world, (draft.steps, obstructed_path_m))
+    movable = [world.moves_alone(index) for index in world.obstacles]
     relevant = _relevant(draft)
     return Episode(
         episode_id=f"{house.scene_id}/{index:04d}",
@@ -290,7 +304,7 @@ def _recorded(draft: EpisodeDraft, index: int, world: World, expert: Expert | No
         room_paths_truncated=draft.room_paths_truncated,
         node_paths=draft.node_paths,
         node_paths_truncated=draft.node_paths_truncated,
-        obstacles=tuple(map(_obstacle, draft.obstacles, outcomes, relevant)),
+        obstacles=tuple(map(_obstacle, draft.obstacles, outcomes, relevant, movable)),
         expert=expert,
         physics=_physics(draft),
     )
@@ -302,9 +316,10 @@ def _relevant(draft: EpisodeDraft) -> tuple[bool, ...]:
     return relevant_obstacles(draft.site.lattice, footprints, draft.start, draft.goal, draft.steps)
 
 
-def _obstacle(spawned: Spawned, outcomes: tuple[Outcome, ...], relevant: bool) -> Obstacle:
-    asset, pose = spawned.asset, spawned.settled.pose
-    dynamics = asset.dynamics
+def _obstacle(
+    spawned: Spawned, outcomes: tuple[Outcome, ...], relevant: bool, movable: bool
+) -> Obstacle:
+    asset, pose, dynamics = spawned.asset, spawned.settled.pose, spawned.dynamics
     return Obstacle(
         asset_id=asset.asset_id,
         type=asset.type,
@@ -321,6 +336,8 @@ def _obstacle(spawned: Spawned, outcomes: tuple[Outcome, ...], relevant: bool) -
         settle_penetration_m=spawned.settled.penetration_m,
         outcomes=outcomes,
         relevant=relevant,
+        movable=movable,
+        affordance=spawned.affordance,
     )
 
 

@@ -15,6 +15,7 @@ from internav_data.world import HouseModel
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from internav_data.catalog.attributes import HiddenAttributes
     from internav_data.navigation import Lattice, TangentGraph
     from internav_data.physics.narrow_phase import ConvexPrisms
     from internav_data.records import House, Vec2
@@ -39,14 +40,16 @@ class SpawnSite:
     """Free nodes (i, j) of the largest component, (n, 2) int64, in order of i, then j."""
     rooms: NDArray[np.int64]
     """Room of each node, (n,) int64."""
+    hidden: HiddenAttributes | None = None
+    """Distribution of the obstacles' attributes; None where their look tells them."""
     _paths_between: dict[tuple[Vec2, Vec2], tuple[Vec2, ...]] = field(default_factory=dict)
     _room_paths: dict[tuple[int, int], tuple[tuple[tuple[int, ...], ...], bool]] = field(
         default_factory=dict
     )
 
     @staticmethod
-    def of(house: House) -> SpawnSite:
-        """Prepare a house for episodes."""
+    def of(house: House, hidden: HiddenAttributes | None = None) -> SpawnSite:
+        """Prepare a house for episodes, whose obstacles may have hidden attributes."""
         model = HouseModel.of(house)
         lattice = model.lattice
         components = lattice.components()
@@ -62,6 +65,7 @@ class SpawnSite:
             tangent_graph=model.tangent_graph(),
             nodes=nodes.astype(np.int64),
             rooms=rooms_of(house, SPACING_M * nodes.astype(np.float64)),
+            hidden=hidden,
         )
 
     def path_between(self, first: Vec2, second: Vec2) -> tuple[Vec2, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -28,12 +28,13 @@ if TYPE_CHECKING:
 
     from numpy.random import Generator
 
+    from internav_data.core.typing import Floats
     from internav_data.episodes.config import EpisodeConfig
     from internav_data.episodes.site import SpawnSite
     from internav_data.navigation import Lattice
     from internav_data.physics import SettleResult
     from internav_data.physics.narrow_phase import ConvexPrisms
-    from internav_data.records import Asset, Mode, NodePath, Vec2
+    from internav_data.records import Affordance, Asset, Dynamics, Mode, NodePath, Vec2
 
 YAW_STEP_DEG = 15
 """Step of the headings at which obstacles stand, degrees."""
@@ -46,6 +47,7 @@ class Spawned:
     """An obstacle at rest."""
 
     asset: Asset
+    dynamics: Dynamics
     settled: SettleResult
     segment: int
     """Segment of the node path on which it was spawned, 0 at the start."""
@@ -53,6 +55,13 @@ class Spawned:
     """Footprint at the rounded pose, as a reader of the file derives it, metres."""
     prisms: ConvexPrisms
     """Prisms of its entire hull at the rounded pose."""
+    affordance: Affordance | None = None
+    """Affordance of its type, where attributes are hidden."""
+
+    @property
+    def body(self) -> Body:
+        """The obstacle at rest, as a body of physics."""
+        return Body(self.asset, self.settled.pose, self.dynamics)
 
 
 @dataclass(slots=True)
@@ -76,6 +85,9 @@ class EpisodeDraft:
     shortest_path_steps: int
     steps: int | None
     """Lattice distance among the obstacles so far; None when cut off."""
+    attribute_draws: Floats | None = None
+    """Random numbers of the hidden attributes, (obstacles, `DRAWS`) float64: a row for each
+    obstacle in order of spawning; None where the look tells the attributes."""
     obstacles: list[Spawned] = field(default_factory=list)
 
     @property
@@ -144,14 +156,27 @@ def _try_spot(draft: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> Non
     upright = prisms_of(asset, pose)
     if any(fall_clearance(upright, other, gap) < gap for other in _solids(draft)):
         return
-    settled = settle(Body.of(asset, pose), gap, lambda: _near(draft, upright), draft.config.engine)
+    dynamics = _dynamics(draft, asset)
+    body = Body(asset, pose, dynamics)
+    settled = settle(body, gap, lambda: _near(draft, upright), draft.config.engine)
     if settled.refusal:
         return
     # Settling may have moved it by up to 5 cm: it must still not touch anything.
     exact, entire = footprint(asset, settled.pose), prisms_of(asset, settled.pose)
     if _distance(draft, exact, gap) <= 0.0 or any(touches(entire, s) for s in _solids(draft)):
         return
-    _place(draft, Spawned(asset, settled, segment, exact, entire))
+    hidden = draft.site.hidden
+    affordance = None if hidden is None else hidden.affordance(asset)
+    _place(draft, Spawned(asset, dynamics, settled, segment, exact, entire, affordance))
+
+
+def _dynamics(draft: EpisodeDraft, asset: Asset) -> Dynamics:
+    """Return the dynamics of the next obstacle, if it is of an asset."""
+    hidden, draws = draft.site.hidden, draft.attribute_draws
+    if hidden is None or draws is None:
+        return asset.dynamics
+    # By the obstacle's number, whatever asset is tried: attributes have no part in the choice.
+    return hidden.dynamics(asset, draws[len(draft.obstacles)].tolist())
 
 
 def _spot(
@@ -205,11 +230,11 @@ def _near(draft: EpisodeDraft, here: ConvexPrisms) -> list[Body]:
     """Return the furniture, obstacles and walls whose plans are near an object's, fixed."""
     house = draft.site.house
     bodies = [
-        Body.of(house.assets[placed.asset_id], placed.pose, moves=False)
+        Body.of_object(placed, house.assets, moves=False)
         for placed in house.objects
         if house.assets[placed.asset_id].blocks
     ]
-    bodies += [Body.of(other.asset, other.settled.pose, moves=False) for other in draft.obstacles]
+    bodies += [replace(other.body, moves=False) for other in draft.obstacles]
     bodies += [wall_body(wall) for wall in house.walls]
     return [body for body in bodies if _is_near(here, prisms_of(body.asset, body.pose))]
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from internav_data.catalog.config import CatalogConfig
 from internav_data.core.config import (
     MAX_SEED,
     Bounds,
@@ -48,6 +49,8 @@ class GenerationConfig:
     """Episodes of each test scene; 0 for a tenth of episodes_per_scene, rounded up."""
     assets: tuple[str, ...] = ()
     """Folders of your own meshes that join the catalogue."""
+    catalog: CatalogConfig = field(default_factory=CatalogConfig)
+    """Settings of the objects' attributes."""
     house: HouseConfig = field(default_factory=HouseConfig)
     """Settings of the houses."""
     episodes: EpisodeConfig = field(default_factory=EpisodeConfig)
@@ -64,6 +67,7 @@ class GenerationConfig:
             A value is out of its bounds, a folder of meshes is missing, or a floor plan is wrong.
 
         """
+        self.catalog.check()
         self.house.check()
         self.episodes.check()
         self.world.check()

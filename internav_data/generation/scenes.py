@@ -55,16 +55,19 @@ def build_scene(
         No attempt succeeded; it gives the reason of the last failure.
 
     """
+    from internav_data.catalog.attributes import hidden_attributes  # noqa: PLC0415 - as below
     from internav_data.episodes import build_batch  # noqa: PLC0415 - numba, pybullet when used
     from internav_data.houses import build_house  # noqa: PLC0415 - as above
 
-    reason = ""
+    reason, hidden = "", hidden_attributes(config.catalog, catalogue)
     for attempt in range(ATTEMPTS):
         try:
-            house = build_house(config.seed, scene, config.house, catalogue, attempt)
+            house = build_house(config.seed, scene, config.house, catalogue, attempt, hidden=hidden)
             count = config.episodes_of(house.split) if episodes is None else episodes
             pool = obstacle_pool(catalogue, config, house.split)
-            made = build_batch(house, count, pool, config.episodes, config.world, attempt=attempt)
+            made = build_batch(
+                house, count, pool, config.episodes, config.world, attempt=attempt, hidden=hidden
+            )
         except QuarantineError as error:
             reason = str(error)
         else:

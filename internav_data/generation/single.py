@@ -40,16 +40,18 @@ def generate_house(seed: int = 0, scene: int = 0, config: GenerationConfig | Non
 
     """
     from internav_data.catalog import catalogue  # noqa: PLC0415
+    from internav_data.catalog.attributes import hidden_attributes  # noqa: PLC0415 - as above
     from internav_data.houses import build_house  # noqa: PLC0415 - as above
 
     config = config or GenerationConfig()
     config.check()
     if scene < 0 or seed < 0:
         raise UsageError(f"seed is {seed} and scene is {scene}: both are 0 or more")
-    reason = ""
+    assets, reason = catalogue(asset_folders(config)), ""
+    hidden = hidden_attributes(config.catalog, assets)
     for attempt in range(ATTEMPTS):
         try:
-            return build_house(seed, scene, config.house, catalogue(asset_folders(config)), attempt)
+            return build_house(seed, scene, config.house, assets, attempt, hidden=hidden)
         except QuarantineError as error:
             reason = str(error)
     raise QuarantineError(reason)
@@ -79,18 +81,23 @@ def generate_episodes(
 
     """
     from internav_data.catalog import catalogue  # noqa: PLC0415
+    from internav_data.catalog.attributes import hidden_attributes  # noqa: PLC0415 - as above
     from internav_data.episodes import build_episodes  # noqa: PLC0415 - as above
 
     config = config or GenerationConfig()
     config.check()
     if count < 1 or first < 0:
         raise UsageError(f"count is {count} and first is {first}: ask for 1 or more from 0 or more")
-    pool = obstacle_pool(catalogue(asset_folders(config)), config, house.split)
-    reason = ""
+    assets, reason = catalogue(asset_folders(config)), ""
+    pool = obstacle_pool(assets, config, house.split)
+    hidden = hidden_attributes(config.catalog, assets)
     for attempt in range(ATTEMPTS):
         try:
             return build_episodes(
-                house, count, pool, config.episodes, config.world, first=first, attempt=attempt
+                *(house, count, pool, config.episodes, config.world),
+                first=first,
+                attempt=attempt,
+                hidden=hidden,
             )
         except QuarantineError as error:
             reason = str(error)

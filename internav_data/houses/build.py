@@ -6,9 +6,10 @@ record: each stage is one function of the draft, with random numbers of its own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+from internav_data.catalog.attributes import DRAWS
 from internav_data.geometry import round_m
 from internav_data.houses.choice import choose_floor_plan
 from internav_data.houses.furniture import furnish
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from internav_data.catalog import Catalogue
+    from internav_data.catalog.attributes import HiddenAttributes
     from internav_data.houses.config import HouseConfig
     from internav_data.houses.plan import Corner, FloorPlan, Opening
     from internav_data.houses.programme import RoomSpec
@@ -104,6 +106,8 @@ class HouseDraft:
     key: SceneKey
     config: HouseConfig
     catalogue: Catalogue
+    hidden: HiddenAttributes | None = None
+    """Distribution of the furniture's attributes; None where their look tells them."""
     rooms: tuple[RoomSpec, ...] = field(init=False, repr=False)
     """Set by `draw_rooms`: types, areas and standards; empty for a user's floor plan."""
     plan: FloorPlan = field(init=False, repr=False)
@@ -115,7 +119,7 @@ class HouseDraft:
     windows: tuple[Opening, ...] = field(init=False, repr=False)
     """Set by `place_windows`."""
     objects: tuple[SceneObject, ...] = field(init=False, repr=False)
-    """Set by `place_furniture`."""
+    """Set by `place_furniture`, and by `draw_attributes` anew."""
     surfaces: Sequence[tuple[str, str]] = field(init=False, repr=False)
     """Set by `choose_materials`: materials of floor and walls by room."""
     materials: tuple[Material, ...] = field(init=False, repr=False)
@@ -168,6 +172,22 @@ def place_furniture(draft: HouseDraft) -> None:
     )
 
 
+def draw_attributes(draft: HouseDraft) -> None:
+    """Draw the attributes of each piece of furniture, where they are hidden."""
+    hidden = draft.hidden
+    if hidden is None:
+        return
+    # A row for each object, whatever its asset is.
+    rows = draft.key.generator(Purpose.FURNITURE_ATTRIBUTES).random((len(draft.objects), DRAWS))
+    objects = []
+    for placed, row in zip(draft.objects, rows.tolist(), strict=True):
+        asset = draft.catalogue.assets[placed.asset_id]
+        dynamics = hidden.dynamics(asset, row)
+        own = None if dynamics == asset.dynamics else dynamics
+        objects.append(replace(placed, dynamics=own, affordance=hidden.affordance(asset)))
+    draft.objects = tuple(objects)
+
+
 def choose_materials(draft: HouseDraft) -> None:
     """Draw the materials of floors and walls."""
     draft.surfaces, draft.materials = draw_materials(draft.key, draft.plan.types)
@@ -179,6 +199,7 @@ STAGES: tuple[Callable[[HouseDraft], None], ...] = (
     place_doors,
     place_windows,
     place_furniture,
+    draw_attributes,
     choose_materials,
 )
 """Stages of a draft, in order. Each has random numbers of its own: a stage that draws more or
@@ -186,7 +207,13 @@ fewer of them changes no other."""
 
 
 def build_house(
-    seed: int, scene: int, config: HouseConfig, catalogue: Catalogue, attempt: int = 0
+    seed: int,
+    scene: int,
+    config: HouseConfig,
+    catalogue: Catalogue,
+    attempt: int = 0,
+    *,
+    hidden: HiddenAttributes | None = None,
 ) -> House:
     """Build one house: a pure function of its arguments.
 
@@ -198,7 +225,7 @@ def build_house(
         When no floor plan keeps the standards.
     """
     config.check()
-    draft = HouseDraft(SceneKey(seed, scene, attempt), config, catalogue)
+    draft = HouseDraft(SceneKey(seed, scene, attempt), config, catalogue, hidden)
     for stage in STAGES:
         stage(draft)
     return _finished(draft)

@@ -211,6 +211,28 @@ def count_movers(
     return len(known)
 
 
+def moves_alone(
+    body: Body, spec: PushSpec = PUSH_SPECS["force"], engine: str = DEFAULT_ENGINE
+) -> bool:
+    """Return whether a push moves an object 5 cm or more on free floor, along any heading.
+
+    False for an object that a push cannot act on. Other parameters as in `push`.
+
+    Raises
+    ------
+    UsageError
+        No engine has this name.
+
+    """
+    if not body.dynamics.pushable:
+        return False
+    for heading in range(4):
+        problem = _Problem.of(body, heading, lambda _: (), spec, engine)
+        if _is_moved(body, problem.frame, _push_alone(problem)):
+            return True
+    return False
+
+
 def _push_alone(problem: _Problem) -> PushSolution:
     return problem.solver.push(PhysicsScene((problem.pushed,)), problem.spec)
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from internav_data.physics.kdop import Dop8
-    from internav_data.records import Dynamics, Obstacle, Quaternion, Wall
+    from internav_data.records import Dynamics, Obstacle, Quaternion, SceneObject, Wall
 
 UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
 AGENT_LOW_M: Final = 0.022
@@ -34,8 +34,14 @@ class Body:
 
     @staticmethod
     def of(asset: Asset, pose: Pose, *, moves: bool = True) -> Body:
-        """Return an object with the dynamics of its asset: furniture, or a new obstacle."""
+        """Return an object with the dynamics of its asset."""
         return Body(asset, pose, asset.dynamics, moves)
+
+    @staticmethod
+    def of_object(placed: SceneObject, assets: Mapping[str, Asset], *, moves: bool = True) -> Body:
+        """Return a piece of furniture with its own dynamics, or else those of its asset."""
+        asset = assets[placed.asset_id]
+        return Body(asset, placed.pose, placed.dynamics or asset.dynamics, moves)
 
     @staticmethod
     def of_obstacle(obstacle: Obstacle, assets: Mapping[str, Asset], *, moves: bool = True) -> Body:

@@ -402,7 +402,7 @@ class _BestFirstSearch:
         self._place(world, entry.pose, entry.horizon)
         result = world.step(entry.action)
         # The push of an object alone is cached: finding it too heavy costs next to nothing.
-        if result.reason != "too heavy":
+        if result.cause != "too heavy":
             self.queries_left -= 1
             goes_on = result.success and entry.last == state.last
             self.tries_left -= not goes_on
@@ -411,7 +411,7 @@ class _BestFirstSearch:
             looks = looks_between(state.world.horizon_deg, entry.horizon)
             actions = (*state.actions, *walk, *looks, int(entry.action))
             self._enter(world, actions, entry.last, entry.penalty)
-        elif entry.fallback is not None and result.reason in _AGENTS_FAULT:
+        elif entry.fallback is not None and result.cause in _AGENTS_FAULT:
             self._push(entry.fallback.f_cost, _RANKS[entry.action], entry.fallback)
 
     def _place(self, world: World, pose: int, horizon: int) -> None:

@@ -1,6 +1,6 @@
 """Records that all rooms share: frozen dataclasses, seeds, errors, the version; imports none."""
 
-from internav_data.records.assets import RGB, Asset, Part, Shape
+from internav_data.records.assets import RGB, Asset, Part, Shape, type_affordances
 from internav_data.records.episodes import (
     Episode,
     Expert,
@@ -28,7 +28,7 @@ from internav_data.records.houses import (
     Wall,
     Window,
 )
-from internav_data.records.physics import PUSH_SPECS, Dynamics, PushModel, PushSpec
+from internav_data.records.physics import PUSH_SPECS, Affordance, Dynamics, PushModel, PushSpec
 from internav_data.records.poses import Pose, Quaternion, Vec2, Vec3
 from internav_data.records.seeds import (
     EvaluationStream,
@@ -45,6 +45,7 @@ __all__ = [
     "OUTSIDE",
     "PUSH_SPECS",
     "RGB",
+    "Affordance",
     "Asset",
     "Door",
     "DoorKind",
@@ -85,4 +86,5 @@ __all__ = [
     "Wall",
     "Window",
     "generator",
+    "type_affordances",
 ]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from internav_data.records.physics import Dynamics
+from internav_data.records.physics import Affordance, Dynamics
 from internav_data.records.poses import Quaternion, Vec3
 
 Shape = Literal["box", "cylinder", "sphere", "hull"]
@@ -79,3 +80,21 @@ class Asset:
     def __hash__(self) -> int:
         """Return the hash of the id: assets key many caches, and hashing all parts is slow."""
         return hash(self.asset_id)
+
+
+def type_affordances(assets: Iterable[Asset]) -> dict[str, Affordance]:
+    """Return the affordance of each type that can be handled: that of most of its assets.
+
+    Only assets that may be spawned count. A type without an asset that can be pushed or picked up
+    is not among the keys; where as many can be pushed as picked up, it is pushed.
+
+    Parameters
+    ----------
+    assets
+        All assets of a catalogue: the affordance is a fact about the type.
+    """
+    votes: dict[str, int] = {}
+    for asset in assets:
+        if asset.spawnable and (asset.pushable or asset.pickable):
+            votes[asset.type] = votes.get(asset.type, 0) + (1 if asset.pushable else -1)
+    return {type_: "push" if vote >= 0 else "pick" for type_, vote in sorted(votes.items())}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from internav_data.records.houses import Split
-from internav_data.records.physics import Dynamics
+from internav_data.records.physics import Affordance, Dynamics
 from internav_data.records.poses import Pose, Quaternion, Vec2
 
 Mode = Literal["blocked", "lengthened"]
@@ -136,6 +136,12 @@ class Obstacle:
     relevant: bool | None = None
     """Whether some smallest set of obstacles without which the goal is nearer on the lattice
     includes it (docs/dataset.md); null in datasets of earlier releases."""
+    movable: bool | None = None
+    """Whether the agent's push moves it by 5 cm or more where nothing is near, in one of the four
+    directions at least; null in datasets of earlier releases."""
+    affordance: Affordance | None = None
+    """Interaction of which it can be the target whatever comes of it: that of its type, where
+    attributes are hidden; null where `pushable` and `pickable` decide."""
 
     @property
     def dynamics(self) -> Dynamics:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from internav_data.records.assets import RGB, Asset
+from internav_data.records.physics import Affordance, Dynamics
 from internav_data.records.poses import Pose, Vec2
 
 Split = Literal["train", "val", "test"]
@@ -128,6 +129,11 @@ class SceneObject:
     """Furniture group: objects of one group belong together (table and chairs); -1 for none."""
     support: int
     """object_id of the object on which it stands, -1 for the floor."""
+    dynamics: Dynamics | None = None
+    """Dynamics of this object, where attributes are hidden; null where its asset's hold."""
+    affordance: Affordance | None = None
+    """Interaction of which it can be the target whatever comes of it: that of its type, where
+    attributes are hidden; null where its asset's `pushable` and `pickable` decide."""
 
     @property
     def pose(self) -> Pose:

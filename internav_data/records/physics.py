@@ -13,6 +13,10 @@ PushModel = Literal["force", "kick", "step"]
 """Name of a push in configs and options: a key of `PUSH_SPECS`."""
 
 
+Affordance = Literal["push", "pick"]
+"""Interaction by which agents try to move objects of a type."""
+
+
 @dataclass(frozen=True, slots=True)
 class Dynamics:
     """Properties of one object that decide what happens when an agent acts on it.
@@ -21,10 +25,18 @@ class Dynamics:
     """
 
     mass_kg: float
+    """Mass, kilograms."""
     friction: float
     """Coulomb friction coefficient on floor, walls and other objects."""
     pushable: bool
+    """Whether the agent's push can act on it."""
     pickable: bool
+    """Whether the agent can pick it up."""
+
+    @property
+    def fixed(self) -> bool:
+        """Whether no interaction of the agent can act on it: it is as if bolted down."""
+        return not (self.pushable or self.pickable)
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,6 +54,10 @@ class Purpose(IntEnum):
     """Evaluation of policies: see `EvaluationStream`."""
     TRAINING = 12
     """Training of agents: see `TrainingStream`."""
+    OBSTACLE_ATTRIBUTES = 13
+    """Hidden attributes of the obstacles of an episode: key as for `SPAWN`."""
+    FURNITURE_ATTRIBUTES = 14
+    """Hidden attributes of the furniture of a house."""
 
 
 class ProgrammeStream(IntEnum):

@@ -12,7 +12,8 @@ if TYPE_CHECKING:
 PUSH_OUTCOMES = ("push_east", "push_north", "push_west", "push_south")
 PICK_OUTCOME = "pick"
 OUTCOMES = (*PUSH_OUTCOMES, PICK_OUTCOME)
-PUSH_REASONS = ("", "not pushable", "too heavy", "something is in the way")
+TOO_HEAVY = "too heavy"
+PUSH_REASONS = ("", "not pushable", TOO_HEAVY, "something is in the way")
 PICK_REASONS = ("", "not pickable", "something rests on it")
 PUSHED_M = 0.05
 """Minimum displacement of a successful push."""
@@ -52,6 +53,18 @@ class _InteractionCheck:
             for outcome in obstacle.outcomes:
                 self._outcome(obstacle, outcome, f"{what}, {outcome.action}")
                 self._poses(number, outcome, f"{what}, {outcome.action}")
+            self._movable(obstacle, what)
+
+    def _movable(self, obstacle: Obstacle, what: str) -> None:
+        """Check whether an obstacle can be moved: some push of it is stopped by others at most."""
+        pushes = [o for o in obstacle.outcomes or () if o.action in PUSH_OUTCOMES]
+        light = obstacle.pushable and any(o.reason != TOO_HEAVY for o in pushes)
+        self.expect(
+            obstacle.movable in (None, light),
+            "outcomes.movable",
+            f"{what}: movable {light}",
+            obstacle.movable,
+        )
 
     def _outcome(self, obstacle: Obstacle, outcome: Outcome, what: str) -> None:
         pick = outcome.action == PICK_OUTCOME

@@ -56,6 +56,7 @@ NAME = Rule(pattern=r"\S+")
 WORDS = Rule(pattern=r"\S+( \S+)*")
 MASS = Rule(1e-4, 1e5)
 FRICTION = Rule(0.0, 2.0)
+AFFORDANCE = Rule(choices=("push", "pick"))
 SPLIT = Rule(choices=("train", "val", "test"))
 TURN = Rule(-1.0, 1.0, digits=TURNS)
 FROM_ZERO = Rule(0.0, 1.0)
@@ -103,6 +104,7 @@ EPISODE_RULES: Mapping[str, Rule] = {
     **{f"obstacles.element.{name}": rule for name, rule in POSE_RULES.items()},
     "obstacles.element.mass_kg": MASS,
     "obstacles.element.friction": FRICTION,
+    "obstacles.element.affordance": AFFORDANCE,
     "obstacles.element.node_path_segment": Rule(0),
     "obstacles.element.settle_s": FROM_ZERO,
     "obstacles.element.settle_penetration_m": FROM_ZERO,
@@ -152,6 +154,9 @@ SCENE_RULES: Mapping[str, Rule] = {
     "objects.element.quaternion.w": Rule(0.0, 1.0, digits=TURNS),
     "objects.element.group": ID_OR_NONE,
     "objects.element.support": ID_OR_NONE,
+    "objects.element.dynamics.mass_kg": MASS,
+    "objects.element.dynamics.friction": FRICTION,
+    "objects.element.affordance": AFFORDANCE,
     "materials.element.name": WORDS,
     "materials.element.pattern": Rule(choices=PATTERNS),
     "room_graph.element.element": ID,

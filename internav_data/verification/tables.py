@@ -12,6 +12,7 @@ from internav_data.dataset import ASSETS, EPISODES, SCENES, from_table, read_tab
 from internav_data.dataset.tables import SPECS
 from internav_data.records import OUTSIDE
 from internav_data.records.errors import InternavError
+from internav_data.verification.attributes import AttributeCheck
 from internav_data.verification.checked_config import checked_config
 from internav_data.verification.findings import FindingCollector
 from internav_data.verification.house_config import check_house_config, house_request
@@ -53,6 +54,8 @@ class DatasetKeys:
     episodes: Counter[str] = field(default_factory=Counter)
     first_rooms: RoomPlan | None = None
     """Rooms of the first house."""
+    attributes: AttributeCheck | None = None
+    """Check of the objects' attributes; None without assets to compare them with."""
 
 
 def split_of(scene: int) -> str:
@@ -81,6 +84,8 @@ def check_tables(
         for file in manifest.of(name):
             if file.path not in damaged:
                 whole.absorb(_check_table(root, manifest, file, keys, unsafe))
+    if keys.attributes is not None:
+        keys.attributes.shares(whole)
     if not damaged:
         _check_counts(manifest, keys, whole)
     return whole, frozenset(unsafe)
@@ -118,7 +123,9 @@ def _check_assets(
     report.expect(ids == sorted(ids), "schema.assets.order", "rows by asset_id", "another order")
     report.expect(len(set(ids)) == len(ids), "schema.assets.unique", "each asset once", "one twice")
     keys.assets = frozenset(ids)
-    for asset in from_table(table, ASSETS):
+    assets = from_table(table, ASSETS)
+    keys.attributes = AttributeCheck.of(manifest.config, assets)
+    for asset in assets:
         report.expect(asset.parts, "schema.assets.parts", f"{asset.asset_id}: parts", "none")
         report.expect(
             all((part.shape == "hull") == bool(part.corners) for part in asset.parts),
@@ -158,6 +165,8 @@ def _check_scenes(
             rooms = check_house_config(house, request, keys.first_rooms, report)
             keys.first_rooms = keys.first_rooms or rooms
         _check_links(house, keys, report)
+        if keys.attributes is not None:
+            keys.attributes.house(house, report)
         keys.scenes[house.scene_id] = SceneKeys(
             house.split,
             frozenset(room.room_id for room in house.rooms),
@@ -260,6 +269,9 @@ def _check_references(
             continue
         report.scene = episode.scene_id
         check_interactions(episode, report, solvable=solvable)
+        if keys.attributes is not None:
+            for number, obstacle in enumerate(episode.obstacles):
+                keys.attributes.obstacle(obstacle, number, report, episode.episode_id)
         rooms = {episode.start.room, episode.goal.room}
         rooms.update(room for path in episode.room_paths for room in path)
         doors = {door for path in episode.node_paths for door in path.doors}

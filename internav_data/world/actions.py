@@ -149,8 +149,12 @@ Reason = Literal[
     "something rests on it",
     "no room to drop it",
     "not at the goal",
+    "did not move",
 ]
-"""Reason of an action's failure; empty after a success."""
+"""Reason of an action's failure; empty after a success. "did not move" stands for every reason that
+would tell something about hidden attributes."""
+Cause = Literal[Reason, "not pushable", "not pickable"]
+"""True reason of a failure."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,3 +186,6 @@ class StepResult:
     """Objects that lie elsewhere now, ascending by index, and their poses. A held one has none."""
     ongoing: bool = False
     """The interaction takes further steps; it is `World.interaction` until its last one."""
+    cause: Cause = ""
+    """True reason for which a target could not be moved. Not for agents: where attributes are
+    hidden, `reason` does not tell it."""

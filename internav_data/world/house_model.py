@@ -19,7 +19,15 @@ if TYPE_CHECKING:
 
     from internav_data.core.typing import Floats
     from internav_data.physics.kdop import Dop8
-    from internav_data.records import Asset, Dynamics, House, Pose, Vec2
+    from internav_data.records import (
+        Affordance,
+        Asset,
+        Dynamics,
+        House,
+        Pose,
+        SceneObject,
+        Vec2,
+    )
 
 MAX_TANGENT_GRAPHS: Final = 16
 """Maximum number of tangent graphs kept per house: one for each set of moved furniture."""
@@ -42,28 +50,40 @@ class MovableObject:
     """Height of its lowest point, metres; inf while it is held."""
     high_m: float
     """Height of its highest point, metres; -inf while it is held."""
+    affordance: Affordance | None = None
+    """Interaction of which it can be the target whatever comes of it, where its dynamics are
+    hidden; None where `dynamics` decides."""
 
     @staticmethod
-    def of(body: Body) -> MovableObject:
+    def of(body: Body, affordance: Affordance | None = None) -> MovableObject:
         """Return an object at the pose of a body."""
         asset, pose, extent = body.asset, body.pose, extent_of(body.asset, body.pose)
         return MovableObject(
             *(asset, pose, body.dynamics, footprint(asset, pose)),
-            *(extent.dop8, extent.low_m, extent.high_m),
+            *(extent.dop8, extent.low_m, extent.high_m, affordance),
         )
+
+    def affords(self, interaction: Affordance) -> bool:
+        """Return whether an interaction may choose the object as its target."""
+        if self.affordance is not None:
+            return self.affordance == interaction
+        return self.dynamics.pickable if interaction == "pick" else self.dynamics.pushable
 
     def moved(self, pose: Pose | None) -> MovableObject:
         """Return the object at another pose, or (None) in a hand."""
         if pose is not None:
-            return MovableObject.of(Body(self.asset, pose, self.dynamics))
+            return MovableObject.of(Body(self.asset, pose, self.dynamics), self.affordance)
         nowhere = (Polygons.of([]), EMPTY, np.inf, -np.inf)
-        return MovableObject(self.asset, None, self.dynamics, *nowhere)
+        return MovableObject(self.asset, None, self.dynamics, *nowhere, self.affordance)
 
 
-def is_movable(asset: Asset) -> bool:
-    """Return whether furniture of an asset can move: obstacle types that an agent can handle."""
-    dynamics = asset.dynamics
-    return asset.spawnable and (dynamics.pushable or dynamics.pickable)
+def is_movable(placed: SceneObject, asset: Asset) -> bool:
+    """Return whether agents take a piece of furniture for movable.
+
+    It is of an obstacle type, and of an asset that they can handle; where attributes are hidden, it
+    is of a type that they can handle, and may be fixed nevertheless.
+    """
+    return placed.affordance is not None or (asset.spawnable and not asset.dynamics.fixed)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,8 +121,9 @@ class HouseModel:
         # fixed; rugs block nothing and are left out.
         for placed in house.objects:
             asset = house.assets[placed.asset_id]
-            if is_movable(asset):
-                items.append(MovableObject.of(Body.of(asset, placed.pose)))
+            if is_movable(placed, asset):
+                body = Body.of_object(placed, house.assets)
+                items.append(MovableObject.of(body, placed.affordance))
                 object_ids.append(placed.object_id)
             elif asset.blocks:
                 bodies.append(Body.of(asset, placed.pose, moves=False))

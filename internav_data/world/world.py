@@ -17,7 +17,7 @@ from internav_data.geometry.headings import HEADINGS
 from internav_data.navigation import CLEARANCE_M, SPACING_M
 from internav_data.physics.engines import DEFAULT_ENGINE
 from internav_data.physics.kdop import dop8_of_square, grown, touching
-from internav_data.physics.pushing import AGENT_M, count_movers, push
+from internav_data.physics.pushing import AGENT_M, count_movers, moves_alone, push
 from internav_data.physics.scene import Body
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import (
@@ -43,8 +43,8 @@ if TYPE_CHECKING:
     from internav_data.navigation import Lattice, TangentGraph
     from internav_data.physics.kdop import Dop8
     from internav_data.physics.pushing import PushResult
-    from internav_data.records import Asset, Episode, Pose, PushSpec, Vec2
-    from internav_data.world.actions import Interaction
+    from internav_data.records import Affordance, Asset, Episode, Pose, PushSpec, Vec2
+    from internav_data.world.actions import Cause, Interaction
     from internav_data.world.config import WorldConfig
 
 
@@ -98,23 +98,16 @@ def _push(world: World, action: Action) -> StepResult:
     target = world.target(pick=False)
     if target < 0:
         return _failed(action, "nothing to push in sight and reach")
+    if not world.items[target].dynamics.pushable:
+        return _refused(world, action, target, "not pushable")
     # The four pushes are relative to the agent's heading, physics knows those of the house.
     pushed = world.simulate_push(target, (world.quarter + action.quarter_turns) % 4)
     if not pushed.success:
-        reason: Reason = pushed.reason
-        return StepResult(
-            action, success=False, reason=reason, target=target, seconds=pushed.seconds
-        )
+        return _refused(world, action, target, pushed.reason, pushed.seconds)
     # An object may fall over the agent's collider, or come to rest over its disc after rounding.
     moved = tuple(sorted([(target, pushed.pose), *pushed.moved]))
     if _lies_on_agent(world, moved):
-        return StepResult(
-            action,
-            success=False,
-            reason="would come to lie on the agent",
-            target=target,
-            seconds=pushed.seconds,
-        )
+        return _refused(world, action, target, "would come to lie on the agent", pushed.seconds)
     world.put(moved)
     return StepResult(
         action,
@@ -143,9 +136,25 @@ def _pick(world: World, action: Action) -> StepResult:
         return _failed(action, "nothing to pick up in sight and reach")
     if carries(world, target):
         return StepResult(action, success=False, reason="something rests on it", target=target)
+    if not world.items[target].dynamics.pickable:
+        return _refused(world, action, target, "not pickable")
     world.put([(target, None)])
     world.held = target
     return StepResult(action, success=True, target=target)
+
+
+def _refused(
+    world: World, action: Action, target: int, cause: Cause, seconds: float = 0.0
+) -> StepResult:
+    """Return the failure to move a target; its true cause is told where nothing is hidden."""
+    hidden = world.items[target].affordance is not None
+    told: Reason = "did not move"
+    # What can be neither pushed nor picked up is a target only where attributes are hidden.
+    if not hidden and cause != "not pushable" and cause != "not pickable":  # noqa: PLR1714 - narrows
+        told = cause
+    return StepResult(
+        action, success=False, reason=told, target=target, seconds=seconds, cause=cause
+    )
 
 
 def carries(world: World, index: int) -> bool:
@@ -273,6 +282,7 @@ class World:
         goal: tuple[int, int],
         config: WorldConfig = DEFAULT_WORLD,
         engine: str = DEFAULT_ENGINE,
+        affordances: Sequence[Affordance | None] = (),
     ) -> None:
         """Put obstacles and an agent into a house.
 
@@ -290,9 +300,12 @@ class World:
             Settings of the world.
         engine
             Name of the physics engine.
+        affordances
+            Affordance of each obstacle, where attributes are hidden; else ().
 
         """
-        extra = [MovableObject.of(body) for body in obstacles]
+        bodies = tuple(obstacles)
+        extra = list(map(MovableObject.of, bodies, affordances or (None,) * len(bodies)))
         self.model = model
         self.lattice = model.lattice.copy()
         self._handles = model.handles + tuple(self.lattice.add(e.footprint) for e in extra)
@@ -348,6 +361,7 @@ class World:
             (goal.i, goal.j),
             config,
             engine or episode.physics.engine,
+            [obstacle.affordance for obstacle in episode.obstacles],
         )
 
     def copy(self) -> World:
@@ -444,11 +458,11 @@ class World:
         x, y = self.position
         round_here = dop8_of_square(x, y, REACH_M)
         near = touching(self._dop8s, round_here)
-        wanted = []
-        for k in near:
-            dynamics = self.items[k].dynamics
-            if dynamics.pickable if pick else dynamics.pushable:
-                wanted.append((self.distance_to(k, x, y), k))
+        wanted = [
+            (self.distance_to(k, x, y), k)
+            for k in near
+            if self.items[k].affords("pick" if pick else "push")
+        ]
         if not wanted:
             return -1
         shapes = [placed_occlusion_shape(body.asset, body.pose) for body in map(self.body, near)]
@@ -493,6 +507,10 @@ class World:
             agent_gap_m=gap,
             engine=self.engine,
         )
+
+    def moves_alone(self, index: int) -> bool:
+        """Return whether a push moves an object 5 cm or more where nothing is near it."""
+        return moves_alone(self.body(index), self.push_spec, self.engine)
 
     def count_movers(self, index: int, heading: int) -> int:
         """Estimate how many objects a push along a heading may move besides the pushed one."""

@@ -104,6 +104,15 @@ OUTCOMES = {
 }
 
 
+@pytest.mark.parametrize(("scene", "light"), [(0, True), (2, False)])
+def test_an_obstacle_is_movable_unless_all_its_pushes_find_it_too_heavy(scenes, scene, light):
+    episode = scenes[scene][1][0]
+    first, *others = episode.obstacles
+    for movable, predicates in ((light, set()), (None, set()), (not light, {"outcomes.movable"})):
+        stated = (replace(first, movable=movable), *others)
+        assert judged(replace(episode, obstacles=stated)) == predicates
+
+
 @pytest.mark.parametrize("case", OUTCOMES)
 def test_outcome_cannot_be(scenes, case):
     (scene, index, shard_ref, number, changes), predicate = OUTCOMES[case]

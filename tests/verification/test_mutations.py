@@ -294,6 +294,7 @@ OBSTACLE_CHANGES = {
     "another friction": ({"friction": 0.5}, "obstacle.friction"),
     "another type": ({"type": "Bar"}, "obstacle.type"),
     "not pushable": ({"pushable": False}, "obstacle.pushable"),
+    "affordance": ({"affordance": "push"}, "obstacle.affordance"),
     "pickable": ({"pickable": True}, "obstacle.pickable"),
     "unknown asset": ({"asset_id": "Ghost_1"}, "schema.episodes.asset"),
     "furniture": ({"asset_id": "Cupboard_1"}, "obstacle.spawnable"),

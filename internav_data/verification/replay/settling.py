@@ -135,7 +135,7 @@ def _near(scene: CheckedScene, asset_id: str, spot: Pose, earlier: Sequence[Body
         return bool(shapely.dwithin(here[:, None], _plans(slabs)[None, :], NEAR_M).any())
 
     bodies = [
-        Body.of(assets[o.asset_id], o.pose, moves=False)
+        Body.of_object(o, assets, moves=False)
         for o in layout.house.objects
         if assets[o.asset_id].blocks and near(layout.object_slabs[o.object_id])
     ]
