@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from internav_data.physics.scene import PhysicsScene
     from internav_data.records import Quaternion, Vec3
 
-_ENGINE_LOCK = ThreadLock()
-"""Held while a scene is built, stepped and read: by one thread of the process."""
+ENGINE_LOCK = ThreadLock()
+"""Held while a scene is built, stepped and read: by one thread of the process. The validator holds
+it too, while it uses a client of its own."""
 _ASLEEP = (
     pybullet.ACTIVATION_STATE_ENABLE_SLEEPING
     | pybullet.ACTIVATION_STATE_ENABLE_WAKEUP
@@ -46,7 +47,7 @@ class Bullet:
     @contextmanager
     def load(self, scene: PhysicsScene) -> Iterator[BulletSimulation]:
         """Load a scene in place of the one before; the engine is locked meanwhile."""
-        with _ENGINE_LOCK:
+        with ENGINE_LOCK:
             ids, client = self.builder.build(scene), self.builder.client
             for identity, body in zip(ids[1:], scene.bodies[1:], strict=True):
                 if body.moves:

@@ -9,10 +9,12 @@ from internav_data.verification.replay.elsewhere import TolerantExpect
 from internav_data.verification.replay.expert_replay import check_expert
 from internav_data.verification.replay.outcomes import check_outcomes
 from internav_data.verification.replay.settling import check_settling
+from internav_data.verification.replay.whole_house import ENGINE, check_whole_house, is_sampled
 
 if TYPE_CHECKING:
     from internav_data.records import Episode
     from internav_data.verification.findings import FindingCollector
+    from internav_data.verification.obstacles import Expect
     from internav_data.verification.replay.checked_scene import CheckedScene
 
 
@@ -44,4 +46,17 @@ def _replay(scene: CheckedScene, episode: Episode, report: FindingCollector) -> 
     if episode.expert is None:
         report.notes["no expert stored: not checked"] += 1
     check_expert(scene, episode, expect)
+    if made == here and is_sampled(episode):
+        _check_house(scene, episode, expect, report)
     report.counts["replayed"] += 1
+
+
+def _check_house(
+    scene: CheckedScene, episode: Episode, expect: Expect, report: FindingCollector
+) -> None:
+    """Build the episode's house, unless another engine made the data than builds houses here."""
+    if episode.physics.engine != ENGINE:
+        report.notes[f"whole houses are built in {ENGINE} alone: not checked"] += 1
+        return
+    check_whole_house(scene.layout.house, scene.layout.shapes, episode, expect)
+    report.counts["whole houses"] += 1

@@ -78,6 +78,7 @@ class ExpertReplay:
             result.success, "physics.expert-action", f"{what} to succeed", result.reason
         ):
             return False
+        self._check_fixed(before, what)
         if action in TURNS:
             self._quarter = (self._quarter + TURNS[action]) % 4
         elif action == MOVE:
@@ -112,6 +113,17 @@ class ExpertReplay:
             not near, "physics.expert-clear", f"nothing within {KEEP_M} m until {what}", near
         )
         self._trail = [self._node]
+
+    def _check_fixed(self, before: Sequence[MovableObject], what: str) -> None:
+        """Check that an action moved nothing that can be neither pushed nor picked up."""
+        for k, (was, now) in enumerate(zip(before, self._world.items, strict=True)):
+            if was.pose != now.pose:
+                self._expect(
+                    now.dynamics.pushable or now.dynamics.pickable,
+                    "physics.expert-fixed",
+                    f"{what}: item {k} ({now.asset.asset_id}) stays, which is fixed",
+                    "moved",
+                )
 
     def _check_reach(self, item: MovableObject, what: str) -> None:
         """Check that the target of an interaction lay within reach."""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from shapely import Geometry
 
-    from internav_data.records import Episode, Outcome, Pose
+    from internav_data.records import Asset, Episode, Outcome, Pose
     from internav_data.verification.obstacles import Expect
     from internav_data.verification.replay.checked_scene import Arrangement, CheckedScene
     from internav_data.world import MovableObject, World
@@ -40,6 +40,7 @@ def check_outcomes(scene: CheckedScene, episode: Episode, expect: Expect) -> Non
         for outcome in obstacle.outcomes or ():
             what = f"obstacle {number} ({obstacle.asset_id}), {outcome.action}"
             check = OutcomeCheck(scene, episode, outcome, what, expect)
+            check.fixed_stay()
             if outcome.action == PICK_OUTCOME:
                 check.pick(world, first + number)
             elif outcome.action in PUSH_OUTCOMES:
@@ -64,6 +65,18 @@ class OutcomeCheck:
         """Check one predicate: that two values are equal, unless `holds` is given."""
         true = expected == got if holds is None else holds
         return self._expect(true, f"physics.outcome-{name}", f"{self.what}: {expected}", got)
+
+    def fixed_stay(self) -> None:
+        """Check that nothing moved that the agent can neither push nor pick up."""
+        assets, house = self.scene.assets, self.scene.layout.house
+        furniture = {o.object_id for o in house.objects if _is_movable(assets[o.asset_id])}
+        for other in self.outcome.moved or ():
+            if other.obstacle is not None:
+                own = self.episode.obstacles[other.obstacle]
+                name, movable = f"obstacle {other.obstacle}", own.pushable or own.pickable
+            else:
+                name, movable = f"object {other.object_id}", other.object_id in furniture
+            self.expect("fixed", f"{name} stays, for it is fixed", "moved", holds=movable)
 
     def push(self, world: World, index: int) -> None:
         """Push an obstacle again and compare."""
@@ -176,3 +189,8 @@ class OutcomeCheck:
             self.expect("path-m-after", stated, stated)
         else:
             self.expect("path-m-after", f"{path.length():.4f} m", stated, holds=False)
+
+
+def _is_movable(asset: Asset) -> bool:
+    """Return whether furniture of an asset can move: a type of obstacles that can be handled."""
+    return asset.spawnable and (asset.pushable or asset.pickable)
