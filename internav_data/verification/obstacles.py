@@ -11,7 +11,7 @@ from internav_data.verification.overlaps import (
     DEPTH_M,
     WALL_ID,
     Solids,
-    intruded,
+    intrusions,
     overlapping_plans,
 )
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from internav_data.records import Episode, Obstacle
     from internav_data.verification.checked_layout import CheckedLayout
     from internav_data.verification.findings import FindingCollector
+    from internav_data.verification.shapes import Slab
 
 MAX_SETTLE_S = 1.0
 MAX_PENETRATION_M = 0.002
@@ -52,7 +53,7 @@ def check_obstacles(
     expect(count > 0, "episode.obstacle-count", "at least one obstacle", count)
     segments = max((len(path.points) - 1 for path in episode.node_paths), default=0)
     footprints: list[list[Geometry]] = []
-    solids: list[Solids] = []
+    bodies: list[tuple[int, list[Slab]]] = []
     for number, obstacle in enumerate(episode.obstacles):
         what = f"obstacle {number} ({obstacle.asset_id})"
         known = obstacle.asset_id in layout.shapes.assets
@@ -76,8 +77,8 @@ def check_obstacles(
         )
         footprints.append(layout.shapes.footprint(obstacle.asset_id, obstacle.pose))
         _check_place(layout, footprints, number, what, expect)
-        solids.append(Solids.of([(number, slabs)]))
-        _check_hull(layout, solids, what, expect)
+        bodies.append((number, slabs))
+    _check_hulls(layout, episode, Solids.of(bodies), expect)
     physics = episode.physics
     if episode.obstacles:
         slowest = max(o.settle_s for o in episode.obstacles)
@@ -148,21 +149,26 @@ def _check_place(
         )
 
 
-def _check_hull(layout: CheckedLayout, solids: list[Solids], what: str, expect: Expect) -> None:
-    """Check the last obstacle in space: a footprint leaves out what lies below 2 cm."""
-    *others, own = solids
-    hits = intruded(own, layout.solids)
-    names = ["a wall" if owner == WALL_ID else f"object {owner}" for owner in hits]
-    expect(
-        not hits,
-        "obstacle.overlap-house-3d",
-        f"{what} nowhere over {DEPTH_M} m inside the house's walls and objects",
-        f"inside {', '.join(names)}",
-    )
-    for other, solid in enumerate(others):
+def _check_hulls(layout: CheckedLayout, episode: Episode, own: Solids, expect: Expect) -> None:
+    """Check the obstacles in space: footprints leave out what lies below 2 cm."""
+    names = [f"obstacle {k} ({o.asset_id})" for k, o in enumerate(episode.obstacles)]
+    clear = f"nowhere over {DEPTH_M} m inside"
+    hits = intrusions(own, layout.solids)
+    for number, name in enumerate(names):
+        within = [b for a, b in hits if a == number]
+        things = ", ".join("a wall" if b == WALL_ID else f"object {b}" for b in within)
         expect(
-            not intruded(own, solid),
+            not within,
+            "obstacle.overlap-house-3d",
+            f"{name} {clear} the house's walls and objects",
+            f"inside {things}",
+        )
+    pairs = intrusions(own, own)
+    for number, name in enumerate(names):
+        within = [b for a, b in pairs if a == number]
+        expect(
+            not within,
             "obstacle.overlap-3d",
-            f"{what} nowhere over {DEPTH_M} m inside obstacle {other}",
-            "inside it",
+            f"{name} {clear} another obstacle",
+            f"inside {', '.join(names[b] for b in within)}",
         )

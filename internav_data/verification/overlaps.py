@@ -114,41 +114,43 @@ class Solids:
     def of(bodies: Iterable[tuple[int, Sequence[Slab]]]) -> Solids:
         """Gather bodies, each with its number."""
         owned = [(owner, slab) for owner, slabs in bodies for slab in slabs]
-        boxes = [(*s.corners.min(axis=0), *s.corners.max(axis=0)) for _, s in owned]
-        return Solids(
-            tuple(slab for _, slab in owned),
-            tuple(owner for owner, _ in owned),
-            np.array(boxes, dtype=np.float64).reshape(-1, 6),
-        )
+        boxes = np.empty((len(owned), 6))
+        if owned:
+            corners = [slab.corners for _, slab in owned]
+            stacked, first = np.vstack(corners), np.cumsum([0, *map(len, corners[:-1])])
+            boxes[:, :3] = np.minimum.reduceat(stacked, first)
+            boxes[:, 3:] = np.maximum.reduceat(stacked, first)
+        return Solids(tuple(s for _, s in owned), tuple(owner for owner, _ in owned), boxes)
 
-    def near(self, others: Solids, grow: Floats) -> list[tuple[int, int]]:
+    def near(self, others: Solids, grow: Sequence[float]) -> list[tuple[int, int]]:
         """Return index pairs of slabs whose boxes share a point, in order.
 
-        `grow` (6,) widens these boxes: downwards, then upwards along x, y and z, metres.
+        `grow` widens these boxes along x, y and z, downwards, then upwards, metres (6 numbers).
         """
-        if not self.slabs or not others.slabs:
-            return []
-        mine = self.boxes + grow * (-1.0, -1.0, -1.0, 1.0, 1.0, 1.0)
-        # First all of them as one box, which few of a house's slabs meet.
-        low, high = mine[:, :3].min(axis=0), mine[:, 3:].max(axis=0)
-        some = np.flatnonzero(
-            ((others.boxes[:, :3] <= high) & (others.boxes[:, 3:] >= low)).all(axis=1)
-        )
-        there = others.boxes[some]
-        meet = (mine[:, None, :3] <= there[None, :, 3:]) & (mine[:, None, 3:] >= there[None, :, :3])
-        return [(int(a), int(some[b])) for a, b in np.argwhere(meet.all(axis=2))]
+        meet = np.ones((len(self.slabs), len(others.slabs)), dtype=bool)
+        for axis in range(3):
+            low = self.boxes[:, axis] - grow[axis]
+            high = self.boxes[:, axis + 3] + grow[axis + 3]
+            meet &= low[:, None] <= others.boxes[:, axis + 3]
+            meet &= high[:, None] >= others.boxes[:, axis]
+        return [(int(a), int(b)) for a, b in np.argwhere(meet)]
 
 
-def intruded(first: Solids, second: Solids, depth_m: float = DEPTH_M) -> list[int]:
-    """Return the bodies of `second`, ascending, in which a slab of `first` is over `depth_m` deep.
+def intrusions(first: Solids, second: Solids, depth_m: float = DEPTH_M) -> list[tuple[int, int]]:
+    """Return pairs of bodies (of first, of second), ascending, over `depth_m` in each other.
 
-    Slabs count in space, at all heights: also those that no footprint holds.
+    Slabs count in space, at all heights: also those that no footprint holds. Bodies of one and the
+    same set are compared once, the higher number first, and never with themselves.
     """
-    found: set[int] = set()
-    for a, b in first.near(second, np.full(6, -depth_m)):
-        owner = second.owners[b]
-        if owner not in found and hulls_overlap(
-            first.slabs[a].corners, second.slabs[b].corners, depth_m
+    found: set[tuple[int, int]] = set()
+    for a, b in first.near(second, (-depth_m,) * 6):
+        pair = first.owners[a], second.owners[b]
+        if pair in found or (first is second and pair[0] <= pair[1]):
+            continue
+        one, two = first.slabs[a], second.slabs[b]
+        # Plans first: boxes of turned parts often meet, and a linear programme takes a millisecond.
+        if shapely.intersects(one.plan, two.plan) and hulls_overlap(
+            one.corners, two.corners, depth_m
         ):
-            found.add(owner)
+            found.add(pair)
     return sorted(found)

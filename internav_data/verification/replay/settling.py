@@ -117,7 +117,7 @@ def clearance_m(scene: CheckedScene, asset_id: str, spot: Pose, earlier: Sequenc
     own = Solids.of([(0, shapes.slabs(asset_id, spot))])
     others = [scene.layout.solids]
     others += [Solids.of([(0, shapes.slabs(b.asset.asset_id, b.pose))]) for b in earlier]
-    grow = np.array([gap, gap, gap, gap, gap, gap + FALL_M])
+    grow = (gap, gap, gap, gap, gap, gap + FALL_M)
     least = gap + SPOT_M
     for other in others:
         for a, b in own.near(other, grow):
