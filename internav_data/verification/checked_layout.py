@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from internav_data.records import House
     from internav_data.verification.shapes import Shapes, Slab
 
+MAX_LAYOUTS = 8
+"""Maximum number of cached layouts without some furniture: visibility graphs are large."""
 MAX_PATHS = 64
 """Maximum number of room paths, and of node paths, that are listed."""
 
@@ -56,6 +58,7 @@ class CheckedLayout:
         self.blockers = self.walls + [plan for plans in self.footprints.values() for plan in plans]
         self.lattice = CheckedLattice(self.blockers, self.outline)
         self._room_paths: dict[tuple[int, int], tuple[RoomPaths, bool]] = {}
+        self._without: dict[frozenset[int], CheckedLayout] = {}
 
     @cached_property
     def wall_slabs(self) -> list[Slab]:
@@ -79,9 +82,17 @@ class CheckedLayout:
         return Solids.of([(WALL_ID, self.wall_slabs), *objects])
 
     def without(self, gone: frozenset[int]) -> CheckedLayout:
-        """Return the layout without some of the house's objects (ids)."""
-        remaining = tuple(t for t in self.house.objects if t.object_id not in gone)
-        return CheckedLayout(replace(self.house, objects=remaining), self.shapes, self.footprints)
+        """Return the layout without some of the house's objects (ids); the last ones are kept."""
+        if not gone:
+            return self
+        if gone not in self._without:
+            if len(self._without) >= MAX_LAYOUTS:
+                del self._without[next(iter(self._without))]
+            remaining = tuple(t for t in self.house.objects if t.object_id not in gone)
+            self._without[gone] = CheckedLayout(
+                replace(self.house, objects=remaining), self.shapes, self.footprints
+            )
+        return self._without[gone]
 
     @cached_property
     def components(self) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:

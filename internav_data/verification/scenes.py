@@ -9,6 +9,7 @@ from internav_data.verification.episodes import check_episode
 from internav_data.verification.findings import FindingCollector
 from internav_data.verification.houses import check_doors, check_rooms, check_walls
 from internav_data.verification.objects import check_objects, check_passages
+from internav_data.verification.outcomes import check_outcomes
 from internav_data.verification.surfaces import SINCE, check_surfaces
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
     from internav_data.records import Episode, House
     from internav_data.verification.checked_config import CheckedConfig
+    from internav_data.verification.outcomes import Scope
     from internav_data.verification.shapes import Shapes
 
 UNTRUE = "geometry not as stated: physics not checked"
@@ -37,13 +39,14 @@ def check_scene(
         The house; its own `assets` are ignored.
     episodes
         Episodes of that house. The finely cut visibility graph is built for the one in the
-        middle of them.
+        middle of them, and distances after its outcomes are derived.
     shapes
         Shapes of the assets of the dataset; share them between scenes.
     file
         Path of the episodes' file, for findings.
     physics
-        Generation settings for the level `physics`; None to omit it.
+        Generation settings for the level `physics`, at which the distances after all outcomes
+        are derived; None to omit it.
     catalogue_version
         Version of the dataset's catalogue: early ones had thick rugs, and things overhung.
 
@@ -57,8 +60,12 @@ def check_scene(
     if layout is not None:
         sound = not report.by_predicate
         for number, episode in enumerate(episodes):
-            holds = check_episode(layout, episode, report, exact=number == len(episodes) // 2)
+            middle = number == len(episodes) // 2
+            holds = check_episode(layout, episode, report, exact=middle)
             report.counts["episodes"] += 1
+            if holds:
+                scope: Scope = "all" if physics is not None else "sample" if middle else "poses"
+                check_outcomes(layout, episode, report, scope)
             if sound and holds:
                 true.append(episode)
     if physics is not None:

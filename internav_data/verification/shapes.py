@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull, Delaunay, QhullError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -101,6 +101,25 @@ def solid_of(part: Part) -> Solid:
     return Solid(corners, _hull_edges(corners))
 
 
+FILLED = {"box": 1.0, "cylinder": math.pi / 4.0, "sphere": math.pi / 6.0}
+"""Share of its bounding box that a round part fills: for its mass it is round, not a polyhedron."""
+
+
+def _volume(part: Part) -> tuple[float, Floats]:
+    """Return the volume of a part, m³, and its centroid in its asset's frame, (3,) metres."""
+    if part.shape != "hull":
+        return FILLED[part.shape] * math.prod(part.size), np.array(part.centre)
+    corners = solid_of(part).corners
+    try:
+        tetrahedra = corners[Delaunay(corners).simplices]
+    except (QhullError, ValueError):  # flat: it weighs nothing
+        return 0.0, np.array(part.centre)
+    edges = tetrahedra[:, 1:] - tetrahedra[:, :1]
+    volumes = np.abs(np.einsum("ki,ki->k", edges[:, 0], np.cross(edges[:, 1], edges[:, 2]))) / 6.0
+    total = float(volumes.sum())
+    return total, np.asarray(volumes @ tetrahedra.mean(axis=1) / total)
+
+
 def _hulls(groups: Sequence[Floats]) -> list[Geometry]:
     """Return the convex hulls in the plane of groups of points (n, 2), in one call."""
     if not groups:
@@ -157,12 +176,22 @@ class Shapes:
     def __init__(self, assets: Mapping[str, Asset]) -> None:
         self.assets = assets
         self._solids: dict[str, tuple[Solid, ...]] = {}
+        self._middles: dict[str, Floats] = {}
 
     def solids(self, asset_id: str) -> tuple[Solid, ...]:
         """Return the polyhedra of an asset's parts, in its own frame."""
         if asset_id not in self._solids:
             self._solids[asset_id] = tuple(solid_of(p) for p in self.assets[asset_id].parts)
         return self._solids[asset_id]
+
+    def centre_of_mass(self, asset_id: str) -> Floats:
+        """Return the centre of mass of an asset in its own frame, (3,), rounded to 0.1 mm."""
+        if asset_id not in self._middles:
+            parts = [_volume(part) for part in self.assets[asset_id].parts]
+            moment = np.sum([volume * centroid for volume, centroid in parts], axis=0)
+            total = sum(volume for volume, _ in parts)
+            self._middles[asset_id] = np.round(moment / total, 4) if total else np.zeros(3)
+        return self._middles[asset_id]
 
     def _placed(self, asset_id: str, pose: Pose) -> list[tuple[Floats, Ints]]:
         solids = self.solids(asset_id)

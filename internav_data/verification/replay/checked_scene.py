@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     from internav_data.verification.checked_layout import CheckedLayout
     from internav_data.world import MovableObject
 
-MAX_LAYOUTS = 8
-"""Maximum number of cached layouts without some furniture: visibility graphs are large."""
-
 
 @dataclass(frozen=True, slots=True)
 class Arrangement:
@@ -44,7 +41,6 @@ class CheckedScene:
         self.config = config
         self.assets: dict[str, Asset] = dict(layout.shapes.assets)
         self.model = HouseModel.of(replace(layout.house, assets=self.assets))
-        self._layouts: dict[frozenset[int], CheckedLayout] = {}
         self._footprints: dict[tuple[str, Pose], tuple[Geometry, ...]] = {}
         self._spans: dict[tuple[str, Pose], tuple[float, float]] = {}
 
@@ -79,7 +75,8 @@ class CheckedScene:
             pose = at[k]
             if pose is not None:
                 obstacles += self.footprint(items[k].asset.asset_id, pose)
-        return Arrangement(self._without(frozenset(moved)), tuple(obstacles))
+        gone = frozenset(self.model.object_ids[k] for k in moved)
+        return Arrangement(self.layout.without(gone), tuple(obstacles))
 
     def footprint(self, asset_id: str, pose: Pose) -> tuple[Geometry, ...]:
         """Return the footprint of an asset, computed once for each pose."""
@@ -112,14 +109,3 @@ class CheckedScene:
         slabs = self.layout.shapes.slabs(asset_id, pose)
         plans = np.array([slab.plan for slab in slabs], dtype=object)
         return float(shapely.distance(plans, Point(point)).min())
-
-    def _without(self, moved: frozenset[int]) -> CheckedLayout:
-        """Return the layout without some of the movable furniture (indices of items)."""
-        if not moved:
-            return self.layout
-        if moved not in self._layouts:
-            if len(self._layouts) >= MAX_LAYOUTS:
-                del self._layouts[next(iter(self._layouts))]
-            gone = frozenset(self.model.object_ids[k] for k in moved)
-            self._layouts[moved] = self.layout.without(gone)
-        return self._layouts[moved]

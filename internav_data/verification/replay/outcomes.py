@@ -91,7 +91,9 @@ class OutcomeCheck:
             ends: dict[int, Pose | None] = {index: pushed.pose, **dict(pushed.moved)}
             self._poses(pushed.pose, pushed.moved, at_rest=pushed.at_rest)
             self._not_sunk(world, ends)
-            self._distances(world, ends)
+            if outcome.moved is None or not self.scene.config.same_hardware:
+                # Else the stored poses are these, and give the distances without physics.
+                self._distances(world, ends)
         else:
             self._poses(None, (), at_rest=pushed.at_rest)
 
@@ -102,8 +104,7 @@ class OutcomeCheck:
         else:
             reason = "something rests on it" if self.carries(world.items, index) else ""
         self._poses(None, (), at_rest=True)
-        if self._ends(reason, 0.0, 0.0) and not reason:
-            self._distances(world, {index: None})
+        self._ends(reason, 0.0, 0.0)
 
     def _ends(self, reason: str, displacement_m: float, seconds: float) -> bool:
         """Check reason, displacement and time; return whether success is as stated."""
