@@ -44,7 +44,7 @@ class Commands(click.Group):
 Examples:
   camp-eval runs/camp-0                                a trained run on the test split
   camp-eval runs/camp-0 data/mine                      on another dataset
-  camp-eval expert,shortest_path,random                what bounds every column
+  camp-eval expert,blind,shortest_path,random          what bounds every column
   camp-eval compare runs/camp-* runs/ppo-*             methods against each other, over seeds
   camp-eval evaluate --help                            all options of the first two
 
@@ -64,10 +64,10 @@ Examples:
   camp-eval runs/camp-0
   camp-eval runs/camp-0 data/mine --greedy --video --out results/greedy
   camp-eval runs/camp-0 data/mine --filter "room_count<=3" --filter "mode=blocked"
-  camp-eval expert,shortest_path,random data/mine --split val --limit 200
+  camp-eval expert,blind,shortest_path data/mine --split val --limit 200
 
 \b
-RUN is a folder that camp-train wrote, or some of expert, shortest_path,
+RUN is a folder that camp-train wrote, or some of expert, blind, shortest_path,
 random with commas between them. DATASET defaults to the folder that INTERNAV_DATASET names,
 else internav-dataset. Written: episodes.parquet and evaluation.json for each,
 tables.md, tables.json, report.html.""",

@@ -70,6 +70,12 @@ workers gives the same bytes.""",
     help="Keep episodes without an expert, marked by a null, rather than draw them again.",
 )
 @click.option(
+    "--blind-expert",
+    is_flag=True,
+    default=None,
+    help="Store the run of an expert that knows types' averages only, and learns by failing.",
+)
+@click.option(
     "--push-model",
     type=click.Choice(["force", "kick", "step"]),
     help="200 N up to 2 m/s; 2 m/s at once for every mass; or 200 N held at 0.5 m/s for 0.22 m.  "
@@ -104,6 +110,7 @@ def command(
     executor: str,
     unseen_assets: bool | None,
     keep_unsolvable: bool | None,
+    blind_expert: bool | None,
     push_model: str | None,
     attributes: str | None,
     strength: float | None,
@@ -121,6 +128,7 @@ def command(
         episodes_per_scene=episodes_per_scene,
         episodes__unseen_assets=unseen_assets,
         episodes__keep_unsolvable=keep_unsolvable,
+        episodes__blind_expert=blind_expert,
         world__push_model=push_model,
         catalog__attributes=attributes,
         catalog__strength=strength,

@@ -17,10 +17,12 @@ from internav_data.records import Episode
 from internav_data.records.errors import CorruptDataError, UsageError
 
 if TYPE_CHECKING:
+    from internav_data.camp.config import ExpertColumn
     from internav_data.core.typing import Bools
     from internav_data.dataset import Dataset
     from internav_data.envs.slot import EpisodeSnapshot
     from internav_data.envs.types import Actions, Observations
+    from internav_data.records import Expert
 
 Experts = Callable[[str], Sequence[int]]
 """Function of an episode's id that returns its expert's actions."""
@@ -29,14 +31,24 @@ Experts = Callable[[str], Sequence[int]]
 MAX_GRAD_NORM: Final = 0.5
 
 
-def experts_of(dataset: Dataset[Episode]) -> Experts:
-    """Return the experts of a dataset; to ask for one that is missing raises a UsageError."""
+def experts_of(dataset: Dataset[Episode], column: ExpertColumn = "expert") -> Experts:
+    """Return the experts of a dataset; to ask for one that is missing raises a UsageError.
+
+    Parameters
+    ----------
+    dataset
+        Episodes.
+    column
+        Column that holds them.
+
+    """
     from internav_data.envs.source import open_source  # noqa: PLC0415 - the camera's kernels
 
     source = open_source(dataset)
 
     def actions(episode_id: str) -> Sequence[int]:
-        expert = source.episode(source.number_of(episode_id)).expert
+        episode = source.episode(source.number_of(episode_id))
+        expert: Expert | None = getattr(episode, column)
         if expert is None:
             raise UsageError(
                 f"episode {episode_id} has no expert to clone: generate the dataset with "

@@ -11,6 +11,8 @@ from internav_data.core import config as values
 from internav_data.core.config import MAX_SEED, Bounds, check_bounds
 from internav_data.records.errors import UsageError
 
+ExpertColumn = Literal["expert", "blind_expert"]
+"""Column of episodes that holds the expert to clone."""
 Intent = Literal["integrated", "policy", "recursive", "none"]
 TrainPreset = Literal["paper", "small"]
 INTERACTION_ACTIONS: Final = 11
@@ -124,6 +126,9 @@ class PPOConfig:
 class CloningConfig:
     """Cloning the dataset's expert (`--pretrain bc`)."""
 
+    expert: ExpertColumn = "expert"
+    """Expert to clone: the one that knows everything, or, where the dataset holds it, the one that
+    learns by failing (`generate --blind-expert`)."""
     frames: Annotated[int, Bounds(1)] = 150_000
     """Number of expert frames in an epoch."""
     epochs: Annotated[int, Bounds(1)] = 4

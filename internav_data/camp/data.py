@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from internav_data.camp.agents.protocol import Agent
-from internav_data.camp.config import CampConfig
+from internav_data.camp.config import CampConfig, ExpertColumn
 from internav_data.camp.policy import AgentPolicy
 from internav_data.camp.stages import TrainingStage
 from internav_data.dataset import Dataset, load_dataset
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from internav_data.envs.loop import Environments
 
 _SINGLE = ("room_count", "==", 1)
-_WITH_EXPERT = ("expert", "is not", None)
 _MEANS = ("success", "spl", "sts", "distance_m", "steps")
 
 
@@ -34,6 +33,8 @@ class TrainingData:
         A folder that `internav-gen generate` wrote.
     where
         Conditions on columns, as in "shortest_path_m<=6".
+    expert
+        Column of the experts to clone.
 
     Raises
     ------
@@ -43,7 +44,10 @@ class TrainingData:
         The dataset has no training episodes, or no outcomes.
     """
 
-    def __init__(self, path: Path, where: Sequence[str] = ()) -> None:
+    def __init__(
+        self, path: Path, where: Sequence[str] = (), expert: ExpertColumn = "expert"
+    ) -> None:
+        self._expert = expert
         self.path, self._where = path, [condition(text) for text in where]
         episodes = self.episodes()
         if any(obstacle.outcomes is None for obstacle in episodes[0].obstacles):
@@ -89,11 +93,13 @@ class TrainingData:
             None of them has one.
         """
         everything = self.episodes()
-        found = load_dataset(self.path, "train", [*self._where, _WITH_EXPERT])
+        blind = self._expert == "blind_expert"
+        option = "with --blind-expert" if blind else "without --keep-unsolvable"
+        found = load_dataset(self.path, "train", [*self._where, (self._expert, "is not", None)])
         if not len(found):
             raise UsageError(
-                f"{self.path}: none of {len(everything)} training episodes has an expert to clone; "
-                "generate some without --keep-unsolvable, or train without --pretrain bc"
+                f"{self.path}: none of {len(everything)} training episodes has an expert to clone "
+                f"(column {self._expert}); generate some {option}, or train without --pretrain bc"
             )
         # A dataset without gaps keeps its own fingerprint, and its houses stay loaded.
         return everything if len(found) == len(everything) else found

@@ -96,7 +96,7 @@ class Trainer:
         # Nothing here draws from torch's own generator, but a user's agent may.
         draws = generator(seed, Purpose.TRAINING, attempt=TrainingStream.TORCH)
         torch.manual_seed(int(draws.integers(2**62)))
-        self.data = TrainingData(request.dataset, config.data.filter)
+        self.data = TrainingData(request.dataset, config.data.filter, config.cloning.expert)
         self.agent = make_agent(self.method, config)
         self.stages = self._schedule()
         for stage in self.stages:
@@ -219,7 +219,9 @@ class Trainer:
         optimiser = torch.optim.Adam(learner.optimised(), stage.rate)
         source: Collector | Demonstrations = Collector(env, learner, seed)
         if stage.clones:
-            source = Demonstrations(env, learner, experts_of(self.data.demonstrated))
+            source = Demonstrations(
+                env, learner, experts_of(self.data.demonstrated, self.config.cloning.expert)
+            )
         if self._checkpoint is not None and self.state.done:
             tensors, progress = self._checkpoint.training, self._checkpoint.progress
             source.state, episode_starts = unpack(

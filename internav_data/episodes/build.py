@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from internav_data.episodes.spawn import EpisodeDraft, spawn
 from internav_data.geometry import round_m
 from internav_data.navigation import SPACING_M, node_paths
 from internav_data.physics import get_solver
+from internav_data.planner.blind import run_blind
 from internav_data.planner.search import solve
 from internav_data.records import (
     Episode,
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
 
     from internav_data.catalog.attributes import HiddenAttributes
     from internav_data.episodes.spawn import Spawned
+    from internav_data.planner.beliefs import TypeBelief
     from internav_data.records import Asset, Expert, House, Outcome, Redraw
     from internav_data.world.config import WorldConfig
 
@@ -72,6 +74,7 @@ def build_episodes(
     first: int = 0,
     attempt: int = 0,
     hidden: HiddenAttributes | None = None,
+    beliefs: Mapping[str, TypeBelief] | None = None,
 ) -> tuple[Episode, ...]:
     """Build the episodes first … first + count - 1 of a house.
 
@@ -94,6 +97,9 @@ def build_episodes(
         Sub-seed: 0 unless an earlier attempt at the scene failed.
     hidden
         Distribution of the obstacles' attributes; None where their look tells them.
+    beliefs
+        Beliefs about the catalogue's types (`planner.beliefs.type_beliefs`) of the blind expert;
+        None for no such expert.
 
     Raises
     ------
@@ -104,7 +110,11 @@ def build_episodes(
 
     """
     batch = build_batch(
-        house, count, pool, config, world_config, first=first, attempt=attempt, hidden=hidden
+        *(house, count, pool, config, world_config),
+        first=first,
+        attempt=attempt,
+        hidden=hidden,
+        beliefs=beliefs,
     )
     return batch.episodes
 
@@ -119,20 +129,30 @@ def build_batch(
     first: int = 0,
     attempt: int = 0,
     hidden: HiddenAttributes | None = None,
+    beliefs: Mapping[str, TypeBelief] | None = None,
 ) -> EpisodeBatch:
     """Build episodes and count the discarded draws.
 
     Parameters and errors as in `build_episodes`.
     """
     config = config or EpisodeConfig()
+    settings = _WorldSettings(world_config, beliefs)
     site = SpawnSite.of(house, hidden)
     redraws: Counter[Redraw] = Counter()
     episodes = []
     for index in range(first, first + count):
-        episode, again = _build_episode(site, index, pool, config, world_config, attempt)
+        episode, again = _build_episode(site, index, pool, config, settings, attempt)
         episodes.append(episode)
         redraws += again
     return EpisodeBatch(tuple(episodes), dict(sorted(redraws.items())))
+
+
+class _WorldSettings(NamedTuple):
+    """Settings of all worlds of a batch."""
+
+    world_config: WorldConfig
+    beliefs: Mapping[str, TypeBelief] | None
+    """Beliefs of the blind expert; None for no such expert."""
 
 
 def mode_of(scene: int, index: int) -> Mode:
@@ -148,14 +168,14 @@ def _build_episode(
     index: int,
     pool: Sequence[Asset],
     config: EpisodeConfig,
-    world_config: WorldConfig,
+    settings: _WorldSettings,
     attempt: int,
 ) -> tuple[Episode, Counter[Redraw]]:
     """Draw until an episode is complete; return it and the reasons of the discarded draws."""
     house = site.house
     again: Counter[Redraw] = Counter()
     for draw in range(config.max_redraws):
-        drawn = _draw(site, index, pool, config, world_config, (house.scene, attempt, index, draw))
+        drawn = _draw(site, index, pool, config, settings, (house.scene, attempt, index, draw))
         if isinstance(drawn, Episode):
             return drawn, again
         again[drawn] += 1
@@ -172,7 +192,7 @@ def _draw(
     index: int,
     pool: Sequence[Asset],
     config: EpisodeConfig,
-    world_config: WorldConfig,
+    settings: _WorldSettings,
     key: tuple[int, int, int, int],
 ) -> Episode | Redraw:
     """Draw a start, a goal and obstacles: return an episode, or the reason to draw again."""
@@ -195,7 +215,7 @@ def _draw(
         [obstacle.body for obstacle in draft.obstacles],
         (*draft.start, yaw_deg // 90),
         draft.goal,
-        world_config,
+        settings.world_config,
         config.engine,
         [obstacle.affordance for obstacle in draft.obstacles],
     )
@@ -203,7 +223,8 @@ def _draw(
     expert = solve(world)
     if expert is None and not config.keep_unsolvable:
         return "no expert"
-    return _recorded(draft, index, world, expert)
+    blind = None if settings.beliefs is None else run_blind(world, settings.beliefs).expert
+    return _recorded(draft, index, world, expert, blind)
 
 
 def _draw_endpoints(
@@ -276,7 +297,9 @@ def _point(node: tuple[int, int]) -> tuple[float, float]:
     return SPACING_M * node[0], SPACING_M * node[1]
 
 
-def _recorded(draft: EpisodeDraft, index: int, world: World, expert: Expert | None) -> Episode:
+def _recorded(
+    draft: EpisodeDraft, index: int, world: World, expert: Expert | None, blind: Expert | None
+) -> Episode:
     """Turn a finished draft into an episode; its predicates are judged on the rounded poses."""
     # The lattice distance is known from spawning; outcomes need both distances before any of them.
     house, obstructed_path_m = draft.site.house, world.obstructed_path_m()
@@ -307,6 +330,7 @@ def _recorded(draft: EpisodeDraft, index: int, world: World, expert: Expert | No
         obstacles=tuple(map(_obstacle, draft.obstacles, outcomes, relevant, movable)),
         expert=expert,
         physics=_physics(draft),
+        blind_expert=blind,
     )
 
 

@@ -41,6 +41,9 @@ class EpisodeConfig:
     """Keep episodes for which the expert finds no plan, their `expert` null; else draw again."""
     engine: str = DEFAULT_ENGINE
     """Physics engine of settling, outcomes, expert and environments; `bullet` is the only one."""
+    blind_expert: bool = False
+    """Store the run of an expert that knows the averages of types, not an object's own mass,
+    friction and fixedness, and learns by failing."""
     unseen_assets: bool = False
     """Each split draws its obstacles from its own share of the assets (2/3, 1/6, 1/6)."""
 

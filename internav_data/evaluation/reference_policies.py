@@ -1,4 +1,4 @@
-"""Reference policies: the dataset's expert, the shortest path without interaction, chance."""
+"""Reference policies: the dataset's expert, a blind one, the shortest path, chance."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ if TYPE_CHECKING:
     from internav_data.evaluation.evaluator import Policy
     from internav_data.navigation import Lattice
     from internav_data.records import Episode
+    from internav_data.world import World
 
     LatticeNode = tuple[int, int]
     ActionPlanner = Callable[[Episode], Sequence[int]]
 
-REFERENCE_POLICIES: Final = ("expert", "shortest_path", "random")
+REFERENCE_POLICIES: Final = ("expert", "blind", "shortest_path", "random")
 """Names of the reference policies."""
 _DIRECTIONS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))
 _TURNS: Final[tuple[tuple[int, ...], ...]] = (
@@ -49,6 +50,8 @@ def reference_policy(name: str, dataset: Dataset[Episode]) -> Policy:
         return RandomPolicy()
     if name == "shortest_path":
         return ScriptedPolicy(name, shortest_path_planner(dataset))
+    if name == "blind":
+        return ScriptedPolicy(name, blind_planner(dataset))
     if name == "expert":
         expert = dataset.to_table(["expert"]).column("expert")
         if len(expert) and expert.null_count == len(expert):
@@ -127,6 +130,31 @@ def expert_actions(episode: Episode) -> Sequence[int]:
     return (int(Action.DONE),) if episode.expert is None else episode.expert.actions
 
 
+def blind_planner(dataset: Dataset[Episode]) -> ActionPlanner:
+    """Return a planner that knows types' averages and learns by failing (`planner.blind`).
+
+    A run that is stored in the dataset is played again. Where the goal cannot be reached, it walks
+    to the node in reach that is nearest to it.
+    """
+    from internav_data.envs.source import open_source  # noqa: PLC0415 - the camera's kernels
+    from internav_data.planner.beliefs import type_beliefs  # noqa: PLC0415
+    from internav_data.planner.blind import run_blind  # noqa: PLC0415
+    from internav_data.world import World  # noqa: PLC0415
+
+    source = open_source(dataset)
+    config = source.world_config
+    beliefs = type_beliefs(dataset.assets.values(), config.push_spec)
+
+    def plan(episode: Episode) -> Sequence[int]:
+        if episode.blind_expert is not None:
+            return episode.blind_expert.actions
+        model = source.loaded_house(episode).model
+        run = run_blind(World.of_episode(model, episode, dataset.assets, config), beliefs)
+        return run.actions if run.reached else (*run.actions, *_approach(run.world))
+
+    return plan
+
+
 def shortest_path_planner(dataset: Dataset[Episode]) -> ActionPlanner:
     """Return a planner of shortest lattice paths among objects as they lie."""
     from internav_data.envs.source import open_source  # noqa: PLC0415 - the camera's kernels
@@ -136,13 +164,17 @@ def shortest_path_planner(dataset: Dataset[Episode]) -> ActionPlanner:
 
     def plan(episode: Episode) -> Sequence[int]:
         model = source.loaded_house(episode).model
-        world = World.of_episode(model, episode, dataset.assets)
-        start, goal = (world.i, world.j), world.goal
-        if world.lattice.distance(start, goal) is None:
-            goal = nearest(world.lattice, model.lattice, start, goal)
-        return [*shortest(world.lattice, (*start, world.quarter), goal), int(Action.DONE)]
+        return _approach(World.of_episode(model, episode, dataset.assets))
 
     return plan
+
+
+def _approach(world: World) -> list[int]:
+    """Return the actions to the goal, or to the node in reach that is nearest to it, and Done."""
+    start, goal = (world.i, world.j), world.goal
+    if world.lattice.distance(start, goal) is None:
+        goal = nearest(world.lattice, world.model.lattice, start, goal)
+    return [*shortest(world.lattice, (*start, world.quarter), goal), int(Action.DONE)]
 
 
 def nearest(lattice: Lattice, clear: Lattice, start: LatticeNode, goal: LatticeNode) -> LatticeNode:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from internav_data.catalog import Catalogue
     from internav_data.dataset import Staging
     from internav_data.generation.config import GenerationConfig
+    from internav_data.planner.beliefs import TypeBelief
     from internav_data.records import Asset, Episode, House, Split
 
 ATTEMPTS = 3
@@ -60,13 +61,17 @@ def build_scene(
     from internav_data.houses import build_house  # noqa: PLC0415 - as above
 
     reason, hidden = "", hidden_attributes(config.catalog, catalogue)
+    beliefs = beliefs_for(catalogue, config)
     for attempt in range(ATTEMPTS):
         try:
             house = build_house(config.seed, scene, config.house, catalogue, attempt, hidden=hidden)
             count = config.episodes_of(house.split) if episodes is None else episodes
             pool = obstacle_pool(catalogue, config, house.split)
             made = build_batch(
-                house, count, pool, config.episodes, config.world, attempt=attempt, hidden=hidden
+                *(house, count, pool, config.episodes, config.world),
+                attempt=attempt,
+                hidden=hidden,
+                beliefs=beliefs,
             )
         except QuarantineError as error:
             reason = str(error)
@@ -82,6 +87,15 @@ def obstacle_pool(catalogue: Catalogue, config: GenerationConfig, split: Split) 
     if not config.episodes.unseen_assets:
         return catalogue.spawnable
     return tuple(asset for asset in catalogue.spawnable if split_of_asset(asset) == split)
+
+
+def beliefs_for(catalogue: Catalogue, config: GenerationConfig) -> Mapping[str, TypeBelief] | None:
+    """Return what a blind expert believes about the catalogue's types; None if none is stored."""
+    from internav_data.planner.beliefs import type_beliefs  # noqa: PLC0415 - one option only
+
+    if not config.episodes.blind_expert:
+        return None
+    return type_beliefs(catalogue.assets.values(), config.world.push_spec)
 
 
 def scene_maker(payload: ScenePayload) -> Callable[[int], int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from internav_data.generation.config import GenerationConfig
-from internav_data.generation.scenes import ATTEMPTS, asset_folders, obstacle_pool
+from internav_data.generation.scenes import ATTEMPTS, asset_folders, beliefs_for, obstacle_pool
 from internav_data.records.errors import QuarantineError, UsageError
 
 if TYPE_CHECKING:
@@ -98,6 +98,7 @@ def generate_episodes(
                 first=first,
                 attempt=attempt,
                 hidden=hidden,
+                beliefs=beliefs_for(assets, config),
             )
         except QuarantineError as error:
             reason = str(error)

@@ -10,10 +10,12 @@ import numpy as np
 
 from internav_data.navigation import SPACING_M, grid
 from internav_data.planner.cost_to_go import bucket_dijkstra, descend
+from internav_data.planner.knowledge import NO_KNOWLEDGE
 from internav_data.records.agent import CLEARANCE_M
 
 if TYPE_CHECKING:
     from internav_data.core.typing import Costs, Ints, Masks
+    from internav_data.planner.knowledge import Knowledge
     from internav_data.world import HouseModel, MovableObject, World
 
 MAX_OBJECTS: Final = 62
@@ -67,16 +69,18 @@ class PlanningProblem:
     """Index in the world of the object of each bit."""
     goals: Ints
     """The four poses at the goal, (4,) int64."""
+    risks: Ints
+    """Price added to that of moving each object, (62,) int64: see `Knowledge.risks`."""
 
     @staticmethod
-    def of(world: World) -> PlanningProblem:
-        """Return the planning problem of a world."""
+    def of(world: World, knowledge: Knowledge = NO_KNOWLEDGE) -> PlanningProblem:
+        """Return the planning problem of a world, to an agent of some knowledge."""
         nx, ny = world.model.lattice.shape
         movable: list[int] = []
         lasting: list[int] = []
         for k, item in enumerate(world.items):
             able = item.dynamics.pushable or item.dynamics.pickable
-            (movable if able else lasting).append(k)
+            (movable if able and k not in knowledge.immovable else lasting).append(k)
         ends = (world.position, world.goal_point)
         first = len(world.model.items)
         # Obstacles first, then what is nearest to either end.
@@ -90,7 +94,10 @@ class PlanningProblem:
             flat[_blocked_indices(world.items[k], nx, ny)] = 1
         goal = 4 * (world.goal[0] * ny + world.goal[1])
         goals = np.arange(goal, goal + 4, dtype=np.int64)
-        return PlanningProblem(ny, (nx, ny), fixed, tuple(ranked[:MAX_OBJECTS]), goals)
+        risks = np.zeros(MAX_OBJECTS, dtype=np.int64)
+        for bit, k in enumerate(ranked[:MAX_OBJECTS]):
+            risks[bit] = knowledge.risks.get(k, 0)
+        return PlanningProblem(ny, (nx, ny), fixed, tuple(ranked[:MAX_OBJECTS]), goals, risks)
 
     def masks(self, world: World) -> Ints:
         """Return the bits of the objects that block each node and edge, (3, nodes) int64."""
@@ -107,12 +114,12 @@ class PlanningProblem:
 
         Picking up costs more while the hand is full.
         """
-        prices = np.zeros(MAX_OBJECTS, dtype=np.int64)
+        prices = self.risks.copy()
         full = DROP_PRICE if world.held >= 0 else 0
         furniture = len(world.model.items)
         for bit, k in enumerate(self.objects):
             pickable = world.items[k].dynamics.pickable
-            prices[bit] = PICK_PRICE + full if pickable else PUSH_PRICE
+            prices[bit] += PICK_PRICE + full if pickable else PUSH_PRICE
             # Furniture stands in groups and along walls: its pushes are slow to solve and seldom
             # help.
             prices[bit] += FURNITURE_PRICE if k < furniture else 0

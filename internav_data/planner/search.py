@@ -29,6 +29,7 @@ import numpy as np
 
 from internav_data.navigation import SPACING_M
 from internav_data.planner.cost_to_go import FAR, viewpoints
+from internav_data.planner.knowledge import NO_KNOWLEDGE, coarse_position
 from internav_data.planner.problem import EVERYTHING, PICK_PRICE, PlanningProblem
 from internav_data.planner.push_heuristic import clearing_pushes, path_marks
 from internav_data.records import Expert
@@ -41,13 +42,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from internav_data.core.typing import Costs, Ints
-    from internav_data.records import Asset, Episode, Pose
+    from internav_data.planner.knowledge import Knowledge
+    from internav_data.records import Asset, Episode
     from internav_data.world import HouseModel
     from internav_data.world.config import WorldConfig
-
-
-ALIKE_M: Final = 0.05
-"""Resolution of the search's notion of equal worlds: positions are rounded to it, metres."""
 
 
 @dataclass(slots=True, eq=False)
@@ -106,11 +104,8 @@ class Candidate:
     """`SearchState.last` of the world after it."""
     penalty: int = 0
     """`SearchState.penalty` of the world after it."""
-
-
-def coarse_position(pose: Pose | None) -> tuple[int, ...]:
-    """Return an object's position in units of `ALIKE_M`; () for a held one."""
-    return () if pose is None else (round(pose.x / ALIKE_M), round(pose.y / ALIKE_M))
+    index: int = -1
+    """Index of the object acted on."""
 
 
 def bits_in_order(entered: Iterable[int]) -> tuple[int, ...]:
@@ -187,7 +182,7 @@ _AGENTS_FAULT: Final = ("the agent is in the way", "would come to lie on the age
 _PUSHES: Final = (Action.PUSH_LEFT, Action.PUSH_RIGHT, Action.PUSH_AHEAD, Action.PUSH_BACK)
 
 
-def search(world: World, limit: int) -> tuple[int, ...] | None:
+def search(world: World, limit: int, knowledge: Knowledge = NO_KNOWLEDGE) -> tuple[int, ...] | None:
     """Find actions that end with Done at the goal.
 
     A pure function of the world, bounded by counts and never by time.
@@ -198,6 +193,8 @@ def search(world: World, limit: int) -> tuple[int, ...] | None:
         World to begin in; it is not changed.
     limit
         Maximum number of actions, Done included.
+    knowledge
+        Facts that the world does not show; for agents that act in another one.
 
     Returns
     -------
@@ -205,12 +202,13 @@ def search(world: World, limit: int) -> tuple[int, ...] | None:
         Numbers of the actions; None if no plan was found.
 
     """
-    return _BestFirstSearch(world, limit).run()
+    return _BestFirstSearch(world, limit, knowledge).run()
 
 
 class _BestFirstSearch:
-    def __init__(self, world: World, limit: int) -> None:
-        self.problem = PlanningProblem.of(world)
+    def __init__(self, world: World, limit: int, knowledge: Knowledge) -> None:
+        self.problem = PlanningProblem.of(world, knowledge)
+        self.knowledge = knowledge
         self.best: tuple[int, ...] | None = None
         self.bound = limit + 1
         """Length below which a plan is an improvement."""
@@ -371,7 +369,9 @@ class _BestFirstSearch:
                 if last != state.last and not clears[last[1]]:
                     penalty += UNLIKELY_PENALTY
             f_cost = state.spent + cost + 1 + penalty
-            entry = Candidate(state, pose, horizon, action, back, entry, f_cost, last, penalty)
+            entry = Candidate(
+                state, pose, horizon, action, back, entry, f_cost, last, penalty, index
+            )
         if entry is not None:
             self._push(entry.f_cost, _RANKS[action], entry)
 
@@ -390,7 +390,7 @@ class _BestFirstSearch:
         for k in nodes:
             for pose in range(4 * k, 4 * k + 4):
                 cost = int(reach[pose]) + int(after[pose]) + 2 + state.penalty
-                entry = Candidate(state, pose, horizon, Action.DROP, back)
+                entry = Candidate(state, pose, horizon, Action.DROP, back, index=state.world.held)
                 self._push(state.spent + cost, _RANKS[Action.DROP], entry)
 
     def _attempt(self, entry: Candidate) -> None:
@@ -400,6 +400,10 @@ class _BestFirstSearch:
             return
         world = state.world.copy()
         self._place(world, entry.pose, entry.horizon)
+        if self.knowledge.excludes(world, entry.action, entry.index):
+            if entry.fallback is not None:
+                self._push(entry.fallback.f_cost, _RANKS[entry.action], entry.fallback)
+            return
         result = world.step(entry.action)
         # The push of an object alone is cached: finding it too heavy costs next to nothing.
         if result.cause != "too heavy":

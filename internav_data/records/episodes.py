@@ -156,7 +156,10 @@ class Obstacle:
 
 @dataclass(frozen=True, slots=True)
 class Expert:
-    """Demonstration: actions that reach the goal, replayed before they were stored."""
+    """Demonstration: actions that reach the goal, replayed before they were stored.
+
+    All actions of `Episode.expert` succeed; of `Episode.blind_expert` interactions may fail.
+    """
 
     actions: tuple[int, ...]
     """Numbers of the actions, the last one Done."""
@@ -237,6 +240,9 @@ class Episode:
     """Actions that reach the goal; null where none were found."""
     physics: Physics
     """Engine and settle certificates."""
+    blind_expert: Expert | None = None
+    """Actions of an agent that knows no object's mass, friction or fixedness and learns by failing,
+    its failed interactions among them; null where none was asked for, or it missed the goal."""
 
     @property
     def interactive(self) -> bool:

@@ -78,6 +78,14 @@ OUTCOME_RULES: Mapping[str, Rule] = {
     "moved.element.object_id": ID,
     **{f"moved.element.pose.{n}": rule for n, rule in POSE_RULES.items()},
 }
+EXPERTS = ("expert", "blind_expert")
+EXPERT_RULES = {
+    "actions.element": Rule(0, 11),
+    "steps": Rule(1, 500),
+    "pushes": Rule(0, 500),
+    "picks": Rule(0, 500),
+    "path_m": Rule(0.0, 125.0, digits=2),
+}
 EPISODE_RULES: Mapping[str, Rule] = {
     "episode_id": Rule(pattern=r"scene-\d{6,}/\d{4,}"),
     "scene_id": SCENE,
@@ -109,11 +117,7 @@ EPISODE_RULES: Mapping[str, Rule] = {
     "obstacles.element.settle_s": FROM_ZERO,
     "obstacles.element.settle_penetration_m": FROM_ZERO,
     **{f"obstacles.element.outcomes.element.{n}": rule for n, rule in OUTCOME_RULES.items()},
-    "expert.actions.element": Rule(0, 11),
-    "expert.steps": Rule(1, 500),
-    "expert.pushes": Rule(0, 500),
-    "expert.picks": Rule(0, 500),
-    "expert.path_m": Rule(0.0, 125.0, digits=2),
+    **{f"{name}.{part}": rule for name in EXPERTS for part, rule in EXPERT_RULES.items()},
     "physics.engine": NAME,
     "physics.build": WORDS,
     "physics.settle_s": FROM_ZERO,

@@ -269,10 +269,14 @@ def test_an_episode_without_expert_is_refused(houses, config, monkeypatch):
     monkeypatch.setattr(Source, "episode", lambda *_: bare)
     with pytest.raises(UsageError, match="has no expert to clone"):
         experts_of(dataset)(bare.episode_id)
+    blind = dataclasses.replace(bare, blind_expert=dataset[0].expert)
+    monkeypatch.setattr(Source, "episode", lambda *_: blind)
+    assert experts_of(dataset, "blind_expert")(bare.episode_id) == blind.blind_expert.actions
 
 
 def test_episodes_without_an_expert_are_skipped_and_counted(houses, config, tmp_path):
     """One of a house's two episodes has none, as `--keep-unsolvable` leaves them."""
+    from internav_data.camp.data import TrainingData
     from internav_data.camp.logging import ProgressReporter
     from internav_data.camp.run import begin
     from internav_data.camp.train import Request
@@ -304,5 +308,7 @@ def test_episodes_without_an_expert_are_skipped_and_counted(houses, config, tmp_
     row, line = clone("some", bare)
     assert row["without_expert"] == len(bare) - 1
     assert f"{len(bare) - 1} episodes without an expert skipped" in line
+    with pytest.raises(UsageError, match=r"column blind_expert\); generate some with --blind-exp"):
+        TrainingData(tmp_path / "some", expert="blind_expert").demonstrated  # noqa: B018
     with pytest.raises(UsageError, match=r"none of .* training episodes has an expert"):
         clone("none", [dataclasses.replace(each, expert=None) for each in bare])

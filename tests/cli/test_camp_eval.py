@@ -122,7 +122,7 @@ def test_episodes_can_be_chosen(call, dataset, tmp_path):
 @pytest.mark.parametrize(
     ("words", "code", "expected"),
     [
-        (("best", "DATA"), 2, ["best", "expert, shortest_path, random"]),
+        (("best", "DATA"), 2, ["best", "expert, blind, shortest_path, random"]),
         (("random,best", "DATA"), 2, ["random,best"]),
         (("random", "nowhere"), 5, ["nowhere"]),
         (("random", "DATA", "--split", "dev"), 2, ["--split"]),

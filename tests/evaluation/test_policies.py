@@ -184,5 +184,5 @@ def test_names_of_rows(played_data):
 
 
 def test_who_is_neither_run_nor_reference_policy_is_told_so(played_data):
-    with pytest.raises(UsageError, match=r"no-such-run.*expert, shortest_path, random"):
+    with pytest.raises(UsageError, match=r"no-such-run.*expert, blind, shortest_path, random"):
         candidate("no-such-run", played_data, SHORT)

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import networkx as nx
 import numpy as np
 import pytest
@@ -24,7 +26,7 @@ INTERACTIONS = set(range(Action.PUSH_AHEAD, Action.DROP + 1))
 
 @pytest.fixture(scope="module")
 def rows(played_data):
-    names = ("expert", "shortest_path", "random")
+    names = ("expert", "blind", "shortest_path", "random")
     return {name: evaluate(reference_policy(name, played_data), played_data) for name in names}
 
 
@@ -38,6 +40,19 @@ def test_the_expert_does_what_is_stored_and_solves_all(played_data, rows):
     assert (values["success"], values["distance_m"], values["isr"]) == (1.0, 0.0, 1.0)
     for result, episode in zip(rows["expert"], played_data, strict=True):
         assert result.path_m == pytest.approx(episode.expert.path_m)
+
+
+def test_the_blind_policy_lies_between_the_shortest_path_and_the_expert(rows):
+    success = {name: summary(rows[name]).values["success"] for name in rows}
+    assert success["shortest_path"] < success["blind"] <= success["expert"]
+
+
+def test_a_stored_run_of_the_blind_expert_is_played_again(played_data):
+    from internav_data.evaluation.reference_policies import blind_planner
+
+    episode = played_data[0]
+    stored = replace(episode, blind_expert=replace(episode.expert, actions=(1, 11)))
+    assert tuple(blind_planner(played_data)(stored)) == (1, 11)
 
 
 def test_the_shortest_path_policy_touches_nothing_and_walks_the_shortest_way(played_data, rows):
@@ -70,7 +85,8 @@ def test_where_cut_off_the_shortest_path_policy_walks_as_near_as_it_can(played_d
 def test_bounds_lie_as_they_should(rows):
     """The shortest path bounds those who do not interact; the expert all on the lattice."""
     for group in ("all", "blocked", "non-interactive"):
-        expert, shortest_path, chance = (summary(rows[name], group).values for name in rows)
+        names = ("expert", "shortest_path", "random")
+        expert, shortest_path, chance = (summary(rows[name], group).values for name in names)
         for name in ("success", "spl", "sts"):
             assert expert[name] >= shortest_path[name] >= chance[name]
         assert expert["distance_m"] <= shortest_path["distance_m"] <= chance["distance_m"]
@@ -145,7 +161,7 @@ def test_chance_is_even_and_of_the_episode(played_data, rows):
 
 
 def test_unknown_reference_policies_and_missing_experts(played_data, monkeypatch):
-    with pytest.raises(UsageError, match=r"expert, shortest_path, random"):
+    with pytest.raises(UsageError, match=r"expert, blind, shortest_path, random"):
         reference_policy("best", played_data)
     import pyarrow as pa
 

@@ -16,7 +16,9 @@ from internav_data.generation.run import identity_for
 from internav_data.generation.scenes import ATTEMPTS, build_scene, obstacle_pool
 from internav_data.records.errors import QuarantineError, UsageError, ValidationError
 
-CONFIG = load_config(overrides=["episodes_per_scene=2", "house.rooms=1-2"])
+CONFIG = load_config(
+    overrides=["episodes_per_scene=2", "house.rooms=1-2", "episodes.blind_expert=true"]
+)
 
 
 @pytest.fixture(scope="module")

@@ -35,7 +35,7 @@ WITHOUT_RULE = {
 }
 """Columns that only the geometry or another row restricts, and the predicate that finds a wrong
 value; colours are any bytes."""
-MUTATED_BY_PARTS = {"start", "goal", "expert", "physics"}
+MUTATED_BY_PARTS = {"start", "goal", "expert", "blind_expert", "physics"}
 """Columns of episodes that have tables of mutations, or tests, of their own."""
 
 

@@ -185,6 +185,22 @@ def test_expert_cannot_be(scenes, case):
     assert f"expert.{predicate}" in judged(episode)
 
 
+@pytest.mark.parametrize("case", [name for name in EXPERTS if name != "dropped unpicked"])
+def test_blind_expert_cannot_be(scenes, case):
+    change, predicate = EXPERTS[case]
+    expert = scenes[0][1][0].expert
+    blind = replace(scenes[0][1][0], blind_expert=expert)
+    assert judged(blind) == set()
+    episode = replace(blind, blind_expert=replace(expert, **change(expert)))
+    assert f"blind_expert.{predicate}" in judged(episode)
+
+
+def test_a_blind_expert_may_fail_to_drop(scenes):
+    expert = scenes[0][1][0].expert
+    failing = replace(expert, actions=(10, *expert.actions), steps=expert.steps + 1)
+    assert judged(replace(scenes[0][1][0], blind_expert=failing)) == set()
+
+
 def test_two_picks_without_a_drop(scenes):
     expert = scenes[2][1][0].expert
     twice = replace(expert, actions=(9, *expert.actions), steps=expert.steps + 1, picks=2)

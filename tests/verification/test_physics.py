@@ -354,6 +354,28 @@ def test_expert_does_not_get_there(scenes, case):
     assert found == {"physics.expert-action"}
 
 
+@pytest.mark.parametrize("case", EXPERTS)
+def test_blind_expert_does_not_get_there(scenes, case):
+    scene, index, edit = EXPERTS[case]
+    episode = scenes[scene][1][index]
+    edited = expert_changed(scenes, scene, index, edit)[scene][1][index].expert
+    seeing = changed(scenes, scene, index, blind_expert=episode.expert)
+    assert not found_in(seeing, scene, index)
+    wrong = changed(scenes, scene, index, blind_expert=edited)
+    found = found_in(wrong, scene, index)
+    # A push that moves nothing may be: what shows is that the way stays closed.
+    assert found
+    assert found <= {"physics.blind-expert-action", "physics.blind-expert-goal"}
+
+
+def test_a_failed_interaction_of_a_blind_expert_is_no_untruth(scenes):
+    expert = scenes[0][1][0].expert
+    assert 9 not in expert.actions
+    failing = replace(expert, actions=(9, *expert.actions), steps=expert.steps + 1, picks=1)
+    assert not found_in(changed(scenes, 0, 0, blind_expert=failing), 0, 0)
+    assert found_in(changed(scenes, 0, 0, expert=failing), 0, 0) == {"physics.expert-action"}
+
+
 def test_a_detour_is_no_untruth(scenes):
     assert not found_in(expert_changed(scenes, 2, 1, lambda actions: [1, 2, *actions]), 2, 1)
 

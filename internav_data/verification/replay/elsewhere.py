@@ -26,7 +26,7 @@ KINDS: Final = frozenset((
     *("physics.outcome-reason", "physics.outcome-success", "physics.outcome-opened"),
 ))  # fmt: skip
 """Predicates of kinds of results, beside all those of experts."""
-_EXPERT: Final = "physics.expert-"
+_EXPERTS: Final = ("physics.expert-", "physics.blind-expert-")
 
 
 class TolerantExpect:
@@ -45,17 +45,18 @@ class TolerantExpect:
         self._episode, self._report = episode, report
         self._differing: set[str] = set()
         outcomes = sum(len(obstacle.outcomes or ()) for obstacle in episode.obstacles)
-        compared = len(episode.obstacles) + outcomes + (episode.expert is not None)
+        compared = len(episode.obstacles) + outcomes
+        compared += (episode.expert is not None) + (episode.blind_expert is not None)
         report.counts["compared"] += compared
 
     def __call__(self, holds: object, predicate: str, expected: object, got: object) -> bool:
         """Count one predicate and return whether it holds."""
         name = self._episode.episode_id
-        if holds or not (predicate in MEASURES | KINDS or predicate.startswith(_EXPERT)):
+        if holds or not (predicate in MEASURES | KINDS or predicate.startswith(_EXPERTS)):
             return self._report.expect(holds, predicate, expected, got, name)
         if predicate not in MEASURES:
-            expert = predicate.startswith(_EXPERT)
-            subject = _EXPERT if expert else str(expected).partition(":")[0]
+            expert = [prefix for prefix in _EXPERTS if predicate.startswith(prefix)]
+            subject = expert[0] if expert else str(expected).partition(":")[0]
             if subject not in self._differing:
                 self._differing.add(subject)
                 self._report.differ(predicate, expected, got, name)

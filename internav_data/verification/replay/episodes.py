@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from internav_data.physics import cache_disabled, get_solver
 from internav_data.verification.replay.elsewhere import TolerantExpect
-from internav_data.verification.replay.expert_replay import check_expert
+from internav_data.verification.replay.expert_replay import check_experts
 from internav_data.verification.replay.outcomes import check_outcomes
 from internav_data.verification.replay.settling import check_settling
 from internav_data.verification.replay.whole_house import ENGINE, check_whole_house, is_sampled
@@ -45,7 +45,7 @@ def _replay(scene: CheckedScene, episode: Episode, report: FindingCollector) -> 
     check_outcomes(scene, episode, expect)
     if episode.expert is None:
         report.notes["no expert stored: not checked"] += 1
-    check_expert(scene, episode, expect)
+    check_experts(scene, episode, expect)
     if made == here and is_sampled(episode):
         _check_house(scene, episode, expect, report)
     report.counts["replayed"] += 1
