@@ -133,11 +133,11 @@ def test_sub_seeds_are_tried_before_a_scene_is_given_up(monkeypatch, room, fails
             if attempt < fails:
                 raise QuarantineError(f"attempt {attempt}")
 
-    def build_house(seed, scene, _config, _catalogue, attempt):
+    def build_house(seed, scene, _config, _catalogue, attempt, **_):
         refused("build_house", attempt)
         return scene_stubs.house(seed, scene)
 
-    def build_batch(house, count, _pool, _config, *, attempt):
+    def build_batch(house, count, _pool, _config, _world, *, attempt, **_):
         refused("build_batch", attempt)
         made = tuple(scene_stubs.episode(house, index) for index in range(count))
         return SimpleNamespace(episodes=made, redraws={})
