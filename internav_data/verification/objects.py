@@ -48,6 +48,7 @@ def check_objects(
     within = {room: shapely.buffer(shape, DEPTH_M) for room, shape in rooms.items()}
     shapely.prepare(list(within.values()))
     groups = {scene_object.object_id: scene_object.group for scene_object in house.objects}
+    blocks = {t.object_id: shapes.assets[t.asset_id].blocks for t in house.objects}
     own = layout.object_slabs
     for scene_object in house.objects:
         name = f"object {scene_object.object_id} ({scene_object.asset_id})"
@@ -67,8 +68,8 @@ def check_objects(
         _check_support(house, scene_object, own, report)
 
     def may_interlock(a: int, b: int) -> bool:
-        """Return whether two owners are of one group, as a chair under its table."""
-        return a != WALL_ID and groups[a] >= 0 and groups[a] == groups[b]
+        """Return whether one of two owners is a rug on which the other stands, in one group."""
+        return a != WALL_ID and groups[a] == groups[b] >= 0 and not (blocks[a] and blocks[b])
 
     for a, b in overlapping_slabs(slabs, owners, may_interlock):
         what = "a wall" if a == WALL_ID else f"object {a}"

@@ -509,11 +509,21 @@ def test_room_cut_off_by_furniture(tmp_path, scenes):
     assert "house.reachable" in predicates(findings), findings.summary()
 
 
-def test_things_of_a_group_may_interlock(tmp_path, scenes):
-    house = scenes[0][0]
-    beside = scene_object(3, "Box_2", 0, 1.0, 0.5, group=1)
-    together = (replace(house.objects[0], group=1), *house.objects[1:], beside)
-    assert judged(tmp_path, change_house(scenes, 0, objects=together)).ok
+@pytest.mark.parametrize(
+    ("asset_id", "y", "holds"),
+    [("Box_2", 0.5, True), ("Box_2", 0.93, False), ("Pole_1", 0.5, False), ("Rug_0", 0.9, True)],
+)
+def test_things_of_a_group_stand_under_each_other_not_in_each_other(
+    tmp_path, scenes, asset_id, y, holds
+):
+    """Under a table, in its legs, through its top; and the table on a rug, which is floor."""
+    pole = builders.crate("Pole_1", (0.1, 0.1, 1.2))
+    rug = builders.crate("Rug_0", (1.6, 1.4, 0.004), blocks=False, spawnable=False)
+    house, assets = scenes[0][0], builders.by_id(*ASSETS.values(), pole, rug)
+    other = scene_object(3, asset_id, 0, 1.0 if holds else 1.5, y, group=1)
+    together = (replace(house.objects[0], group=1), *house.objects[1:], other)
+    findings = judged(tmp_path, change_house(scenes, 0, objects=together), assets)
+    assert ("object.overlap" not in predicates(findings)) == holds, findings.summary()
 
 
 def test_things_may_hang_on_walls(tmp_path, scenes):
