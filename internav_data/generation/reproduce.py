@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from internav_data.core.config import plain
 from internav_data.generation.run import identity_for
 from internav_data.generation.scenes import asset_folders, build_scene
 from internav_data.physics import cache_disabled
+from internav_data.records import House
 from internav_data.records.errors import UsageError, ValidationError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from internav_data.dataset import TableSpec
     from internav_data.generation.config import GenerationConfig
-    from internav_data.records import Asset, Episode, House
+    from internav_data.records import Asset, Episode
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,9 +87,12 @@ def scene_again(
 
 
 def record_values(record: House | Episode) -> dict[str, Any]:
-    """Return a record as plain values; fields that are not stored are left out."""
-    stored = [f.name for f in dataclasses.fields(record) if f.compare]
-    return {name: plain(getattr(record, name)) for name in stored}
+    """Return a record as the row of its table, which obeys the table's JSON Schema."""
+    from internav_data.dataset import EPISODES, SCENES, to_table  # noqa: PLC0415 - needs pyarrow
+
+    spec: TableSpec[Any] = SCENES if isinstance(record, House) else EPISODES
+    row: dict[str, Any] = to_table([record], spec).to_pylist()[0]
+    return row
 
 
 def _compare(

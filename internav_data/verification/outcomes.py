@@ -54,9 +54,7 @@ class _OutcomeCheck:
         self.layout = layout
         self.episode = episode
         self._report = report
-        self._objects: dict[int | None, str] = {
-            placed.object_id: placed.asset_id for placed in layout.house.objects
-        }
+        self._objects = {placed.object_id: placed for placed in layout.house.objects}
 
     @cached_property
     def _plans(self) -> list[list[Geometry]]:
@@ -90,11 +88,15 @@ class _OutcomeCheck:
         return math.dist(before[:2], after[:2])
 
     def _can_move(self, other: MovedObject) -> bool:
-        obstacles = self.episode.obstacles
         if other.obstacle is not None:
-            return 0 <= other.obstacle < len(obstacles)
-        asset = self.layout.shapes.assets.get(self._objects.get(other.object_id, ""))
-        return asset is not None and asset.spawnable and (asset.pushable or asset.pickable)
+            return 0 <= other.obstacle < len(self.episode.obstacles)
+        placed = self._objects.get(-1 if other.object_id is None else other.object_id)
+        if placed is None:
+            return False
+        asset = self.layout.shapes.assets[placed.asset_id]
+        own = placed.dynamics or asset.dynamics
+        of_obstacles = asset.spawnable or placed.affordance is not None
+        return of_obstacles and (own.pushable or own.pickable)
 
     def distances(self, scope: Scope) -> None:
         """Derive the distances after the outcomes of a scope."""
@@ -135,7 +137,7 @@ class _OutcomeCheck:
                 plans[other.obstacle] = shapes.footprint(asset_id, other.pose)
             elif other.object_id is not None:
                 gone.add(other.object_id)
-                plans.append(shapes.footprint(self._objects[other.object_id], other.pose))
+                plans.append(shapes.footprint(self._objects[other.object_id].asset_id, other.pose))
         return frozenset(gone), [plan for own in plans for plan in own]
 
     def _steps(

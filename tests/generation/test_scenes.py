@@ -5,11 +5,12 @@ import json
 from collections import Counter
 from types import SimpleNamespace
 
+import jsonschema
 import pytest
 import scene_stubs
 
 from internav_data.catalog import catalogue, split_of_asset
-from internav_data.dataset import stage_scene
+from internav_data.dataset import load_dataset, schemas, stage_scene
 from internav_data.generation import generate, generate_episodes, generate_house, load_config
 from internav_data.generation.reproduce import scene_again
 from internav_data.generation.run import identity_for
@@ -29,8 +30,6 @@ def dataset(tmp_path_factory):
 
 
 def test_generate_episodes_equals_the_dataset(dataset):
-    from internav_data.dataset import load_dataset
-
     held = [episode for episode in load_dataset(dataset) if episode.scene_id == "scene-000002"]
     house = generate_house(seed=0, scene=2, config=CONFIG)
     assert house == load_dataset(dataset).scene("scene-000002")
@@ -40,8 +39,6 @@ def test_generate_episodes_equals_the_dataset(dataset):
 
 def test_every_column_of_episodes_has_values(dataset):
     """A column that nothing fills is null in every row, which readers and rules allow."""
-    from internav_data.dataset import load_dataset
-
     table = load_dataset(dataset).to_table()
     empty = [name for name in table.column_names if table[name].null_count == len(table)]
     assert empty == []
@@ -109,6 +106,20 @@ def test_a_scene_again_is_compared(dataset, tmp_path):
         scene_again(other, 2, 1, dataset)
     with pytest.raises(UsageError, match="no episode"):
         scene_again(CONFIG, 2, 7, dataset)
+
+
+def test_what_is_printed_of_a_scene_obeys_the_published_schemas(dataset):
+    house, episode = (
+        jsonschema.Draft202012Validator(schemas()[f"{name}.schema.json"])
+        for name in ("scenes", "episodes")
+    )
+    one = json.loads(scene_again(CONFIG, 2, 1)[0])
+    whole = json.loads(scene_again(CONFIG, 2)[0])
+    episode.validate(one)
+    house.validate(whole["scene"])
+    assert [row["index"] for row in whole["episodes"]] == [0, 1]
+    assert whole["episodes"][1] == one
+    assert one in load_dataset(dataset).to_table().to_pylist()
 
 
 def test_a_dataset_with_other_values_is_reported(dataset, monkeypatch):
