@@ -49,6 +49,11 @@ def command(*, dataset: Path | None, split: str | None, as_json: bool) -> int:
         f"shortest_path_m: {_spread(stats['shortest_path_m'])}; "
         f"shortest_path_steps: {_spread(stats['shortest_path_steps'])}"
     )
+    if stats["pocket_share"] is not None:
+        click.echo(
+            f"starts: {stats['facing_wall_share']:.1%} face a wall or furniture, "
+            f"{stats['pocket_share']:.1%} reach fewer than 4 nodes"
+        )
     for line in interaction_lines(stats):
         click.echo(line)
     if stats["quarantined"]:
@@ -86,6 +91,8 @@ def interaction_lines(stats: dict[str, Any]) -> list[str]:
         f"{_spread(expert['steps'])}; {expert['pushes']:.2f} pushes, {expert['picks']:.2f} picks; "
         f"SPL {expert['spl']:.3f}, STS {expert['sts']:.3f}"
     )
+    by_number = ", ".join(f"{number}: {count}" for number, count in expert["interactions"].items())
+    lines.append(f"experts by number of interactions: {by_number or 'none'}")
     again = ", ".join(f"{reason} {count}" for reason, count in stats["redraws"].items())
     lines.append(
         f"drawn again: {again or 'nothing'}; the expert refused {expert['refused_share']:.1%}"

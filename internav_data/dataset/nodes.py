@@ -32,6 +32,7 @@ WIDTHS: dict[str, str] = {
     "obstructed_path_steps": "int32",
     "path_steps_after": "int32",
     "steps": "int32",
+    "reachable_nodes": "int32",
     "group": "int16",
 }
 """Integers that are not ids or counts within one house; those are int16."""

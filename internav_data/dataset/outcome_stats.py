@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping  # noqa: TC003 - read at run time for the JSON Schema
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from internav_data.dataset.summary_statistics import Spread, mean, path_efficiency, share, spread
+from internav_data.dataset.summary_statistics import (
+    Spread,
+    counts,
+    mean,
+    path_efficiency,
+    share,
+    spread,
+)
 from internav_data.records.agent import SPACING_M
 
 if TYPE_CHECKING:
@@ -38,6 +46,8 @@ class ExpertRow:
     """Mean number of pushes of an expert."""
     picks: float
     """Mean number of pick-ups of an expert."""
+    interactions: Mapping[str, int]
+    """Experts by their number of pushes and pick-ups."""
     spl: float
     """Mean of shortest_path_m / max(path_m, shortest_path_m) over episodes; 0 without expert."""
     sts: float
@@ -129,6 +139,7 @@ def expert_row(table: pa.Table, manifest: Manifest) -> ExpertRow:
         steps=spread(steps),
         pushes=mean(pushes),
         picks=mean(picks),
+        interactions=counts(pa.chunked_array([pa.array(pushes + picks)])),
         spl=share(float(path_efficiency(shortest_path_m, path_m).sum()), len(solved)),
         sts=share(float((shortest_path_m / SPACING_M / steps).sum()), len(solved)),
         refused=manifest.redraws.get(REFUSED, 0),

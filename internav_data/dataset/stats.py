@@ -39,6 +39,9 @@ _SCALARS = (
         "obstructed_path_steps",
     ),
 )
+_START = tuple(f"start.{name}" for name in ("faces_wall", "reachable_nodes"))
+POCKET_NODES = 4
+"""Number of nodes within reach below which a start is in a pocket."""
 _OBSTACLES = tuple(
     f"obstacles.list.element.{n}" for n in ("type", "pushable", "pickable", "relevant")
 )
@@ -105,6 +108,11 @@ class Stats:
     shortest_path_steps: Spread
     detour_steps: Spread
     """Further steps of lengthened episodes: obstructed_path_steps - shortest_path_steps."""
+    facing_wall_share: float | None
+    """Share of starts whose first step ahead a wall or furniture blocks; null where no episode
+    states it, as in datasets of earlier releases."""
+    pocket_share: float | None
+    """Share of starts with fewer than 4 nodes within reach; null likewise."""
     expert: ExpertRow
     outcomes: tuple[OutcomeRow, ...]
     openable_share_of_blocked: float
@@ -146,7 +154,7 @@ def compute_stats(dataset: Any, split: str | None = None) -> dict[str, Any]:  # 
 
 def stats_of(root: StoreLike, manifest: Manifest, split: str | None = None) -> Stats:
     """Return the statistics of the files that a manifest names."""
-    names = [*_SCALARS, *_OBSTACLES, *EXPERT_COLUMNS, *OUTCOME_COLUMNS]
+    names = [*_SCALARS, *_START, *_OBSTACLES, *EXPERT_COLUMNS, *OUTCOME_COLUMNS]
     store = store_of(root)
     tables, kinds, outcomes = [_no_rows()], [_no_obstacles()], OutcomeCounts()
     for file in manifest.of("episodes", split):
@@ -160,7 +168,7 @@ def stats_of(root: StoreLike, manifest: Manifest, split: str | None = None) -> S
 
 def _flat_rows(table: pa.Table) -> pa.Table:
     """Return the columns of episodes, of the expert's what its figures need."""
-    return table.select([*_SCALARS, "expert"]).cast(_no_rows().schema)
+    return table.select([*_SCALARS, "start", "expert"]).cast(_no_rows().schema)
 
 
 def _flat_obstacles(column: pa.ListArray) -> pa.Table:
@@ -171,10 +179,13 @@ def _flat_obstacles(column: pa.ListArray) -> pa.Table:
 def _no_rows() -> pa.Table:
     """Return the columns of episodes without a row."""
     schema = EPISODES.schema
-    kind = schema.field("expert").type
-    parts = [kind.field(name.removeprefix("expert.")) for name in EXPERT_COLUMNS]
-    scalars = [schema.field(name) for name in _SCALARS]
-    return pa.schema([*scalars, pa.field("expert", pa.struct(parts))]).empty_table()
+    structs = [
+        pa.field(
+            name, pa.struct([schema.field(name).type.field(c.partition(".")[2]) for c in columns])
+        )
+        for name, columns in (("start", _START), ("expert", EXPERT_COLUMNS))
+    ]
+    return pa.schema([*(schema.field(name) for name in _SCALARS), *structs]).empty_table()
 
 
 def _no_obstacles() -> pa.Table:
@@ -199,6 +210,10 @@ def _stats(
     longer = detours.filter(pc.equal(table.column("mode"), "lengthened")).drop_null()
     push, pick = (kinds.column(name).to_numpy().astype(bool) for name in ("pushable", "pickable"))
     relevant = kinds.column("relevant").drop_null().to_numpy().astype(bool)
+    walls, nodes = (
+        pc.struct_field(table.column("start"), name.partition(".")[2]).drop_null().to_numpy()
+        for name in _START
+    )
     held = {k: v for k, v in manifest.counts.items() if split in (None, k)}
     return Stats(
         scenes=sum(count.scenes for count in held.values()),
@@ -219,6 +234,8 @@ def _stats(
         shortest_path_m=spread(table.column("shortest_path_m").to_numpy()),
         shortest_path_steps=spread(table.column("shortest_path_steps").to_numpy()),
         detour_steps=spread(longer.to_numpy()),
+        facing_wall_share=mean(walls) if len(walls) else None,
+        pocket_share=mean(nodes < POCKET_NODES) if len(nodes) else None,
         expert=expert_row(table, manifest),
         outcomes=outcomes.rows(),
         openable_share_of_blocked=share(outcomes.openable, int(blocked.sum())),

@@ -15,8 +15,8 @@ import numpy as np
 
 from internav_data.catalog.attributes import DRAWS
 from internav_data.episodes.config import EpisodeConfig
+from internav_data.episodes.idle import drop_idle, relevance_of
 from internav_data.episodes.outcomes import outcomes_of
-from internav_data.episodes.relevance import relevant_obstacles
 from internav_data.episodes.site import SpawnSite
 from internav_data.episodes.spawn import EpisodeDraft, spawn
 from internav_data.geometry import round_m
@@ -51,8 +51,8 @@ if TYPE_CHECKING:
 
 PAIRS = 64
 """Maximum number of pairs of nodes drawn for one start and goal; most are far enough apart."""
-QUARTER_TURNS = (0, 90, 180, 270)
-"""Headings of the agent at the start, degrees counter-clockwise from +x."""
+AHEAD = ((1, 0), (0, 1), (-1, 0), (0, -1))
+"""Step of the lattice straight ahead by quarter turns counter-clockwise from +x."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,24 +196,13 @@ def _draw(
     key: tuple[int, int, int, int],
 ) -> Episode | Redraw:
     """Draw a start, a goal and obstacles: return an episode, or the reason to draw again."""
-    # Two streams per draw: the obstacles' many numbers do not shift those of the start's heading.
-    seed = site.house.seed
-    place = generator(seed, Purpose.EPISODE, *key)
-    draft = _draw_endpoints(site, mode_of(site.house.scene, index), config, place)
-    if draft is None:
-        return "no two nodes far enough apart"
-    if site.hidden is not None:
-        count = config.max_obstacles_for(len(site.house.rooms))
-        numbers = generator(seed, Purpose.OBSTACLE_ATTRIBUTES, *key)
-        draft.attribute_draws = numbers.random((count, DRAWS))
-    if not spawn(draft, pool, generator(seed, Purpose.SPAWN, *key)):
-        return "condition not reached"
-    # Drawn last, from the first stream: spawning does not depend on the agent's heading.
-    yaw_deg = QUARTER_TURNS[int(place.integers(4))]
+    draft = _drawn(site, index, pool, config, key)
+    if not isinstance(draft, EpisodeDraft):
+        return draft
     world = World(
         site.model,
         [obstacle.body for obstacle in draft.obstacles],
-        (*draft.start, yaw_deg // 90),
+        (*draft.start, draft.quarter),
         draft.goal,
         settings.world_config,
         config.engine,
@@ -223,8 +212,40 @@ def _draw(
     expert = solve(world)
     if expert is None and not config.keep_unsolvable:
         return "no expert"
+    if expert is not None and expert.pushes + expert.picks < config.min_interactions:
+        return "too few interactions"
     blind = None if settings.beliefs is None else run_blind(world, settings.beliefs).expert
     return _recorded(draft, index, world, expert, blind)
+
+
+def _drawn(
+    site: SpawnSite,
+    index: int,
+    pool: Sequence[Asset],
+    config: EpisodeConfig,
+    key: tuple[int, int, int, int],
+) -> EpisodeDraft | Redraw:
+    """Return a draft whose obstacles fulfil the condition of its mode, or why there is none."""
+    # Two streams per draw: the obstacles' many numbers do not shift those of the start's heading.
+    seed = site.house.seed
+    place = generator(seed, Purpose.EPISODE, *key)
+    draft = _draw_endpoints(site, mode_of(site.house.scene, index), config, place)
+    if draft is None:
+        return "no two nodes far enough apart"
+    draft.quarter = int(place.integers(4))
+    if config.refuse_facing_wall and _faces_wall(draft):
+        return "start faces a wall"
+    if site.hidden is not None:
+        count = config.max_obstacles_for(len(site.house.rooms))
+        numbers = generator(seed, Purpose.OBSTACLE_ATTRIBUTES, *key)
+        draft.attribute_draws = numbers.random((count, DRAWS))
+    if not spawn(draft, pool, generator(seed, Purpose.SPAWN, *key)):
+        return "condition not reached"
+    if config.idle_obstacles == "drop" and not drop_idle(draft):
+        return "other rest without idle obstacles"
+    if _reachable_nodes(draft) < config.min_start_nodes:
+        return "start in a pocket"
+    return draft
 
 
 def _draw_endpoints(
@@ -297,6 +318,16 @@ def _point(node: tuple[int, int]) -> tuple[float, float]:
     return SPACING_M * node[0], SPACING_M * node[1]
 
 
+def _faces_wall(draft: EpisodeDraft) -> bool:
+    """Return whether a wall or furniture blocks the first step ahead from the start."""
+    return not draft.site.lattice.edge_free(*draft.start, *AHEAD[draft.quarter])
+
+
+def _reachable_nodes(draft: EpisodeDraft) -> int:
+    """Return the number of nodes that a draft's obstacles leave within reach of the start."""
+    return int(np.count_nonzero(draft.lattice.distances(*draft.start) >= 0))
+
+
 def _recorded(
     draft: EpisodeDraft, index: int, world: World, expert: Expert | None, blind: Expert | None
 ) -> Episode:
@@ -305,7 +336,7 @@ def _recorded(
     house, obstructed_path_m = draft.site.house, world.obstructed_path_m()
     outcomes = outcomes_of(world, (draft.steps, obstructed_path_m))
     movable = [world.moves_alone(index) for index in world.obstacles]
-    relevant = _relevant(draft)
+    relevant = relevance_of(draft)
     return Episode(
         episode_id=f"{house.scene_id}/{index:04d}",
         scene_id=house.scene_id,
@@ -321,7 +352,7 @@ def _recorded(
         shortest_path_steps=draft.shortest_path_steps,
         obstructed_path_m=obstructed_path_m,
         obstructed_path_steps=draft.steps,
-        start=Start(*draft.start, *_point(draft.start), 90 * world.quarter, draft.start_room),
+        start=_start(draft),
         goal=Goal(*draft.goal, *_point(draft.goal), draft.goal_room),
         room_paths=draft.room_paths,
         room_paths_truncated=draft.room_paths_truncated,
@@ -334,10 +365,15 @@ def _recorded(
     )
 
 
-def _relevant(draft: EpisodeDraft) -> tuple[bool, ...]:
-    """Return for each obstacle of a finished draft whether it is relevant."""
-    footprints = [obstacle.footprint for obstacle in draft.obstacles]
-    return relevant_obstacles(draft.site.lattice, footprints, draft.start, draft.goal, draft.steps)
+def _start(draft: EpisodeDraft) -> Start:
+    return Start(
+        *draft.start,
+        *_point(draft.start),
+        yaw_deg=90 * draft.quarter,
+        room=draft.start_room,
+        faces_wall=_faces_wall(draft),
+        reachable_nodes=_reachable_nodes(draft),
+    )
 
 
 def _obstacle(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal, get_args
 
 from internav_data.core.config import Bounds, check_bounds
 from internav_data.physics.engines import DEFAULT_ENGINE, ENGINES
 from internav_data.records.errors import UsageError
 
+IdleObstacles = Literal["keep", "drop"]
 ObstacleCount = Annotated[int, Bounds(1)]
 
 
@@ -39,6 +40,18 @@ class EpisodeConfig:
     """Maximum number of starts and goals tried for one episode."""
     keep_unsolvable: bool = False
     """Keep episodes for which the expert finds no plan, their `expert` null; else draw again."""
+    idle_obstacles: IdleObstacles = "keep"
+    """`keep` obstacles that are not relevant (docs/dataset.md), as the paper's procedure does, or
+    `drop` them before expert and outcomes."""
+    min_detour_steps: Annotated[int, Bounds(1)] = 2
+    """Minimum further steps of a lengthened path; 2 is any, as lattice detours are even."""
+    min_interactions: Annotated[int, Bounds(0)] = 0
+    """Minimum number of pushes and pick-ups of the expert; with fewer, start and goal are drawn
+    anew."""
+    refuse_facing_wall: bool = False
+    """Refuse starts whose first step ahead a wall or furniture blocks."""
+    min_start_nodes: Annotated[int, Bounds(1)] = 1
+    """Minimum number of nodes within reach of the start before any interaction."""
     engine: str = DEFAULT_ENGINE
     """Physics engine of settling, outcomes, expert and environments; `bullet` is the only one."""
     blind_expert: bool = False
@@ -53,14 +66,18 @@ class EpisodeConfig:
         Raises
         ------
         UsageError
-            A value is out of its bounds, or no engine has the name.
+            A value is out of its bounds, or none of those that the setting may have.
 
         """
         check_bounds(self, "{key}: expected {expected}, got {value}", "episodes.")
-        if self.engine not in ENGINES:
-            raise UsageError(
-                f"episodes.engine: expected one of {', '.join(ENGINES)}, got {self.engine!r}"
-            )
+        for key, value, known in (
+            ("engine", self.engine, ENGINES),
+            ("idle_obstacles", self.idle_obstacles, get_args(IdleObstacles)),
+        ):
+            if value not in known:
+                raise UsageError(
+                    f"episodes.{key}: expected one of {', '.join(known)}, got {value!r}"
+                )
 
     def max_obstacles_for(self, room_count: int) -> int:
         """Return the maximum number of obstacles in a house with a number of rooms."""

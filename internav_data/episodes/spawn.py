@@ -48,6 +48,8 @@ class Spawned:
 
     asset: Asset
     dynamics: Dynamics
+    spot: Pose
+    """Pose from which it fell, on the floor."""
     settled: SettleResult
     segment: int
     """Segment of the node path on which it was spawned, 0 at the start."""
@@ -88,6 +90,8 @@ class EpisodeDraft:
     attribute_draws: Floats | None = None
     """Random numbers of the hidden attributes, (obstacles, `DRAWS`) float64: a row for each
     obstacle in order of spawning; None where the look tells the attributes."""
+    quarter: int = 0
+    """Heading of the agent at the start, quarter turns counter-clockwise from +x."""
     obstacles: list[Spawned] = field(default_factory=list)
 
     @property
@@ -95,7 +99,9 @@ class EpisodeDraft:
         """Whether the condition of the mode holds."""
         if self.mode == "blocked":
             return self.steps is None
-        return self.steps is not None and self.steps > self.shortest_path_steps
+        # A detour has an even number of steps: every way round takes as many back as forth.
+        longer = self.shortest_path_steps + self.config.min_detour_steps
+        return self.steps is not None and self.steps >= longer
 
 
 @lru_cache(maxsize=4096)
@@ -157,8 +163,7 @@ def _try_spot(draft: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> Non
     if any(fall_clearance(upright, other, gap) < gap for other in _solids(draft)):
         return
     dynamics = _dynamics(draft, asset)
-    body = Body(asset, pose, dynamics)
-    settled = settle(body, gap, lambda: _near(draft, upright), draft.config.engine)
+    settled = settled_at(draft, Body(asset, pose, dynamics))
     if settled.refusal:
         return
     # Settling may have moved it by up to 5 cm: it must still not touch anything.
@@ -167,7 +172,7 @@ def _try_spot(draft: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> Non
         return
     hidden = draft.site.hidden
     affordance = None if hidden is None else hidden.affordance(asset)
-    _place(draft, Spawned(asset, dynamics, settled, segment, exact, entire, affordance))
+    _place(draft, Spawned(asset, dynamics, pose, settled, segment, exact, entire, affordance))
 
 
 def _dynamics(draft: EpisodeDraft, asset: Asset) -> Dynamics:
@@ -177,6 +182,16 @@ def _dynamics(draft: EpisodeDraft, asset: Asset) -> Dynamics:
         return asset.dynamics
     # By the obstacle's number, whatever asset is tried: attributes have no part in the choice.
     return hidden.dynamics(asset, draws[len(draft.obstacles)].tolist())
+
+
+def settled_at(draft: EpisodeDraft, body: Body) -> SettleResult:
+    """Let a body fall from its upright pose among the house and the obstacles of a draft."""
+    return settle(
+        body,
+        draft.config.gap_m,
+        lambda: _near(draft, prisms_of(body.asset, body.pose)),
+        draft.config.engine,
+    )
 
 
 def _spot(

@@ -11,9 +11,18 @@ from internav_data.records.poses import Pose, Quaternion, Vec2
 
 Mode = Literal["blocked", "lengthened"]
 """Effect of an episode's obstacles on the lattice: no path to the goal, or a longer one."""
-Redraw = Literal["no two nodes far enough apart", "condition not reached", "no expert"]
+Redraw = Literal[
+    "no two nodes far enough apart",
+    "condition not reached",
+    "no expert",
+    "start faces a wall",
+    "start in a pocket",
+    "too few interactions",
+    "other rest without idle obstacles",
+]
 """Reasons to draw a start and goal again: no nodes were found, tries or obstacles ran out before
-the mode's condition held, or the expert found no plan."""
+the mode's condition held, the expert found no plan, or a setting refuses the draw. The last is an
+obstacle that touched a dropped one as it settled."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +41,12 @@ class Start:
     """Heading, 0, 90, 180 or 270 degrees: 0 looks along +x, counter-clockwise."""
     room: int
     """Id of the room."""
+    faces_wall: bool | None = None
+    """Whether a wall or furniture blocks the first step ahead; null in datasets of earlier
+    releases."""
+    reachable_nodes: int | None = None
+    """Number of nodes within reach before any interaction, its own included; null in datasets of
+    earlier releases."""
 
 
 @dataclass(frozen=True, slots=True)

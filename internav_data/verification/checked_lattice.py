@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import breadth_first_order, connected_components, dijkstra
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -110,6 +110,18 @@ class CheckedLattice:
         if free is self.free:
             self._distances[goal] = out
         return out
+
+    def edge_free(self, node: int, neighbour: int, free: FreeSpace) -> bool:
+        """Return whether the edge between two nodes is free; not if one of them does not exist."""
+        ends = sorted((node, neighbour))
+        return bool((self._pairs[free.edges] == ends).all(axis=1).any())
+
+    def reachable(self, node: int, free: FreeSpace) -> int:
+        """Return the number of nodes within reach of a free node, itself included."""
+        order = breadth_first_order(
+            self._graph(free), node, directed=False, return_predecessors=False
+        )
+        return len(order)
 
     def components(self) -> Ints:
         """Return the component of every node without obstacles, -1 if not free, shape (n,)."""

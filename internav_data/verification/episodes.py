@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from shapely import Geometry
 
     from internav_data.records import Episode, Goal, Start
+    from internav_data.verification.checked_lattice import FreeSpace
     from internav_data.verification.checked_layout import CheckedLayout
     from internav_data.verification.findings import FindingCollector
 
@@ -23,6 +24,8 @@ MIN_SHORTEST_PATH_M = 2.0
 ROUNDED_M = 1e-4
 """Stored lengths are rounded to 0.1 mm."""
 YAWS_DEG = (0, 90, 180, 270)
+AHEAD = ((1, 0), (0, 1), (-1, 0), (0, -1))
+"""Step ahead by heading, in the order of `YAWS_DEG`."""
 
 
 def check_episode(
@@ -167,6 +170,24 @@ class _EpisodeCheck:
             longer = steps is not None and steps > unobstructed
             self.expect(longer, "lengthened", f"more than {unobstructed} steps", steps)
         check_relevance(episode, removals, self.report)
+        self._surroundings(free)
+
+    def _surroundings(self, free: FreeSpace) -> None:
+        """Check what is stated of the start: the step ahead, and the nodes within reach."""
+        start, lattice = self.episode.start, self.layout.lattice
+        if start.faces_wall is not None and start.yaw_deg in YAWS_DEG:
+            di, dj = AHEAD[YAWS_DEG.index(start.yaw_deg)]
+            ahead = lattice.node(start.i + di, start.j + dj)
+            blocked = not lattice.edge_free(self.start, ahead, lattice.free)
+            self.expect(start.faces_wall == blocked, "start-faces-wall", blocked, start.faces_wall)
+        if start.reachable_nodes is not None:
+            found = lattice.reachable(self.start, free)
+            self.expect(
+                start.reachable_nodes == found,
+                "start-reachable-nodes",
+                found,
+                start.reachable_nodes,
+            )
 
     def lengths(self, footprints: list[Geometry], *, exact: bool) -> None:
         """Check the Euclidean distances with and without obstacles."""

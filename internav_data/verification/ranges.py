@@ -101,6 +101,7 @@ EPISODE_RULES: Mapping[str, Rule] = {
     "obstructed_path_m": Rule(0.0, 1e4, digits=METRES),
     "obstructed_path_steps": Rule(1),
     "start.yaw_deg": Rule(choices=(0, 90, 180, 270)),
+    "start.reachable_nodes": Rule(1),
     **{f"{end}.{axis}": Rule(0) for end in ("start", "goal") for axis in "ij"},
     **{f"{end}.{axis}": Rule(0.0, 1e4, digits=2) for end in ("start", "goal") for axis in "xy"},
     **{f"{end}.room": ID for end in ("start", "goal")},

@@ -14,6 +14,7 @@ from internav_data.records import OUTSIDE
 from internav_data.records.errors import InternavError
 from internav_data.verification.attributes import AttributeCheck
 from internav_data.verification.checked_config import checked_config
+from internav_data.verification.episode_config import check_episode_config, episode_request
 from internav_data.verification.findings import FindingCollector
 from internav_data.verification.house_config import check_house_config, house_request
 from internav_data.verification.interactions import check_interactions
@@ -251,8 +252,7 @@ def _check_episodes(
         ):
             expect("room_count", len(scene.room_ids) if scene else 0, room_count)
     report.scene = ""
-    solvable = checked_config(manifest.config).solvable
-    _check_references(table, keys, report, solvable=solvable)
+    _check_references(table, keys, report, manifest.config)
 
 
 def _lengths(table: pa.Table, name: str) -> list[int]:
@@ -260,9 +260,10 @@ def _lengths(table: pa.Table, name: str) -> list[int]:
 
 
 def _check_references(
-    table: pa.Table, keys: DatasetKeys, report: FindingCollector, *, solvable: bool
+    table: pa.Table, keys: DatasetKeys, report: FindingCollector, config: Mapping[str, Any]
 ) -> None:
-    """Check the room, door and asset ids that episodes name, and their interactions."""
+    """Check the ids that episodes name, their interactions, and what the config refuses."""
+    solvable, request = checked_config(config).solvable, episode_request(config)
     for episode in from_table(table, EPISODES):
         scene = keys.scenes.get(episode.scene_id)
         if scene is None:
@@ -272,6 +273,7 @@ def _check_references(
         if keys.attributes is not None:
             for number, obstacle in enumerate(episode.obstacles):
                 keys.attributes.obstacle(obstacle, number, report, episode.episode_id)
+        check_episode_config(episode, request, report)
         rooms = {episode.start.room, episode.goal.room}
         rooms.update(room for path in episode.room_paths for room in path)
         doors = {door for path in episode.node_paths for door in path.doors}

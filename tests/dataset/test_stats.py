@@ -44,6 +44,8 @@ def test_statistics_are_those_of_the_records(dataset_folder, split):
     assert stats["obstacles_pushable"] == sum(o.pushable for o in obstacles)
     assert stats["obstacles_pickable"] == sum(o.pickable for o in obstacles)
     assert stats["obstacles_fixed"] == sum(not (o.pushable or o.pickable) for o in obstacles)
+    assert stats["facing_wall_share"] is None, "nothing states it"
+    assert stats["relevant_share"] is None
     assert stats["modes"] == Counter(e.mode for e in episodes)
     blocked = [e for e in episodes if e.mode == "blocked"]
     share = sum(e.sealed for e in blocked) / len(blocked)
@@ -75,6 +77,8 @@ def test_interactions_are_those_of_the_records(dataset_folder, split):
     assert expert["spl"] == pytest.approx(statistics.mean(spl), abs=1e-6)
     assert expert["sts"] == pytest.approx(statistics.mean(sts), abs=1e-6)
     assert expert["steps"]["mean"] == pytest.approx(statistics.mean(e.steps for e in solved))
+    interactions = Counter(str(e.pushes + e.picks) for e in solved)
+    assert expert["interactions"] == interactions
     assert expert["pushes"] == pytest.approx(statistics.mean(e.pushes for e in solved), abs=1e-6)
     assert expert["picks"] == pytest.approx(statistics.mean(e.picks for e in solved), abs=1e-6)
     for row in stats["outcomes"]:

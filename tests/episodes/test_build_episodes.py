@@ -329,11 +329,81 @@ def test_an_impossible_episode_is_quarantined_and_named(houses, pool):
         ("gap_m", -0.1),
         ("min_shortest_path_m", 0.0),
         ("lateral_std_m", -1.0),
+        ("min_detour_steps", 0),
+        ("min_interactions", -1),
+        ("min_start_nodes", 0),
     ],
 )
 def test_invalid_settings_are_refused(field, value):
     with pytest.raises(UsageError, match=f"episodes.{field}: expected .* got {value}"):
         EpisodeConfig(**{field: value}).check()
+
+
+def test_an_unknown_treatment_of_idle_obstacles_is_refused():
+    with pytest.raises(UsageError, match=r"idle_obstacles: expected one of keep, drop, got 'hide'"):
+        EpisodeConfig(idle_obstacles="hide").check()
+
+
+@pytest.fixture(scope="module")
+def chosen(houses, pool):
+    """Episodes of settings that refuse much, with their draws."""
+    config = EpisodeConfig(
+        idle_obstacles="drop",
+        min_detour_steps=6,
+        min_interactions=1,
+        refuse_facing_wall=True,
+        min_start_nodes=4,
+    )
+    return build_batch(houses[0], 4, pool, config)
+
+
+def test_settings_refuse_draws_and_count_them(houses, chosen):
+    house, lattice = houses[0], Lattice.of(houses[0])
+    ahead = {0: (1, 0), 90: (0, 1), 180: (-1, 0), 270: (0, -1)}
+    for episode in chosen.episodes:
+        assert all(obstacle.relevant for obstacle in episode.obstacles)
+        assert episode.expert.pushes + episode.expert.picks >= 1
+        start = episode.start
+        assert lattice.edge_free(start.i, start.j, *ahead[start.yaw_deg])
+        assert start.faces_wall is False
+        crowded = lattice.copy()
+        for obstacle in episode.obstacles:
+            crowded.add(footprint(catalogue().assets[obstacle.asset_id], obstacle.pose))
+        components = crowded.components()
+        assert start.reachable_nodes == (components == components[start.i, start.j]).sum() >= 4
+        if episode.mode == "lengthened":
+            assert episode.obstructed_path_steps >= episode.shortest_path_steps + 6
+        world = World.of_episode(HouseModel.of(house), episode, catalogue().assets)
+        assert tuple(o.outcomes for o in episode.obstacles) == outcomes_of(world)
+        assert replay(world, episode.expert.actions) == episode.expert
+    assert chosen.redraws["start faces a wall"] >= 1
+
+
+def test_experts_with_too_few_interactions_are_refused(houses, episodes, pool):
+    few = next(e for e in episodes[0] if e.expert.pushes + e.expert.picks == 1)
+    config = EpisodeConfig(min_interactions=2, max_redraws=200)
+    batch = build_batch(houses[0], 1, pool, config, first=few.index)
+    assert batch.redraws["too few interactions"] >= 1
+    assert batch.episodes[0].expert.pushes + batch.episodes[0].expert.picks >= 2
+
+
+def test_a_start_in_a_pocket_is_refused(houses, pool):
+    for index in range(0, 40, 2):  # of an even scene these are the blocked ones
+        batch = build_batch(houses[0], 1, pool, first=index)
+        nodes = batch.episodes[0].start.reachable_nodes
+        if nodes < 40:
+            break
+    config = EpisodeConfig(min_start_nodes=nodes + 1)
+    again = build_batch(houses[0], 1, pool, config, first=index)
+    assert again.redraws["start in a pocket"] >= 1
+    assert again.episodes[0].start.reachable_nodes > nodes
+
+
+def test_what_touched_a_dropped_obstacle_as_it_settled_spoils_the_draw(houses, pool, monkeypatch):
+    monkeypatch.setattr("internav_data.episodes.idle.settled_at", lambda *_: None)
+    config = EpisodeConfig(idle_obstacles="drop", max_redraws=200)
+    redraws = build_batch(houses[0], 4, pool, config).redraws
+    assert redraws["other rest without idle obstacles"] >= 1
 
 
 def test_all_spawnable_assets_settle(pool):

@@ -106,7 +106,14 @@ def test_identity_leaves_paths_out(tmp_path):
     assert base.identity("c") == spelled_out.identity("c")
 
 
-WORDS = {"paper": "realistic", "look": "hidden", "": "4", "force": "kick", "bullet": "another"}
+WORDS = {
+    "paper": "realistic",
+    "look": "hidden",
+    "": "4",
+    "force": "kick",
+    "bullet": "another",
+    "keep": "drop",
+}
 """Another value for each setting that is a word."""
 
 

@@ -258,6 +258,8 @@ END_CHANGES = {
     "another room": ({"room": 1}, "episode.start-room"),
     "no such room": ({"room": 7}, "schema.episodes.room"),
     "another yaw": ({"yaw_deg": 45}, "episode.start-yaw"),
+    "faces a wall": ({"faces_wall": True}, "episode.start-faces-wall"),
+    "in a pocket": ({"reachable_nodes": 3}, "episode.start-reachable-nodes"),
     "under the obstacle": ({"i": 10, "j": 8, "x": 2.5, "y": 2.0}, "episode.start-uncovered"),
     "near the goal": (
         {"i": 27, "j": 8, "x": 6.75, "y": 2.0, "room": 1},
