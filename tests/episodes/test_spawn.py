@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 from builders import crate, scene_object, screen
 
-from internav_data.episodes import EpisodeConfig
+from internav_data.catalog import catalogue
+from internav_data.episodes import EpisodeConfig, build_episodes
 from internav_data.episodes.build import _draw_endpoints
 from internav_data.episodes.site import SpawnSite
 from internav_data.episodes.spawn import spawn
 from internav_data.geometry import clearance, footprint
+from internav_data.houses import HouseConfig, build_house
 from internav_data.physics import wall_body
 from internav_data.records import Pose
 from internav_data.verification.checked_layout import CheckedLayout
@@ -65,3 +67,26 @@ def test_their_footprints_alone_would_let_them_in():
     shapes = Shapes(ASSETS)
     own = Solids.of([(0, shapes.slabs("Screen_0", spot))])
     assert intrusions(own, CheckedLayout(HOUSE, shapes).solids) == [(0, -1)]
+
+
+@pytest.mark.slow
+def test_none_of_3000_obstacles_is_in_anything(monkeypatch):
+    """1,000 episodes of the catalogue, whose experts and outcomes are not asked for here."""
+    monkeypatch.setattr("internav_data.episodes.build.solve", lambda _: None)
+    monkeypatch.setattr(
+        "internav_data.episodes.build.outcomes_of",
+        lambda world, _: ((),) * len(world.obstacles),
+    )
+    shapes, count = Shapes(catalogue().assets), 0
+    for scene in range(100):
+        house = build_house(0, scene, HouseConfig(), catalogue())
+        still = CheckedLayout(house, shapes).solids
+        config = EpisodeConfig(keep_unsolvable=True)
+        for episode in build_episodes(house, 10, catalogue().spawnable, config):
+            own = Solids.of(
+                (k, shapes.slabs(o.asset_id, o.pose)) for k, o in enumerate(episode.obstacles)
+            )
+            count += len(episode.obstacles)
+            assert (episode.episode_id, intrusions(own, still)) == (episode.episode_id, [])
+            assert (episode.episode_id, intrusions(own, own)) == (episode.episode_id, [])
+    assert count > 3000
