@@ -86,6 +86,13 @@ def interaction_lines(stats: dict[str, Any]) -> list[str]:
             f"{sum(row['opened'] for row in rows)} open a blocked way"
         )
     lines[-1] += f"; {stats['openable_share_of_blocked']:.1%} of the blocked open by one of these"
+    told = stats["confounding"]
+    if told is not None:
+        lines.append(
+            f"pushes of types that are pushed: {told['base_rate']:.1%} succeed; asset, type and "
+            f"size guess {told['guess_accuracy']:.1%} right and tell "
+            f"{told['information_share']:.1%} of what there is to know (cross-validated)"
+        )
     lines.append(
         f"expert: solves {expert['solved']} ({expert['solved_share']:.1%}); steps "
         f"{_spread(expert['steps'])}; {expert['pushes']:.2f} pushes, {expert['picks']:.2f} picks; "

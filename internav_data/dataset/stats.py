@@ -11,6 +11,12 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from internav_data.core.storage import Store, StoreLike, store_of
+from internav_data.dataset.confounding import (
+    ASSET_COLUMNS,
+    ConfoundingRow,
+    PushCounts,
+    looks_of,
+)
 from internav_data.dataset.manifest import Manifest, read_manifest
 from internav_data.dataset.outcome_stats import (
     EXPERT_COLUMNS,
@@ -22,7 +28,7 @@ from internav_data.dataset.outcome_stats import (
 )
 from internav_data.dataset.snapshot import read_shard
 from internav_data.dataset.summary_statistics import Spread, counts, mean, share, spread
-from internav_data.dataset.tables import EPISODES
+from internav_data.dataset.tables import ASSETS, EPISODES
 from internav_data.records.agent import SPACING_M
 
 if TYPE_CHECKING:
@@ -43,7 +49,7 @@ _START = tuple(f"start.{name}" for name in ("faces_wall", "reachable_nodes"))
 POCKET_NODES = 4
 """Number of nodes within reach below which a start is in a pocket."""
 _OBSTACLES = tuple(
-    f"obstacles.list.element.{n}" for n in ("type", "pushable", "pickable", "relevant")
+    f"obstacles.list.element.{n}" for n in ("asset_id", "type", "pushable", "pickable", "relevant")
 )
 
 
@@ -117,6 +123,8 @@ class Stats:
     outcomes: tuple[OutcomeRow, ...]
     openable_share_of_blocked: float
     """Share of blocked episodes that a single interaction opens."""
+    confounding: ConfoundingRow | None
+    """Predictability of pushes from the look of their obstacles; null without any push outcome."""
     redraws: Mapping[str, int]
     """Number of redraws while generating, by reason; of all splits."""
     quarantined: int
@@ -156,14 +164,19 @@ def stats_of(root: StoreLike, manifest: Manifest, split: str | None = None) -> S
     """Return the statistics of the files that a manifest names."""
     names = [*_SCALARS, *_START, *_OBSTACLES, *EXPERT_COLUMNS, *OUTCOME_COLUMNS]
     store = store_of(root)
-    tables, kinds, outcomes = [_no_rows()], [_no_obstacles()], OutcomeCounts()
+    tables, kinds = [_no_rows()], [_no_obstacles()]
+    outcomes, pushes = OutcomeCounts(), PushCounts()
     for file in manifest.of("episodes", split):
         table = read_shard(store, file, EPISODES, names)
         tables.append(_flat_rows(table))
         for chunk in table.column("obstacles").chunks:
             kinds.append(_flat_obstacles(chunk))
             outcomes.add(chunk)
-    return _stats(pa.concat_tables(tables), pa.concat_tables(kinds), outcomes, manifest, split)
+            pushes.add(chunk)
+    (assets,) = manifest.of("assets")
+    confounding = pushes.row(looks_of(read_shard(store, assets, ASSETS, ASSET_COLUMNS)))
+    obstacles = pa.concat_tables(kinds)
+    return _stats(pa.concat_tables(tables), obstacles, outcomes, confounding, manifest, split)
 
 
 def _flat_rows(table: pa.Table) -> pa.Table:
@@ -198,6 +211,7 @@ def _stats(
     table: pa.Table,
     kinds: pa.Table,
     outcomes: OutcomeCounts,
+    confounding: ConfoundingRow | None,
     manifest: Manifest,
     split: str | None,
 ) -> Stats:
@@ -239,6 +253,7 @@ def _stats(
         expert=expert_row(table, manifest),
         outcomes=outcomes.rows(),
         openable_share_of_blocked=share(outcomes.openable, int(blocked.sum())),
+        confounding=confounding,
         redraws=dict(manifest.redraws),
         quarantined=len(manifest.quarantined),
     )

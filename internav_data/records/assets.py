@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Protocol
 
 from internav_data.records.physics import Affordance, Dynamics
 from internav_data.records.poses import Quaternion, Vec3
@@ -82,7 +82,27 @@ class Asset:
         return hash(self.asset_id)
 
 
-def type_affordances(assets: Iterable[Asset]) -> dict[str, Affordance]:
+class Handled(Protocol):
+    """Facts about an asset that make the affordance of its type."""
+
+    @property
+    def type(self) -> str:
+        """Type of the asset."""
+
+    @property
+    def pushable(self) -> bool:
+        """Whether the agent's push can act on it."""
+
+    @property
+    def pickable(self) -> bool:
+        """Whether the agent can pick it up."""
+
+    @property
+    def spawnable(self) -> bool:
+        """Whether it may be spawned as an obstacle."""
+
+
+def type_affordances(assets: Iterable[Handled]) -> dict[str, Affordance]:
     """Return the affordance of each type that can be handled: that of most of its assets.
 
     Only assets that may be spawned count. A type without an asset that can be pushed or picked up

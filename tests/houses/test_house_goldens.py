@@ -16,10 +16,10 @@ SCENES = 33
 ALL_TYPES = "hall,living,dining,kitchen,laundry,office,storage,studio,bathroom,bedroom"
 
 GOLDEN = {
-    "paper": "66e26d5d3d70f169bab18f7ddcd8a8cb2c5ed409339e5b6172753e90b8d871b1",
-    "paper, every type": "7b781de379683a2b58f68a09102ae1fa2a518ec812191f1f9d9c62b3fdb613cc",
-    "realistic": "1836a3e4b1e963fc46fbc0789a897e9dcdb0a617744cb46c48eadba56097a006",
-    "realistic, every type": "470c51bf08a94e6239ac52ab91525811908558ed0cbbb2dcdc8648f39d04eabc",
+    "paper": "5f4fa506c75536d8836e7cd036860514bd2e2afe0742dff59106789338bd9189",
+    "paper, every type": "04d83db8a40299c6c336cbdda6b08808242e71b87917e1dc81eece055661aab8",
+    "realistic": "4fe19d4202b9fb640c8c35aa395eb031743552825f7b635b05eb3d5a7f8c11c3",
+    "realistic, every type": "e77f53ecaf0a9aeacab0c7a26881c826dba93b9dc849df2da076ebb9f712f010",
 }
 
 
