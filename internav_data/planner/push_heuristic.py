@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 STEP_M: Final = 0.15
 """Step in which a slide is tested against other footprints, metres."""
+MAX_REPEATS: Final = 6
+"""Maximum number of pushes of one object in a row, from one pose, that are considered at once."""
 GRAVITY: Final = 9.81
 """Acceleration of gravity, m/s²."""
 
@@ -70,10 +72,12 @@ def path_marks(poses: Sequence[int], nodes: int) -> Ints:
     return np.unique(np.concatenate([NODE * nodes + place, row * nodes + edge]))
 
 
-def clearing_pushes(
+def pushes_to_clear(
     world: World, index: int, path: Ints, shape: tuple[int, int]
-) -> tuple[bool, ...]:
-    """Return whether a push along each of the four headings may clear a path of an object.
+) -> tuple[int, ...]:
+    """Return how many pushes along each of the four headings may clear a path of an object.
+
+    0 where none are likely to. More than one in a row counts for pushes of a short distance only.
 
     Parameters
     ----------
@@ -88,18 +92,29 @@ def clearing_pushes(
 
     """
     far = slide_m(world, index)
-    footprint = world.items[index].footprint
-    low, high = footprint.vertices.min(axis=0) - far, footprint.vertices.max(axis=0) + far
+    most = MAX_REPEATS if world.push_spec.distance_m else 1
+    footprint, farthest = world.items[index].footprint, most * far
+    low, high = footprint.vertices.min(axis=0) - farthest, footprint.vertices.max(axis=0) + farthest
     round_it = grown(dop8_of_rectangle(*low.tolist(), *high.tolist()), 0.0)
     movable = [k for k, _ in world.near(round_it, index) if k < len(world.items)]
     solid = [world.model.footprints, *(world.items[k].footprint for k in movable)]
-    out = []
-    for heading in range(4):
-        there = _slid(footprint, HEADINGS[heading], far, solid)
-        blockers = np.zeros((3, *shape), dtype=np.int32)
-        grid.mark(blockers, there.vertices, there.offsets, SPACING_M, CLEARANCE_M, 1)
-        out.append(not blockers.reshape(-1)[path].any())
-    return tuple(out)
+    return tuple(
+        next(
+            (
+                count
+                for count in range(1, most + 1)
+                if _is_clear(_slid(footprint, ahead, count * far, solid), path, shape)
+            ),
+            0,
+        )
+        for ahead in HEADINGS[:4]
+    )
+
+
+def _is_clear(footprint: Polygons, path: Ints, shape: tuple[int, int]) -> bool:
+    blockers = np.zeros((3, *shape), dtype=np.int32)
+    grid.mark(blockers, footprint.vertices, footprint.offsets, SPACING_M, CLEARANCE_M, 1)
+    return not blockers.reshape(-1)[path].any()
 
 
 def _slid(

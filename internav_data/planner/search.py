@@ -31,7 +31,7 @@ from internav_data.navigation import SPACING_M
 from internav_data.planner.cost_to_go import FAR, viewpoints
 from internav_data.planner.knowledge import NO_KNOWLEDGE, coarse_position
 from internav_data.planner.problem import EVERYTHING, PICK_PRICE, PlanningProblem
-from internav_data.planner.push_heuristic import clearing_pushes, path_marks
+from internav_data.planner.push_heuristic import path_marks, pushes_to_clear
 from internav_data.records import Expert
 from internav_data.world import Action, World
 from internav_data.world.actions import HORIZONS_DEG, PUSHES
@@ -106,6 +106,8 @@ class Candidate:
     """`SearchState.penalty` of the world after it."""
     index: int = -1
     """Index of the object acted on."""
+    repeats: int = 1
+    """Number of times in a row, from the same pose: pushes of a short distance come in runs."""
 
 
 def bits_in_order(entered: Iterable[int]) -> tuple[int, ...]:
@@ -342,9 +344,9 @@ class _BestFirstSearch:
         if pick and places:
             self._offer(state, index, Action.PICKUP, places, back)
         elif places:
-            clears = clearing_pushes(state.world, index, path, problem.shape)
+            counts = pushes_to_clear(state.world, index, path, problem.shape)
             for action in _PUSHES:
-                self._offer(state, index, action, places, back, clears)
+                self._offer(state, index, action, places, back, counts)
 
     def _offer(
         self,
@@ -353,24 +355,27 @@ class _BestFirstSearch:
         action: Action,
         places: Sequence[tuple[int, int, int]],
         back: Costs,
-        clears: tuple[bool, ...] = (),
+        counts: tuple[int, ...] = (),
     ) -> None:
         """Put an interaction from the first place into the queue; the others are its fallbacks."""
         # From the last place to the first, so that each candidate holds the next as its fallback.
         entry = None
         for pose, horizon, cost in reversed(places):
-            penalty, last = state.penalty, (-1, -1)
+            penalty, last, repeats = state.penalty, (-1, -1), 1
             if action.kind == "push":
                 last = (index, (pose + action.quarter_turns) % 4)
                 turn = (last[1] - state.last[1]) % 4 if state.last[0] == index else 0
                 if turn == 2:  # noqa: PLR2004 - to and fro
                     continue
                 penalty += TURN_PENALTY if turn else 0
-                if last != state.last and not clears[last[1]]:
+                repeats = counts[last[1]] or 1
+                if last != state.last and not counts[last[1]]:
                     penalty += UNLIKELY_PENALTY
-            f_cost = state.spent + cost + 1 + penalty
+            f_cost = state.spent + cost + repeats + penalty
             entry = Candidate(
-                state, pose, horizon, action, back, entry, f_cost, last, penalty, index
+                *(state, pose, horizon, action, back, entry, f_cost, last, penalty),
+                index=index,
+                repeats=repeats,
             )
         if entry is not None:
             self._push(entry.f_cost, _RANKS[action], entry)
@@ -405,6 +410,7 @@ class _BestFirstSearch:
                 self._push(entry.fallback.f_cost, _RANKS[entry.action], entry.fallback)
             return
         result = world.step(entry.action)
+        pushes = 1 + self._repeat(world, entry) if result.success else 0
         # The push of an object alone is cached: finding it too heavy costs next to nothing.
         if result.cause != "too heavy":
             self.queries_left -= 1
@@ -413,10 +419,22 @@ class _BestFirstSearch:
         if result.success:
             walk = moves(problem.walk(state.masks, entry.back, entry.pose))
             looks = looks_between(state.world.horizon_deg, entry.horizon)
-            actions = (*state.actions, *walk, *looks, int(entry.action))
+            actions = (*state.actions, *walk, *looks, *[int(entry.action)] * pushes)
             self._enter(world, actions, entry.last, entry.penalty)
         elif entry.fallback is not None and result.cause in _AGENTS_FAULT:
             self._push(entry.fallback.f_cost, _RANKS[entry.action], entry.fallback)
+
+    def _repeat(self, world: World, entry: Candidate) -> int:
+        """Push on in a world, which this changes, while it is likely to help; count the pushes."""
+        for count in range(entry.repeats - 1):
+            if (
+                world.target(pick=False) != entry.index
+                or world.count_movers(*entry.last) > MAX_MOVERS
+                or self.knowledge.excludes(world, entry.action, entry.index)
+                or not world.step(entry.action).success
+            ):
+                return count
+        return entry.repeats - 1
 
     def _place(self, world: World, pose: int, horizon: int) -> None:
         node, world.quarter = divmod(pose, 4)

@@ -19,9 +19,10 @@ from internav_data.navigation import Lattice
 from internav_data.physics import Body
 from internav_data.planner.cost_to_go import FAR
 from internav_data.planner.problem import EVERYTHING, PlanningProblem
+from internav_data.planner.push_heuristic import path_marks, pushes_to_clear
 from internav_data.planner.search import expert_of_episode, replay, solve
 from internav_data.records import Pose
-from internav_data.world import ACTION_COUNT, Action, HouseModel, World
+from internav_data.world import ACTION_COUNT, Action, HouseModel, World, WorldConfig
 
 CRATE = crate("Crate_0", (0.8, 0.8, 0.5), mass_kg=12.0)
 PARCEL = crate("Parcel_0", (0.8, 0.8, 0.5), mass_kg=3.0, pushable=False, pickable=True)
@@ -273,3 +274,33 @@ def test_things_that_stand_apart_do_not_matter():
     far = [*near, at(crate("Crate_1", (0.2, 0.2, 0.5), mass_kg=2.0), 5.6, 0.3)]
     alone = expert_of(CORRIDOR, near, (4, 3, 0), (14, 3))
     assert expert_of(CORRIDOR, far, (4, 3, 0), (14, 3)).steps == alone.steps
+
+
+STEP = WorldConfig(push_model="step")
+
+
+def test_short_pushes_of_one_object_come_in_runs():
+    """A crate in a corridor is shoved along until there is a way: one candidate, many pushes."""
+    for x, pushes in ((2.5, 1), (2.25, 2)):
+        world = World(CORRIDOR, [at(CRATE, x, 0.75)], (4, 3, 0), (8, 3), STEP)
+        expert = solve(world)
+        assert expert is not None
+        assert expert.pushes == pushes
+        assert replay(world.copy(), expert.actions) == expert
+    far = solve(World(CORRIDOR, [at(CRATE, 2.25, 0.75)], (4, 3, 0), (12, 3), STEP))
+    assert far is not None
+    assert far.pushes >= 4
+    strong = solve(World(CORRIDOR, [at(CRATE, 2.25, 0.75)], (4, 3, 0), (12, 3)))
+    assert strong.pushes < far.pushes
+
+
+def test_the_number_of_short_pushes_that_clear_a_path_is_estimated():
+    world = World(HALL, [at(CRATE, 3.0, 2.0)], (4, 8, 0), (20, 8), STEP)
+    problem = PlanningProblem.of(world)
+    poses = [4 * (i * problem.ny + 8) for i in range(4, 21)]
+    marks = path_marks(poses, problem.fixed.shape[1])
+    east, north, west, south = pushes_to_clear(world, 0, marks, problem.shape)
+    assert north == south == 3, "0.4 m of crate and 0.21 m of agent, 0.24 m a push"
+    assert east == west == 0, "along the path no number of pushes helps"
+    once = World(HALL, [at(CRATE, 3.0, 2.0)], (4, 8, 0), (20, 8))
+    assert set(pushes_to_clear(once, 0, marks, problem.shape)) <= {0, 1}

@@ -7,7 +7,7 @@ from internav_data.catalog import catalogue
 from internav_data.houses import HouseConfig, build_house
 from internav_data.planner.cost_to_go import FAR, bucket_dijkstra
 from internav_data.planner.problem import EVERYTHING, PlanningProblem
-from internav_data.planner.push_heuristic import clearing_pushes, path_marks, slide_m
+from internav_data.planner.push_heuristic import pushes_to_clear, path_marks, slide_m
 from internav_data.world import HouseModel, World
 
 SIXES = range(0, 12, 3)
@@ -48,7 +48,7 @@ def test_most_guesses_are_right(worlds):
             i, j = np.rint(world.items[thing].footprint.vertices.mean(axis=0) / 0.25).astype(int)
             path = path_marks([4 * ((i + k) * ny + j) for k in range(-1, 2)], nx * ny)
             bit = 1 << problem.objects.index(thing)
-            for heading, clears in enumerate(clearing_pushes(world, thing, path, (nx, ny))):
+            for heading, clears in enumerate(pushes_to_clear(world, thing, path, (nx, ny))):
                 there, pushed = world.copy(), world.simulate_push(thing, heading, agent=False)
                 if pushed.success:
                     there.put([(thing, pushed.pose), *pushed.moved])
