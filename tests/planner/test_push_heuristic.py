@@ -7,7 +7,7 @@ from internav_data.catalog import catalogue
 from internav_data.houses import HouseConfig, build_house
 from internav_data.planner.cost_to_go import FAR, bucket_dijkstra
 from internav_data.planner.problem import EVERYTHING, PlanningProblem
-from internav_data.planner.push_heuristic import pushes_to_clear, path_marks, slide_m
+from internav_data.planner.push_heuristic import path_marks, pushes_to_clear, slide_m
 from internav_data.world import HouseModel, World
 
 SIXES = range(0, 12, 3)
