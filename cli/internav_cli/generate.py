@@ -33,6 +33,7 @@ Examples:
   internav-gen generate --out data/demo --scenes 240          extends it
   internav-gen generate --out data/flats --rooms kitchen,living,bedroom:2 --preset realistic
   internav-gen generate --out data/confounded --attributes hidden
+  internav-gen generate --out data/dense --episode-preset dense   obstacles that matter
   internav-gen generate --dry-run --workers 8                 how long, how large
   internav-gen generate --scene 17 --episode 3                one episode again, as JSON
   internav-gen generate --print-config > mine.toml            all settings, to be changed

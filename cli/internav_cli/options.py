@@ -41,6 +41,13 @@ _CONFIG = (
         help="Generous rooms calibrated to the paper, or those of real homes.  [default: paper]",
     ),
     click.option(
+        "--episode-preset",
+        type=click.Choice(["paper", "dense", "long"]),
+        default="paper",
+        help="As in the paper, obstacles that all matter, or interactions of several actions.  "
+        "[default: paper]",
+    ),
+    click.option(
         "--rooms",
         metavar="ROOMS",
         help="A count (4), a range (2-5) or a programme (kitchen,living,bedroom:2).",
@@ -71,9 +78,10 @@ def config_from(
     rooms: str | None = None,
     floor_plan: str | None = None,
     folders: tuple[str, ...] = (),
+    episode_preset: str = "paper",
     **more: Any,  # noqa: ANN401 - further settings by key, __ for a dot
 ) -> GenerationConfig:
-    """Return the config that the options describe: file, then options, then --set."""
+    """Return the config that the options describe: preset, file, then options, then --set."""
     from internav_data.generation import load_config
 
     options = {
@@ -84,7 +92,7 @@ def config_from(
         "assets": list(folders) or None,
     } | {key.replace("__", "."): value for key, value in more.items()}
     chosen = {key: value for key, value in options.items() if value is not None}
-    config = load_config(config_file, overrides, chosen)
+    config = load_config(config_file, overrides, chosen, episode_preset)
     config.check()
     return config
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from internav_data.catalog.config import CatalogConfig
 from internav_data.core.config import (
@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 
     from internav_data.records import Split
 
+EPISODE_PRESETS: Final = ("paper", "dense", "long")
+"""Names of the presets of episodes, each a TOML file in the folder `presets`: settings that differ
+from the defaults, of any section."""
 TEST_SHARE = 10
 """A test scene has one episode for every ten of other scenes, as in the paper (5 for 50)."""
 COMMAND_LINE_ONLY = ("scenes", "workers", "executor", "out")
@@ -109,18 +112,26 @@ def load_config(
     path: Path | None = None,
     overrides: Iterable[str] = (),
     options: Mapping[str, Any] | None = None,
+    episode_preset: str = "paper",
 ) -> GenerationConfig:
-    """Read a config: a TOML file, then options by dotted key, then `a.b=c` overrides.
+    """Read a config: a preset of episodes, a TOML file, options by dotted key, `a.b=c` overrides.
 
-    Other settings have their defaults. Paths inside the file are relative to the file.
+    Later ones win. Other settings have their defaults. Paths inside the file are relative to it.
 
     Raises
     ------
     UsageError
-        An unreadable file, an unknown key, or a value of the wrong type; it names the place.
+        An unreadable file, an unknown preset or key, or a value of the wrong type; it names the
+        place.
+
+    Examples
+    --------
+    >>> from internav_data.generation import load_config
+    >>> load_config(episode_preset="dense").episodes.idle_obstacles
+    'drop'
 
     """
-    config = GenerationConfig()
+    config = _preset(episode_preset)
     if path is not None:
         config = from_mapping(config, read_settings(path), str(path), COMMAND_LINE_ONLY)
         config = _beside(config, path.parent)
@@ -129,6 +140,13 @@ def load_config(
     for override in overrides:
         config = updated(config, override, COMMAND_LINE_ONLY)
     return config
+
+
+def _preset(name: str) -> GenerationConfig:
+    if name not in EPISODE_PRESETS:
+        raise UsageError(f"episode preset {name!r}: expected one of {', '.join(EPISODE_PRESETS)}")
+    path = Path(__file__).parent / "presets" / f"{name}.toml"
+    return from_mapping(GenerationConfig(), read_settings(path), str(path))
 
 
 def _beside(config: GenerationConfig, folder: Path) -> GenerationConfig:

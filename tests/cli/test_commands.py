@@ -189,6 +189,12 @@ def test_options_of_episodes_are_settings():
     assert "[world]" in result.stdout
     assert 'push_model = "kick"' in result.stdout
     assert "keep_unsolvable = true" in result.stdout
+    dense = run(
+        *("generate", "--episode-preset", "dense", "--print-config"),
+        *("--set", "episodes.min_interactions=3"),
+    )
+    assert 'idle_obstacles = "drop"' in dense.stdout
+    assert "min_interactions = 3" in dense.stdout
 
 
 def test_a_single_episode_again(dataset):

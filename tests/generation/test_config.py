@@ -1,9 +1,10 @@
 import dataclasses
+from importlib import resources
 
 import pytest
 
 from internav_data.core.config import known_keys
-from internav_data.generation.config import GenerationConfig, load_config
+from internav_data.generation.config import EPISODE_PRESETS, GenerationConfig, load_config
 from internav_data.records.errors import UsageError
 
 
@@ -20,6 +21,27 @@ def test_defaults_are_the_papers():
     assert config == GenerationConfig()
     assert (config.episodes_of("train"), config.episodes_of("test")) == (50, 5)
     config.check()
+
+
+@pytest.mark.parametrize("name", EPISODE_PRESETS)
+def test_presets_of_episodes_are_sound_and_installed(name):
+    config = load_config(episode_preset=name)
+    config.check()
+    assert (config == GenerationConfig()) == (name == "paper")
+    folder = resources.files("internav_data.generation") / "presets"
+    assert (folder / f"{name}.toml").is_file()
+    assert {entry.name for entry in folder.iterdir()} == {f"{n}.toml" for n in EPISODE_PRESETS}
+
+
+def test_a_file_wins_over_a_preset_and_both_are_overridden(tmp_path):
+    path = tmp_path / "c.toml"
+    path.write_text("[episodes]\nmin_detour_steps = 3\nmin_interactions = 3\n")
+    dense = load_config(episode_preset="dense")
+    config = load_config(path, ["episodes.min_interactions=2"], episode_preset="dense")
+    assert (config.episodes.min_detour_steps, config.episodes.min_interactions) == (3, 2)
+    assert config.episodes.max_obstacles == dense.episodes.max_obstacles
+    with pytest.raises(UsageError, match="'sparse': expected one of paper, dense, long"):
+        load_config(episode_preset="sparse")
 
 
 def test_a_file_and_overrides_in_that_order(tmp_path):
