@@ -16,6 +16,7 @@ from statistics import mean, median
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from home_rules import area_spread, kept_rules, repeated_plans
 
 from internav_data.catalog import catalogue
 from internav_data.geometry import footprint
@@ -46,6 +47,8 @@ MEASURED = {
         "minima": "habitable 6.5 m2 and 2.13 m, hall 0.91 m, doors 0.77-0.96 m, ceilings 2.4-3.2 m",
     },
 }  # fmt: skip
+WANTED = {"paper": 0.95, "realistic": 0.99}
+"""Share of rooms and things that keep each rule of `home_rules`."""
 BUDGET_MS = {2: 20, 4: 40, 8: 80}
 
 
@@ -107,8 +110,9 @@ def paths(house: House, rng: np.random.Generator, draws: int = 12) -> list[tuple
     return out
 
 
-def survey(config: HouseConfig, scenes: int, seed: int) -> Result:
-    assets = catalogue()
+def survey(config: HouseConfig, scenes: int, seed: int) -> tuple[Result, list[House]]:
+    """Build houses; return figures of them, and the houses."""
+    assets, houses = catalogue(), []
     build_house(seed, 0, config, assets)
     table = defaultdict(lambda: defaultdict(list))
     rng = np.random.default_rng(0)
@@ -116,6 +120,7 @@ def survey(config: HouseConfig, scenes: int, seed: int) -> Result:
         started = time.process_time()
         house = build_house(seed, scene, config, assets)
         spent = 1000 * (time.process_time() - started)
+        houses.append(house)
         rooms = len(house.rooms)
         table["CPU ms per house by rooms"][rooms].append(spent)
         table["house area by rooms (m2)"][rooms].append(house.area_m2)
@@ -142,7 +147,7 @@ def survey(config: HouseConfig, scenes: int, seed: int) -> Result:
         for metres, passed in paths(house, rng):
             table["lattice distance by class (m)"][size_class(rooms)].append(metres)
             table["rooms on path by class"][size_class(rooms)].append(passed)
-    return {
+    figures = {
         name: {
             str(key): {
                 "mean": round(float(mean(values)), 3),
@@ -155,6 +160,33 @@ def survey(config: HouseConfig, scenes: int, seed: int) -> Result:
         }
         for name, rows in sorted(table.items())
     }
+    return figures, houses
+
+
+def homes(houses: list[House]) -> dict[str, Any]:
+    """Return how many rooms and things keep each rule of a home, and how much plans vary."""
+    areas = defaultdict(list)
+    for house in houses:
+        areas[len(house.rooms)].append(house.area_m2)
+    return {
+        "rules": {
+            name: {"kept": kept, "of": of} for name, (kept, of) in kept_rules(houses).items()
+        },
+        "plans that repeat": repeated_plans(houses),
+        "area, 95 % over 5 %, by rooms": {
+            str(rooms): round(area_spread(values), 2) for rooms, values in sorted(areas.items())
+        },
+    }
+
+
+def show_homes(preset: str, found: dict[str, Any]) -> None:
+    print("\nrules of a home")
+    for name, row in found["rules"].items():
+        share = row["kept"] / max(1, row["of"])
+        note = "" if share >= WANTED[preset] or not row["of"] else f"  wanted {WANTED[preset]:.0%}"
+        print(f"  {name:<45} {row['kept']:5d} of {row['of']:5d}  {share:7.1%}{note}")
+    for name in ("plans that repeat", "area, 95 % over 5 %, by rooms"):
+        print(f"{name}: {found[name]}")
 
 
 def show(preset: str, result: Result) -> None:
@@ -189,8 +221,10 @@ def main() -> int:
     results = {}
     for preset in arguments.presets.split(","):
         config = replace(HouseConfig(preset=preset), **levers(arguments.set))
-        results[preset] = survey(config, arguments.scenes, arguments.seed)
-        show(preset, results[preset])
+        figures, houses = survey(config, arguments.scenes, arguments.seed)
+        results[preset] = {**figures, "home": homes(houses)}
+        show(preset, figures)
+        show_homes(preset, results[preset]["home"])
     print(f"\nbudget, ms per house by rooms: {BUDGET_MS}")
     if arguments.out:
         text = json.dumps({"measured": MEASURED, "houses": results}, indent=1)

@@ -31,6 +31,14 @@ if TYPE_CHECKING:
 
 MAX_TRIES = 8
 """Number of times that `candidates` may be drawn while none of them keeps the standards."""
+MAX_TRIES_HOME = 4
+"""The same while the best one has one of the faults of `MUST_NOT`."""
+MUST_NOT = (
+    "habitable rooms without daylight",
+    "bathrooms behind a kitchen",
+    "no bathroom for all",
+)
+"""Penalties of a plan that no home has if it can be helped."""
 JITTERS = (0.6, 2.0, 4.0, 4.0, 4.0)
 """Random parts of the door costs, one for each door tree that a candidate is tried with."""
 MIN_JOG_CM = 50
@@ -117,8 +125,15 @@ def _drawable(grid: FloorGrid, rooms: int) -> bool:
     )
 
 
+def _will_do(plan: FloorPlan, tries: int) -> bool:
+    """Return whether a plan is taken after some times `config.candidates` draws."""
+    return tries >= MAX_TRIES_HOME or not any(plan.score_terms[name] for name in MUST_NOT)
+
+
 def choose_floor_plan(key: SceneKey, config: HouseConfig, specs: Sequence[RoomSpec]) -> FloorPlan:
     """Draw `config.candidates` floor plans and return the best one; a plain row if all fail.
+
+    Tight programmes get more draws, but only until the first plan that works.
 
     Raises
     ------
@@ -128,9 +143,8 @@ def choose_floor_plan(key: SceneKey, config: HouseConfig, specs: Sequence[RoomSp
     """
     rng = key.generator(Purpose.FLOOR_PLAN, draw=FloorPlanStream.CANDIDATES)
     best: FloorPlan | None = None
-    # Tight programmes get more draws, but only until the first plan that holds.
     for k in range(config.candidates * MAX_TRIES):
-        if best is not None and k >= config.candidates:
+        if k >= config.candidates and best is not None and _will_do(best, k // config.candidates):
             break
         layout = draw_layout(specs, rng, config.wings)
         found = scored_plan(plan_candidate(layout, specs, config), rng)

@@ -43,11 +43,11 @@ class HouseConfig:
     """Path of a floor plan of your own (TOML or JSON); its rooms are furnished anew each scene."""
     scale: Annotated[float, Bounds(0.7, 2.0)] = 1.0
     """Lengths of rooms times this; 1.1 makes houses 21 % larger. `paper` only."""
-    scale_small: Annotated[float, Bounds(0.7, 2.0)] = 0.87
+    scale_small: Annotated[float, Bounds(0.7, 2.0)] = 0.89
     """Further factor for houses of 1-2 rooms."""
-    scale_medium: Annotated[float, Bounds(0.7, 2.0)] = 0.89
+    scale_medium: Annotated[float, Bounds(0.7, 2.0)] = 0.935
     """Further factor for houses of 3-5 rooms."""
-    scale_large: Annotated[float, Bounds(0.7, 2.0)] = 1.0
+    scale_large: Annotated[float, Bounds(0.7, 2.0)] = 0.975
     """Further factor for houses of 6-10 rooms."""
     furnishing: Annotated[float, Bounds(0.0, 2.0)] = 1.0
     """Amount of furniture beyond the indispensable: 0 bare, 1 lived in, 2 crowded."""

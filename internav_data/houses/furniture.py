@@ -9,6 +9,7 @@ from internav_data.houses.furnishing import RoomState, quarter_quaternion, room_
 from internav_data.houses.group_makers import GROUP_MAKERS
 from internav_data.houses.groups import RoomContext
 from internav_data.houses.pieces import Picker, consistent
+from internav_data.houses.plan import clear_area_m2
 from internav_data.houses.room_types import ROOM_TYPES
 from internav_data.records import Purpose, SceneObject
 
@@ -20,8 +21,12 @@ if TYPE_CHECKING:
     from internav_data.houses.room_types import FurnitureRule
     from internav_data.records import SceneKey
 
+COOKING = ("Stove", "Sink", "CounterTop")
+"""Types of asset that a kitchenette needs."""
 CERTAIN = 1.0
 """Share from which on a rule is indispensable: its group is tried at any furnishing."""
+TRIES = 4
+"""Number of times that a room is furnished while it lacks what it needs."""
 MAX_GROUPS = 4
 """Largest number of groups that one rule puts into one room."""
 
@@ -52,13 +57,54 @@ def furnish(
         Assets to choose from.
     """
     objects: list[SceneObject] = []
-    for room in range(len(floor_plan.types)):
-        state = room_state(floor_plan, room, openings, ceiling_m)
+    types = frozenset(floor_plan.types)
+    for room, rules in enumerate(_rules(key, floor_plan)):
         # Each room has random numbers of its own: furnishing one changes no other.
-        rng = key.generator(Purpose.FURNITURE, draw=room)
-        _furnish_room(state, frozenset(floor_plan.types), Picker(catalogue, rng), density)
-        objects += _scene_objects(state, len(objects), _groups(objects))
+        picker = Picker(catalogue, key.generator(Purpose.FURNITURE, draw=room))
+        best: RoomState | None = None
+        for attempt in range(TRIES):
+            state = room_state(floor_plan, room, openings, ceiling_m)
+            # Once a room lacks something, what it must have comes first, in its smallest form.
+            ordered = sorted(rules, key=lambda r: r.share < CERTAIN) if attempt else rules
+            _furnish_room(state, ordered, types, picker, density, smallest=attempt > 1)
+            if best is None or len(_missing(state, types)) < len(_missing(best, types)):
+                best = state
+            if not _missing(best, types):
+                break
+        if best is not None:
+            objects += _scene_objects(best, len(objects), _groups(objects))
     return tuple(objects)
+
+
+def _rules(key: SceneKey, floor_plan: FloorPlan) -> list[tuple[FurnitureRule, ...]]:
+    """Return the rules of each room; of those for one room a house, one room has them."""
+    grid, types = floor_plan.grid, floor_plan.types
+    rules = [ROOM_TYPES[name].furniture for name in types]
+    may_have = [
+        room
+        for room, listed in enumerate(rules)
+        for rule in listed
+        if rule.one_a_house
+        and rule.without not in types
+        and clear_area_m2(grid, room) >= rule.min_m2
+    ]
+    draw = float(key.generator(Purpose.FURNITURE, draw=len(types)).random())
+    chosen = may_have[int(draw * len(may_have))] if may_have else -1
+    return [
+        tuple(rule for rule in listed if not rule.one_a_house or room == chosen)
+        for room, listed in enumerate(rules)
+    ]
+
+
+def _present(state: RoomState) -> set[str]:
+    return {item.asset.type for group, *_ in state.placed for item in group.items}
+
+
+def _missing(state: RoomState, types: frozenset[str]) -> set[str]:
+    """Return the types of asset that a room needs and does not have."""
+    record = ROOM_TYPES[state.type]
+    kitchenette = COOKING if record.cooks and "kitchen" not in types else ()
+    return {*record.needs, *kitchenette} - _present(state)
 
 
 def _groups(objects: Sequence[SceneObject]) -> int:
@@ -79,21 +125,33 @@ def _times(rule: FurnitureRule, picker: Picker, area_m2: float, density: float) 
     return min(MAX_GROUPS, certain + (draw < expected - certain))
 
 
-def _furnish_room(state: RoomState, types: frozenset[str], picker: Picker, density: float) -> None:
+def _furnish_room(
+    state: RoomState,
+    rules: Sequence[FurnitureRule],
+    types: frozenset[str],
+    picker: Picker,
+    density: float,
+    *,
+    smallest: bool,
+) -> None:
     width, depth = float(state.inner[2] - state.inner[0]), float(state.inner[3] - state.inner[1])
     room = RoomContext(state.area_m2, state.short_m, max(width, depth), types)
-    for rule in ROOM_TYPES[state.type].furniture:
+    for rule in rules:
         times = _times(rule, picker, state.area_m2, density)
-        present = {item.asset.type for group, *_ in state.placed for item in group.items}
-        if rule.without in types or rule.lacking in present:
+        if rule.without in types or rule.lacking in _present(state):
             continue
         for _ in range(times):
-            if not _try_rule(state, rule, room, picker):
+            if not _try_rule(state, rule, room, picker, smallest=smallest):
                 break
 
 
-def _try_rule(state: RoomState, rule: FurnitureRule, room: RoomContext, picker: Picker) -> bool:
-    for group in GROUP_MAKERS[rule.group](picker, room):
+def _try_rule(
+    state: RoomState, rule: FurnitureRule, room: RoomContext, picker: Picker, *, smallest: bool
+) -> bool:
+    groups = GROUP_MAKERS[rule.group](picker, room)
+    if smallest:
+        groups.sort(key=lambda group: (group.right - group.left) * group.depth)
+    for group in groups:
         if not consistent(picker, group):
             continue
         poses = (

@@ -13,6 +13,10 @@ if TYPE_CHECKING:
 
 SEAM_M = 0.008
 """Gap between the pieces of a run."""
+SMALL_COUNTER_M = 0.8
+"""Length along the wall for a small counter."""
+SHORT_RUN_M = 2.2
+"""Length along the wall for a stove, a sink and a small counter."""
 WORKING_M = 0.75
 """Clear depth before a run."""
 _FOODS = ("Microwave", "Bread", "Apple", "Lettuce", "Tomato", "Pot")
@@ -30,6 +34,8 @@ def _run(p: Picker, kinds: tuple[str, ...], longest: float) -> Group | None:
         if kind == "CounterTop":
             limit = spare / counters - SEAM_M
             piece = p.one(kind, narrow(limit))
+            if piece is None:
+                return None
         if piece is None:
             continue
         items.append(against(piece, x + piece.size[0] / 2.0))
@@ -82,19 +88,16 @@ def kitchen_run(p: Picker, room: RoomContext) -> list[Group]:
 
 
 def short_run(p: Picker, room: RoomContext) -> list[Group]:
-    """Make stove and sink, for kitchens in which no run fits."""
-    runs = [
-        _run(p, k, length)
-        for k in _SHORT_RUNS
-        for length in (0.7 * room.long_m, 0.7 * room.short_m)
-    ]
+    """Make stove, sink and a small counter, for rooms in which no run fits."""
+    lengths = (0.7 * room.long_m, 0.7 * room.short_m, SHORT_RUN_M)
+    runs = [_run(p, k, length) for k in _SHORT_RUNS for length in lengths]
     return [_laid(p, run) for run in runs if run is not None]
 
 
 def counter(p: Picker, room: RoomContext) -> list[Group]:
-    """Make another counter."""
-    run = _run(p, ("CounterTop",), 0.6 * room.long_m)
-    return [_laid(p, run)] if run is not None else []
+    """Make another counter, a small one where there is little room."""
+    runs = [_run(p, ("CounterTop",), length) for length in (0.6 * room.long_m, SMALL_COUNTER_M)]
+    return [_laid(p, run) for run in runs if run is not None]
 
 
 def sink_alone(p: Picker, room: RoomContext) -> list[Group]:

@@ -7,6 +7,7 @@ floorplans (Otten 1982): a rectangle is cut in two until every room has its own.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from internav_data.houses.room_types import ROOM_TYPES
@@ -50,17 +51,55 @@ def _min_depth(specs: Sequence[RoomSpec], rooms: Sequence[int]) -> int:
 
 def sliced_layout(specs: Sequence[RoomSpec], rng: Generator) -> Layout:
     """Draw one block, cut by a slicing tree."""
-    order = sorted(range(len(specs)), key=lambda k: (_position(specs[k]), k))
+    guests = _guests(specs, rng)
+    order = sorted(set(range(len(specs))) - guests.keys(), key=lambda k: (_position(specs[k]), k))
     if float(rng.random()) < 0.35:  # noqa: PLR2004 - other orders now and then
         order = _shuffled(rng, order)
     area = sum(spec.area_m2 for spec in specs) * 1e4
-    aspect = _uniform(rng, 1.0, 1.35 if len(specs) == 1 else 1.75)
+    aspect = _uniform(rng, 1.0, 1.6 if len(specs) == 1 else 1.75)
     side = _min_depth(specs, order)
-    width = max(snapped(math.sqrt(area * aspect)), side)
-    height = max(snapped(area / width), side)
+    # Whole centimetres, not the grid of the inner walls: houses of few rooms would repeat.
+    width = max(round(math.sqrt(area * aspect)), side)
+    height = max(round(area / width), side)
+    joined = list(specs)
+    for guest, host in guests.items():
+        together = joined[host].area_m2 + specs[guest].area_m2
+        joined[host] = replace(joined[host], area_m2=together)
     layout: Layout = {}
-    slice_rooms((0, 0, width, height), specs, order, rng, layout)
+    slice_rooms((0, 0, width, height), joined, order, rng, layout)
+    for guest, host in guests.items():
+        _tuck(layout, guest, host, specs[guest], rng)
     return layout
+
+
+def _guests(specs: Sequence[RoomSpec], rng: Generator) -> dict[int, int]:
+    """Choose small rooms that a large one wraps around: hosts by guest, one guest a host."""
+    found: dict[int, int] = {}
+    for k, spec in enumerate(specs):
+        draw, which = float(rng.random()), float(rng.random())
+        hosts = [
+            m
+            for m, other in enumerate(specs)
+            if ROOM_TYPES[other.type].host
+            and m not in found.values()
+            and other.area_m2 > 2.0 * spec.area_m2
+        ]
+        if ROOM_TYPES[spec.type].small and hosts and draw < 0.6:  # noqa: PLR2004 - mostly wrapped
+            found[k] = hosts[int(which * len(hosts))]
+    return found
+
+
+def _tuck(layout: Layout, guest: int, host: int, spec: RoomSpec, rng: Generator) -> None:
+    """Cut a small room out of a corner of its host's rectangle."""
+    x0, y0, x1, y1 = layout[host][0]
+    area, side = spec.area_m2 * 1e4, min_width_cm(spec)
+    width = max(side, snapped(math.sqrt(area) * _uniform(rng, 0.8, 1.25)))
+    depth = max(side, snapped(area / width))
+    left, low = (float(rng.random()) < 0.5 for _ in range(2))  # noqa: PLR2004 - fair coins
+    gx0, gx1 = (x0, min(x1, x0 + width)) if left else (max(x0, x1 - width), x1)
+    gy0, gy1 = (y0, min(y1, y0 + depth)) if low else (max(y0, y1 - depth), y1)
+    layout[guest] = [(gx0, gy0, gx1, gy1)]
+    layout[host] = carve(layout[host], (gx0, gy0, gx1, gy1))
 
 
 def _split_bands(

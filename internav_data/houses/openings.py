@@ -16,8 +16,13 @@ if TYPE_CHECKING:
     from numpy.random import Generator
 
     from internav_data.houses.config import HouseConfig
-    from internav_data.houses.plan import FloorGrid, FloorPlan
+    from internav_data.houses.plan import FloorGrid, FloorPlan, WallSegment
     from internav_data.records import DoorKind, SceneKey
+
+MIN_WINDOW_CM = 60
+"""Width of the narrowest window."""
+BESIDE_DOOR_CM = 20
+"""Smallest distance of a window from a door in the same wall."""
 
 
 def _kind(types: tuple[str, str], config: HouseConfig, rng: Generator) -> tuple[DoorKind, int]:
@@ -104,17 +109,15 @@ def _entrance(
 def draw_windows(
     key: SceneKey, floor_plan: FloorPlan, doors: Sequence[Opening], ceiling_cm: int
 ) -> list[Opening]:
-    """Draw windows in the outer walls, more of them in habitable rooms."""
+    """Draw windows in the outer walls, more of them in habitable rooms, of which each has one."""
     rng = key.generator(Purpose.WINDOWS)
-    grid, out = floor_plan.grid, []
-    for segment in grid.segments:
+    out: list[Opening] = []
+    for segment in floor_plan.grid.segments:
         if OUTSIDE not in {segment.before, segment.after}:
             continue
         room = max(segment.before, segment.after)
         name = floor_plan.types[room]
-        cooking = name == "living" and "kitchen" not in floor_plan.types
-        width, sill, height = ROOM_TYPES["studio" if cooking else name].window
-        top = min(sill + height, ceiling_cm - 15)
+        width, sill, top = _window_size(floor_plan.types, room, ceiling_cm)
         # Windows of equal pitch, 1.1 m apart or more; a short wall has one where its jambs fit.
         room_for = (segment.length - 2 * JAMB_CM) // (width + 110)
         if room_for == 0 and segment.length >= width + 6 * JAMB_CM:
@@ -128,8 +131,8 @@ def draw_windows(
             if float(rng.random()) < (0.85 if habitable else 0.6) and not any(
                 d.along_x == segment.along_x
                 and d.at == segment.at
-                and low < d.high + 20
-                and d.low - 20 < high
+                and low < d.high + BESIDE_DOOR_CM
+                and d.low - BESIDE_DOOR_CM < high
                 for d in doors
             ):
                 out.append(
@@ -137,4 +140,47 @@ def draw_windows(
                         segment.along_x, segment.at, low, high, (OUTSIDE, room), None, sill, top
                     )
                 )
-    return out
+    lit = {window.rooms[1] for window in out}
+    dark = [k for k, name in enumerate(floor_plan.types) if ROOM_TYPES[name].habitable]
+    return out + [
+        window
+        for room in dark
+        if room not in lit
+        for window in _only_window(floor_plan, room, doors, ceiling_cm)
+    ]
+
+
+def _window_size(types: Sequence[str], room: int, ceiling_cm: int) -> tuple[int, int, int]:
+    """Return width, sill and top of a room's windows, centimetres."""
+    cooking = types[room] == "living" and "kitchen" not in types
+    width, sill, height = ROOM_TYPES["studio" if cooking else types[room]].window
+    return width, sill, min(sill + height, ceiling_cm - 15)
+
+
+def _only_window(
+    floor_plan: FloorPlan, room: int, doors: Sequence[Opening], ceiling_cm: int
+) -> list[Opening]:
+    """Return a window in the middle of a room's longest free piece of outer wall, if it has one."""
+    width, sill, top = _window_size(floor_plan.types, room, ceiling_cm)
+    best: tuple[int, WallSegment, int] | None = None
+    for segment in floor_plan.grid.segments:
+        if {segment.before, segment.after} != {OUTSIDE, room}:
+            continue
+        taken = sorted(
+            (d.low - BESIDE_DOOR_CM, d.high + BESIDE_DOOR_CM)
+            for d in doors
+            if d.along_x == segment.along_x and d.at == segment.at
+        )
+        # The free pieces lie between doors, and between them and the wall's ends.
+        starts = [segment.low + 2 * JAMB_CM, *(high for _, high in taken)]
+        ends = [*(low for low, _ in taken), segment.high - 2 * JAMB_CM]
+        for start, end in zip(starts, ends, strict=True):
+            free = min(end, segment.high) - max(start, segment.low)
+            if free >= MIN_WINDOW_CM and (best is None or free > best[0]):
+                best = (free, segment, (start + end) // 2)
+    if best is None:
+        return []
+    free, segment, middle = best
+    half = min(width, free) // 2
+    span = (middle - half, middle + half)
+    return [Opening(segment.along_x, segment.at, *span, (OUTSIDE, room), None, sill, top)]

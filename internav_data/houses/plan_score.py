@@ -184,6 +184,42 @@ def _through_bathroom(plan: PlanCandidate, tree: Sequence[RoomEdge]) -> float:
     )
 
 
+def _reaches_all(plan: PlanCandidate, tree: Sequence[RoomEdge], bath: int, avoid: str) -> bool:
+    """Return whether a bathroom is joined to a public room without passing some rooms.
+
+    These are kitchens (`avoid` "kitchen") or private rooms ("private"); the public rooms in
+    question are not kitchens. Where a house has none, nothing can be missed.
+    """
+    types = plan.types
+    kitchens = [name == "kitchen" for name in types]
+    private = [ROOM_TYPES[name].private for name in types]
+    goals = {k for k in range(len(types)) if not (private[k] or kitchens[k])}
+    closed = kitchens if avoid == "kitchen" else private
+    seen, stack = {bath}, [bath]
+    while stack:
+        here = stack.pop()
+        for a, b in tree:
+            if here in (a, b) and (a + b - here) not in seen and not closed[a + b - here]:
+                seen.add(a + b - here)
+                stack.append(a + b - here)
+    return not goals or bool(goals & seen)
+
+
+def _bathrooms(plan: PlanCandidate) -> list[int]:
+    return [k for k, name in enumerate(plan.types) if name == "bathroom"]
+
+
+def _behind_kitchen(plan: PlanCandidate, tree: Sequence[RoomEdge]) -> float:
+    """Count the bathrooms that are reached through a kitchen alone."""
+    return float(sum(not _reaches_all(plan, tree, k, "kitchen") for k in _bathrooms(plan)))
+
+
+def _none_for_all(plan: PlanCandidate, tree: Sequence[RoomEdge]) -> float:
+    """Return 1 where every bathroom lies behind a bedroom or another private room."""
+    baths = _bathrooms(plan)
+    return float(bool(baths) and not any(_reaches_all(plan, tree, k, "private") for k in baths))
+
+
 def _depth_error(plan: PlanCandidate, tree: Sequence[RoomEdge]) -> float:
     if plan.rooms_on_path is None:
         return 0.0
@@ -230,6 +266,8 @@ TREE_SCORE: tuple[ScoreTerm, ...] = (
     ScoreTerm("doors between private rooms", 3.0, _private_doors),
     ScoreTerm("paths through private rooms", 4.0, _private_passages),
     ScoreTerm("paths through bathrooms", 12.0, _through_bathroom),
+    ScoreTerm("bathrooms behind a kitchen", 15.0, _behind_kitchen),
+    ScoreTerm("no bathroom for all", 15.0, _none_for_all),
     ScoreTerm("rooms on a path, from the aim", 10.0, _depth_error),
 )
 """Penalties that decide between the door trees of one candidate."""
@@ -239,7 +277,7 @@ PLAN_SCORE: tuple[ScoreTerm, ...] = (
     ScoreTerm("slender rooms", 2.0, _slender_rooms),
     ScoreTerm("rooms too large", 1.5, _large_rooms),
     ScoreTerm("nooks", 1.5, _nooks),
-    ScoreTerm("habitable rooms without daylight", 3.0, _dark_rooms),
+    ScoreTerm("habitable rooms without daylight", 12.0, _dark_rooms),
     ScoreTerm("long house", 2.0, _long_house),
     ScoreTerm("neighbours apart", 1.0, _missing_neighbours),
     ScoreTerm("large halls", 12.0, _large_halls),

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from internav_data.houses.quota import SHARES, room_count
+from internav_data.houses.quota import SHARES, room_count, size_quantile
 from internav_data.houses.room_types import ROOM_TYPES, RoomStandard
 from internav_data.records import ProgrammeStream, Purpose
 
@@ -16,10 +16,16 @@ if TYPE_CHECKING:
     from numpy.random import Generator
 
     from internav_data.houses.config import HouseConfig
-    from internav_data.records import SceneKey
+    from internav_data.records import HousePreset, SceneKey
 
 PAPER_AREA_M2 = 25.0
 """Mean area of a room in the preset `paper`: ProcTHOR's houses have 26, 47, 67, 103 … m²."""
+
+SIZE_SPREAD: Mapping[HousePreset, float] = {"paper": 0.45, "realistic": 0.2}
+"""Standard deviation of the logarithm of a house's area, given the number of its rooms. ProcTHOR's
+houses of the 95 % quantile are 2.9 to 5.2 times as large as those of the 5 % quantile."""
+ROOM_SPREAD = 0.16
+"""The same for the area of one room beside the others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,26 +41,28 @@ class RoomSpec:
 
 _HOMES: Mapping[int, tuple[tuple[float, str], ...]] = {
     1: ((1.0, "studio"),),
-    2: (
-        (0.40, "living bedroom"),
-        (0.25, "studio bathroom"),
-        (0.20, "kitchen living"),
-        (0.15, "kitchen bedroom"),
-    ),
+    2: ((1.0, "studio bathroom"),),
     3: (
-        (0.40, "living bedroom bathroom"),
-        (0.30, "living kitchen bedroom"),
-        (0.15, "living kitchen bathroom"),
-        (0.15, "kitchen bedroom bathroom"),
+        (0.60, "living bedroom bathroom"),
+        (0.25, "studio kitchen bathroom"),
+        (0.15, "studio bedroom bathroom"),
     ),
     4: (
         (0.60, "living kitchen bedroom bathroom"),
         (0.20, "living bedroom bedroom bathroom"),
-        (0.10, "living kitchen dining bedroom"),
-        (0.10, "living kitchen bedroom office"),
+        (0.10, "studio kitchen bedroom bathroom"),
+        (0.10, "living bedroom office bathroom"),
     ),
 }
-"""Small homes: (share, rooms)."""
+"""Small homes: (share, rooms). From two rooms on there is a bathroom, and a room to reach it from
+that is neither kitchen nor bedroom. A studio or living room has the kitchen where none is."""
+_WITH_HALL = {
+    1: "hall",
+    2: "hall studio",
+    3: "hall studio bathroom",
+    4: "hall living bedroom bathroom",
+}
+"""Small homes with a hall, which `HouseConfig.hall_from` may ask for."""
 _CORE = "living kitchen bedroom bathroom"
 """Rooms of every home of five rooms or more."""
 
@@ -75,10 +83,8 @@ def _choose(rng: Generator, weighted: list[tuple[float, str]]) -> str:
 
 def _room_types(rng: Generator, count: int, hall_from: int) -> list[str]:
     if count in _HOMES:
-        types = _choose(rng, list(_HOMES[count])).split()
-        if count >= hall_from:
-            types[-1] = "hall"
-        return types
+        drawn = _choose(rng, list(_HOMES[count]))
+        return (_WITH_HALL[count] if count >= hall_from else drawn).split()
     types = _CORE.split()
     if count >= hall_from:
         types.insert(0, "hall")
@@ -109,17 +115,29 @@ def _standards(types: list[str], config: HouseConfig, rng: Generator) -> list[Ro
     return out
 
 
-def _areas(standards: list[RoomStandard], config: HouseConfig, rng: Generator) -> list[float]:
-    """Draw the wanted areas, centre line to centre line, m²."""
+def _areas(
+    standards: list[RoomStandard], config: HouseConfig, size: float, rng: Generator
+) -> list[float]:
+    """Draw the wanted areas, centre line to centre line, m².
+
+    `size` is the house's own, a normal deviate.
+    """
     # Log-normal, so that no area is negative; the paper preset then fits the house to its total.
-    spread = 0.14 if config.preset == "paper" else 0.10
-    areas = [s.area_m2 * math.exp(spread * float(rng.standard_normal())) for s in standards]
-    areas = [min(s.high_m2, max(s.low_m2, a)) for s, a in zip(standards, areas, strict=True)]
+    share = SIZE_SPREAD[config.preset]
+    larger = math.exp(share * size - share * share / 2.0)
+    areas = [s.area_m2 * math.exp(ROOM_SPREAD * float(rng.standard_normal())) for s in standards]
+    # Somewhat above the smallest allowed area, which not every candidate keeps; by how much is
+    # drawn, or the smallest houses would be copies of each other.
+    least = [s.low_m2 * (1.08 + 0.14 * float(rng.random())) for s in standards]
     if config.preset == "paper":
         count = len(areas)
-        total = PAPER_AREA_M2 * count * math.exp(0.12 * float(rng.standard_normal()))
-        factor = total / sum(areas) * config.scale_of(count) ** 2
-        areas = [max(s.low_m2, a * factor) for s, a in zip(standards, areas, strict=True)]
+        larger *= PAPER_AREA_M2 * count / sum(areas) * config.scale_of(count) ** 2
+        areas = [max(low, a * larger) for low, a in zip(least, areas, strict=True)]
+    else:
+        areas = [
+            min(s.high_m2, max(low, a * larger))
+            for s, low, a in zip(standards, least, areas, strict=True)
+        ]
     # Walls take about a tenth of a real room and a twentieth of a generous one.
     return [a + 0.24 * math.sqrt(a) + 0.02 for a in areas]
 
@@ -139,7 +157,7 @@ def programme(key: SceneKey, config: HouseConfig) -> tuple[RoomSpec, ...]:
             shares = {count: SHARES[count] for count in request.counts}
         types = _room_types(rng, room_count(key.seed, key.scene, shares), config.min_hall_rooms())
     standards = _standards(types, config, rng)
-    areas = _areas(standards, config, rng)
+    areas = _areas(standards, config, size_quantile(key), rng)
     return tuple(
         RoomSpec(name, area, standard)
         for name, area, standard in zip(types, areas, standards, strict=True)

@@ -1,13 +1,14 @@
-"""Number of rooms of each scene: a low-discrepancy sequence, so that any prefix keeps the shares.
+"""Number of rooms and size of each scene: low-discrepancy sequences, so that any prefix keeps them.
 
 Source of the shares: Table 2 of the paper (1-2, 3-5 and 6-10 rooms); inside 1-2 rooms 56 % to 44 %.
 """
 
 from __future__ import annotations
 
+from statistics import NormalDist
 from typing import TYPE_CHECKING
 
-from internav_data.records import ProgrammeStream, Purpose, generator
+from internav_data.records import ProgrammeStream, Purpose, SceneKey, generator
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,6 +23,8 @@ SHARES: Mapping[int, float] = {
 }
 """Share of scenes by room count; sums to 1."""
 
+SILVER = 0.41421356237309515
+"""The square root of 2 less one: a second such sequence, independent of the first."""
 GOLDEN = 0.6180339887498949
 """The golden ratio's fractional part: its multiples modulo 1 are a Kronecker sequence of lowest
 discrepancy (additive recurrence; Niederreiter 1992)."""
@@ -48,3 +51,14 @@ def room_count(seed: int, scene: int, shares: Mapping[int, float] = SHARES) -> i
         if position < 0.0:
             return count
     return max(shares)
+
+
+def size_quantile(key: SceneKey) -> float:
+    """Return how large a scene's house is among those of its programme: a normal deviate.
+
+    Its mean is 0 and its deviation nearly 1, over scenes of any number of rooms; it lies within
+    the central 96 %, so that no house is a freak. Other attempts have other sizes.
+    """
+    turn = float(generator(key.seed, Purpose.PROGRAMME, episode=ProgrammeStream.SIZES).random())
+    share = (turn + key.scene * SILVER + key.attempt * GOLDEN) % 1.0
+    return NormalDist().inv_cdf(0.02 + 0.96 * share)

@@ -89,6 +89,8 @@ class FurnitureRule:
     """Type of room: only houses without it have the group here."""
     lacking: str = ""
     """Type of asset: only a room that has none of it yet has the group."""
+    one_a_house: bool = False
+    """Whether one room of a house has the group: drawn from those whose rules say so."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +126,10 @@ class RoomType:
     """Floor material; `carpet` in a third of the rooms, else planks."""
     wall: Literal["paint", "bricks", "tiles"]
     """Wall material; `bricks` in few of the rooms, else paint."""
+    needs: tuple[str, ...]
+    """Types of asset without which it does not work: a room that lacks one is furnished anew."""
+    cooks: bool
+    """Whether it has stove, sink and counter where the house has no kitchen."""
     pairs: Mapping[str, RoomPair]
     """Relations to other types. A pair stands in one of its two records, no matter which."""
     furniture: tuple[FurnitureRule, ...]
@@ -138,10 +144,21 @@ _PICTURES = FurnitureRule("painting", "centre", 0.7, 0.03)
 _PLANT = FurnitureRule("plant", "corner", 0.5, 0.015)
 _LAMP = FurnitureRule("floor_lamp", "corner", 0.5)
 _RUG = FurnitureRule("rug", "open", 0.4)
+_COOKING = tuple(
+    FurnitureRule(group, "corner", 1.0, without="kitchen", lacking=lacking)
+    for group, lacking in (
+        ("kitchen_run", ""),
+        ("short_run", "Stove"),
+        ("sink_alone", "Sink"),
+        ("counter", "CounterTop"),
+        ("fridge", "Fridge"),
+    )
+)
+"""Kitchenette of a room in a house without a kitchen."""
 
 ROOM_TYPES: Mapping[str, RoomType] = {
     "bedroom": RoomType(
-        paper=RoomStandard(25.0, 11.5, 60.0, 2.9, 1.6),
+        paper=RoomStandard(25.0, 9.0, 60.0, 2.6, 1.6),
         realistic=RoomStandard(11.3, 6.5, 17.0, 2.13, 1.75),
         private=True,
         habitable=True,
@@ -155,6 +172,8 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         window=WindowSize(130, 90, 122),
         floor="carpet",
         wall="paint",
+        needs=("Bed", "Wardrobe"),
+        cooks=False,
         pairs={},
         furniture=(
             FurnitureRule("bed", "centre", 1.0),
@@ -175,7 +194,7 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         ),
     ),
     "bathroom": RoomType(
-        paper=RoomStandard(13.0, 5.0, 30.0, 2.0, 1.9),
+        paper=RoomStandard(13.0, 4.5, 30.0, 1.8, 1.9),
         realistic=RoomStandard(4.6, 3.0, 7.5, 1.5, 2.2),
         private=True,
         habitable=False,
@@ -189,6 +208,8 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         window=WindowSize(60, 140, 60),
         floor="tiles",
         wall="tiles",
+        needs=("Toilet", "Sink"),
+        cooks=False,
         pairs={
             "bedroom": RoomPair(6.0, shared_wall=0.5, loop_share=0.5),
         },
@@ -197,7 +218,7 @@ ROOM_TYPES: Mapping[str, RoomType] = {
             FurnitureRule("shower", "corner", 1.0, lacking="Bathtub"),
             FurnitureRule("toilet", "corner", 1.0),
             FurnitureRule("washbasin", "corner", 1.0),
-            FurnitureRule("shower", "corner", 0.3, min_m2=9.0),
+            FurnitureRule("shower", "corner", 0.3, lacking="Shower", min_m2=9.0),
             FurnitureRule("hamper", "corner", 0.5, min_m2=4.0),
             FurnitureRule("laundry", "corner", 0.4, without="laundry", min_m2=7.0),
             FurnitureRule("bookshelf", "corner", 0.5, min_m2=7.0),
@@ -209,7 +230,7 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         ),
     ),
     "dining": RoomType(
-        paper=RoomStandard(24.0, 11.0, 60.0, 3.0, 1.6),
+        paper=RoomStandard(24.0, 9.0, 60.0, 2.7, 1.6),
         realistic=RoomStandard(11.0, 7.5, 16.0, 2.5, 1.7),
         private=False,
         habitable=True,
@@ -223,6 +244,8 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         window=WindowSize(150, 80, 130),
         floor="planks",
         wall="paint",
+        needs=("DiningTable",),
+        cooks=False,
         pairs={
             "bathroom": RoomPair(5.0),
             "bedroom": RoomPair(4.5),
@@ -239,7 +262,7 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         ),
     ),
     "office": RoomType(
-        paper=RoomStandard(19.0, 9.0, 40.0, 2.6, 1.6),
+        paper=RoomStandard(19.0, 7.5, 40.0, 2.4, 1.6),
         realistic=RoomStandard(9.0, 6.6, 13.0, 2.13, 1.75),
         private=True,
         habitable=True,
@@ -253,6 +276,8 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         window=WindowSize(130, 90, 122),
         floor="carpet",
         wall="paint",
+        needs=("Desk",),
+        cooks=False,
         pairs={},
         furniture=(
             FurnitureRule("desk", "sun", 1.0),
@@ -271,7 +296,7 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         ),
     ),
     "laundry": RoomType(
-        paper=RoomStandard(12.0, 5.0, 25.0, 2.0, 1.9),
+        paper=RoomStandard(12.0, 4.5, 25.0, 1.8, 1.9),
         realistic=RoomStandard(4.0, 2.6, 7.0, 1.5, 2.2),
         private=True,
         habitable=False,
@@ -285,6 +310,8 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         window=WindowSize(60, 140, 60),
         floor="tiles",
         wall="tiles",
+        needs=("WashingMachine",),
+        cooks=False,
         pairs={
             "bathroom": RoomPair(8.0),
         },
@@ -313,6 +340,8 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         window=WindowSize(60, 150, 50),
         floor="tiles",
         wall="paint",
+        needs=(),
+        cooks=False,
         pairs={},
         furniture=(
             FurnitureRule("storage_rack", "corner", 1.0, 0.06),
@@ -323,7 +352,7 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         ),
     ),
     "kitchen": RoomType(
-        paper=RoomStandard(25.0, 10.0, 60.0, 2.9, 1.7),
+        paper=RoomStandard(25.0, 8.0, 60.0, 2.5, 1.7),
         realistic=RoomStandard(8.0, 6.6, 9.0, 2.13, 1.9),
         private=False,
         habitable=True,
@@ -337,8 +366,10 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         window=WindowSize(120, 112, 100),
         floor="tiles",
         wall="paint",
+        needs=("Stove", "Sink", "CounterTop"),
+        cooks=False,
         pairs={
-            "bathroom": RoomPair(4.0),
+            "bathroom": RoomPair(9.0),
             "bedroom": RoomPair(4.5),
             "dining": RoomPair(0.5, shared_wall=1.0, open_plan=True),
             "laundry": RoomPair(2.0, shared_wall=0.4, loop_share=0.5),
@@ -347,9 +378,11 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         furniture=(
             FurnitureRule("kitchen_run", "corner", 1.0),
             FurnitureRule("short_run", "corner", 1.0, lacking="Stove"),
+            FurnitureRule("sink_alone", "corner", 1.0, lacking="Sink"),
+            FurnitureRule("counter", "corner", 1.0, lacking="CounterTop"),
             FurnitureRule("fridge", "corner", 1.0, lacking="Fridge"),
             FurnitureRule("counter", "corner", 0.5, 0.015),
-            FurnitureRule("dining", "open", 1.0, without="dining", min_m2=11.0),
+            FurnitureRule("dining", "open", 1.0, without="dining", min_m2=11.0, one_a_house=True),
             FurnitureRule("island", "open", 0.35, min_m2=20.0),
             FurnitureRule("bin", "corner", 0.8),
             FurnitureRule("bookshelf", "corner", 0.3, 0.01),
@@ -360,7 +393,7 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         ),
     ),
     "living": RoomType(
-        paper=RoomStandard(32.0, 15.0, 90.0, 3.5, 1.6),
+        paper=RoomStandard(32.0, 12.0, 90.0, 3.0, 1.6),
         realistic=RoomStandard(25.0, 19.0, 48.0, 3.2, 1.7),
         private=False,
         habitable=True,
@@ -374,6 +407,8 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         window=WindowSize(180, 60, 150),
         floor="planks",
         wall="bricks",
+        needs=("Sofa",),
+        cooks=True,
         pairs={
             "bathroom": RoomPair(3.5),
             "bedroom": RoomPair(3.0, loop_share=0.35),
@@ -385,11 +420,8 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         furniture=(
             FurnitureRule("seating", "centre", 1.0),
             FurnitureRule("sofa_alone", "centre", 1.0, lacking="Sofa"),
-            FurnitureRule("kitchen_run", "corner", 1.0, without="kitchen", min_m2=14.0),
-            FurnitureRule(
-                "fridge", "corner", 1.0, without="kitchen", lacking="Fridge", min_m2=14.0
-            ),
-            FurnitureRule("dining", "open", 1.0, without="dining", min_m2=20.0),
+            *_COOKING,
+            FurnitureRule("dining", "open", 1.0, without="dining", min_m2=16.0, one_a_house=True),
             FurnitureRule("bookshelf", "corner", 0.8, 0.02),
             FurnitureRule("armchair", "corner", 0.6, 0.01),
             FurnitureRule("side_table", "any", 0.5, 0.01),
@@ -419,6 +451,8 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         window=WindowSize(90, 100, 110),
         floor="planks",
         wall="paint",
+        needs=(),
+        cooks=False,
         pairs={
             "bathroom": RoomPair(1.8),
             "bedroom": RoomPair(2.0),
@@ -441,12 +475,12 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         ),
     ),
     "studio": RoomType(
-        paper=RoomStandard(28.0, 18.0, 80.0, 3.8, 1.6),
+        paper=RoomStandard(28.0, 12.5, 80.0, 3.2, 1.7),
         realistic=RoomStandard(30.0, 22.0, 45.0, 3.6, 1.7),
         private=False,
         habitable=True,
         small=False,
-        host=False,
+        host=True,
         position=4,
         hall_end=None,
         wing=False,
@@ -455,19 +489,20 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         window=WindowSize(140, 112, 100),
         floor="planks",
         wall="bricks",
+        needs=("Bed",),
+        cooks=True,
         pairs={
             "bathroom": RoomPair(2.0),
             "bedroom": RoomPair(3.0),
+            "kitchen": RoomPair(0.8, shared_wall=0.8),
         },
         furniture=(
             FurnitureRule("bed", "centre", 1.0),
-            FurnitureRule("kitchen_run", "corner", 1.0),
-            FurnitureRule("short_run", "corner", 1.0, lacking="Stove"),
-            FurnitureRule("fridge", "corner", 1.0, lacking="Fridge"),
+            *_COOKING,
             FurnitureRule("seating", "centre", 1.0, min_m2=22.0),
             FurnitureRule("sofa_alone", "centre", 1.0, lacking="Sofa"),
             FurnitureRule("wardrobe", "corner", 1.0),
-            FurnitureRule("dining", "open", 0.8),
+            FurnitureRule("dining", "open", 0.8, without="dining", one_a_house=True),
             FurnitureRule("desk", "sun", 0.4),
             FurnitureRule("bookshelf", "corner", 0.5, 0.01),
             FurnitureRule("armchair", "corner", 0.3),

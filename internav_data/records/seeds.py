@@ -67,6 +67,8 @@ class ProgrammeStream(IntEnum):
     """Offset of the sequence of room counts."""
     ROOMS = 1
     """Types and areas of the rooms of a scene."""
+    SIZES = 2
+    """Offset of the sequence of sizes of houses."""
 
 
 class FloorPlanStream(IntEnum):

@@ -16,10 +16,10 @@ SCENES = 33
 ALL_TYPES = "hall,living,dining,kitchen,laundry,office,storage,studio,bathroom,bedroom"
 
 GOLDEN = {
-    "paper": "5f4fa506c75536d8836e7cd036860514bd2e2afe0742dff59106789338bd9189",
-    "paper, every type": "04d83db8a40299c6c336cbdda6b08808242e71b87917e1dc81eece055661aab8",
-    "realistic": "4fe19d4202b9fb640c8c35aa395eb031743552825f7b635b05eb3d5a7f8c11c3",
-    "realistic, every type": "e77f53ecaf0a9aeacab0c7a26881c826dba93b9dc849df2da076ebb9f712f010",
+    "paper": "94781f1902670b5a68ed89eaa24b368c1718c205cc3edf20447dfcd8436fa4e2",
+    "paper, every type": "5951052b92a500b594a9af75044cb54134c76896e5386a61a72245c27cc2b435",
+    "realistic": "d1b3780eea61427536b4660c7d33fb28c84cb0a4c19d5cdcf0330ddd3063cc33",
+    "realistic, every type": "4f587de007bcc6c43edb3c404a0bd1502d401a2f9232afd1949cc647729d637b",
 }
 
 

@@ -46,7 +46,8 @@ def test_areas_and_proportions_by_type(sample, oracle, preset):
     assert {"bathroom", "bedroom", "kitchen", "living"} <= set(judged)
     for name, values in judged.items():
         typical = ROOM_TYPES[name].standard(preset).area_m2
-        assert 0.7 * typical < median(values) < 1.4 * typical, (name, median(values))
+        # Houses of one size differ by a factor of three in area, and these are few.
+        assert 0.65 * typical < median(values) < 1.5 * typical, (name, median(values))
 
 
 def test_paper_houses_have_the_areas_of_procthor(assets):
@@ -86,7 +87,14 @@ def test_a_score_can_be_printed_term_by_term():
     names = [term.name for term in PLAN_SCORE]
     assert len(set(names)) == len(names)
     seen = {"nooks"}
-    programmes = ("8", "3", "bathroom:4", "hall,bedroom")
+    programmes = (
+        "8",
+        "3",
+        "bathroom:4",
+        "hall,bedroom",
+        "living,kitchen:2,bathroom:2",
+        "living,bedroom:2,bathroom",
+    )
     for preset, rooms in (*product(["paper"], programmes), ("realistic", "8")):
         for scene in range(20):
             plan = chosen(scene, rooms=rooms, preset=preset, candidates=1)
