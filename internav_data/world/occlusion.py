@@ -93,7 +93,7 @@ def _visibility_points(asset: Asset) -> tuple[Floats, Ints]:
     return points, owners
 
 
-@lru_cache(maxsize=2048)
+@lru_cache(maxsize=4096)
 def placed_occlusion_shape(asset: Asset, pose: Pose) -> OcclusionShape:
     """Return the occlusion shape of an object at a pose in the house; cached, read-only."""
     own = occlusion_shape(asset)

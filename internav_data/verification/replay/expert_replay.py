@@ -125,7 +125,7 @@ class ExpertReplay:
             if was.pose != now.pose:
                 self._expect(
                     now.dynamics.pushable or now.dynamics.pickable,
-                    "physics.expert-fixed",
+                    f"{self._prefix}-fixed",
                     f"{what}: item {k} ({now.asset.asset_id}) stays, which is fixed",
                     "moved",
                 )

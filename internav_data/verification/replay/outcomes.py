@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from shapely import Geometry
 
-    from internav_data.records import Asset, Episode, Outcome, Pose
+    from internav_data.records import Asset, Episode, Outcome, Pose, SceneObject
     from internav_data.verification.obstacles import Expect
     from internav_data.verification.replay.checked_scene import Arrangement, CheckedScene
     from internav_data.world import MovableObject, World
@@ -69,7 +69,7 @@ class OutcomeCheck:
     def fixed_stay(self) -> None:
         """Check that nothing moved that the agent can neither push nor pick up."""
         assets, house = self.scene.assets, self.scene.layout.house
-        furniture = {o.object_id for o in house.objects if _is_movable(assets[o.asset_id])}
+        furniture = {o.object_id for o in house.objects if _is_movable(o, assets[o.asset_id])}
         for other in self.outcome.moved or ():
             if other.obstacle is not None:
                 own = self.episode.obstacles[other.obstacle]
@@ -192,6 +192,7 @@ class OutcomeCheck:
             self.expect("path-m-after", f"{path.length():.4f} m", stated, holds=False)
 
 
-def _is_movable(asset: Asset) -> bool:
-    """Return whether furniture of an asset can move: a type of obstacles that can be handled."""
-    return asset.spawnable and (asset.pushable or asset.pickable)
+def _is_movable(placed: SceneObject, asset: Asset) -> bool:
+    """Return whether furniture can move: a type of obstacles, with dynamics that let it."""
+    own = placed.dynamics or asset.dynamics
+    return asset.spawnable and (own.pushable or own.pickable)

@@ -106,8 +106,9 @@ def _furniture(house: House, shapes: Shapes) -> dict[Key, Standing]:
         asset = shapes.assets[placed.asset_id]
         if not _is_floor(asset):
             name = f"object {placed.object_id} ({asset.asset_id})"
+            own = placed.dynamics or asset.dynamics
             out[Key("object", placed.object_id)] = Standing(
-                name, asset.asset_id, placed.pose, asset.mass_kg, asset.friction, moves=False
+                name, asset.asset_id, placed.pose, own.mass_kg, own.friction, moves=False
             )
     return out
 
