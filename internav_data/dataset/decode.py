@@ -8,17 +8,18 @@ of microseconds, and each row of a table no more.
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
+import numpy as np
 import pyarrow as pa
 
-from internav_data.dataset.nodes import Coordinates, Keyed, Leaf, Node, Sequence
+from internav_data.dataset.nodes import Coordinates, Field, Keyed, Leaf, Node, record_node
+from internav_data.dataset.nodes import Sequence as SequenceNode
 from internav_data.records.errors import ValidationError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    import numpy as np
+    from collections.abc import Iterable, Mapping
 
     from internav_data.dataset.tables import TableSpec
 
@@ -53,14 +54,12 @@ class RecordReader:
                 f"{schema_difference(table.schema, spec.schema)}"
             )
         self.num_rows: int = table.num_rows
-        self._make = spec.cls if not extra else _with_extra(spec.cls, extra)
-        self._columns = [
-            cursor(field.node, one_array(table.column(field.name))) for field in spec.node.fields
-        ]
+        columns = [one_array(table.column(name)) for name in table.schema.names]
+        self._records = _RecordCursor(_maker(spec.cls, extra or {}), spec.node.fields, columns)
 
     def rows(self, start: int, stop: int) -> list[Any]:
         """Return the records of rows start … stop - 1."""
-        return list(map(self._make, *[column.take(start, stop) for column in self._columns]))
+        return self._records.take(start, stop)
 
 
 class ColumnReader:
@@ -76,13 +75,6 @@ class ColumnReader:
         """Return the rows start … stop - 1, each a dictionary by column."""
         columns = [column.take(start, stop) for column in self._columns]
         return [dict(zip(self._names, row, strict=True)) for row in zip(*columns, strict=True)]
-
-
-def _with_extra(cls: type[Any], extra: Mapping[str, Any]) -> Any:  # noqa: ANN401 - a constructor
-    def make(*values: object) -> object:
-        return cls(*values, **extra)
-
-    return make
 
 
 def one_array(column: pa.ChunkedArray) -> pa.Array:
@@ -102,64 +94,133 @@ def schema_difference(got: pa.Schema, expected: pa.Schema) -> str:
     return f"of another type: {changed}" if changed else "in another order"
 
 
-class _LeafCursor:
-    def __init__(self, array: pa.Array, *, is_text: bool) -> None:
-        self._valid = _validity(array)
-        self._words: list[str] | None = None
-        if is_text:
-            # Few distinct strings: each is made once and shared by all records.
-            coded = (
-                array.fill_null("").dictionary_encode()
-                if array.null_count
-                else (array.dictionary_encode())
-            )
-            self._words = coded.dictionary.to_pylist()
-            self._values = coded.indices.to_numpy(zero_copy_only=False)
-        else:
-            if array.null_count:
-                array = array.fill_null(False if pa.types.is_boolean(array.type) else 0)
-            self._values = array.to_numpy(zero_copy_only=False)
+FEW = 5
+"""Number of records from which on fields are set column by column."""
+Maker = Callable[[Sequence[Sequence[Any]], int], list[Any]]
+"""Function from columns, and the number of their rows, to records."""
+
+
+def _maker(cls: type[Any], extra: Mapping[str, Any]) -> Maker:
+    """Return a function that makes records of a frozen dataclass with slots.
+
+    `extra` gives the fields that are not stored, the same for every record.
+    """
+    stored = [field.name for field in record_node(cls).fields]
+    setters = [cls.__dict__[name].__set__ for name in (*stored, *extra)]
+    repeated = [itertools.repeat(value) for value in extra.values()]
+
+    def made(columns: Sequence[Sequence[Any]], count: int) -> list[Any]:
+        if count < FEW:
+            return [cls(*row, **extra) for row in zip(*columns, strict=True)]
+        # The constructor of a frozen dataclass calls object.__setattr__ for each field, which takes
+        # twice as long as the slots themselves. A setter returns None, so that any() runs through.
+        records = [object.__new__(cls) for _ in range(count)]
+        for setter, column in zip(setters, (*columns, *repeated), strict=True):
+            any(map(setter, records, column))
+        return records
+
+    return made
+
+
+class _NumberCursor:
+    def __init__(self, array: pa.Array) -> None:
+        self._values = array.to_numpy(zero_copy_only=False)
 
     def take(self, start: int, stop: int) -> list[Any]:
-        values = self._values[start:stop].tolist()
-        if self._words is not None:
-            words = self._words
-            values = [words[k] for k in values]
-        return _nulled(values, self._valid, start, stop)
+        values: list[Any] = self._values[start:stop].tolist()
+        return values
 
 
-class _StructCursor:
-    def __init__(self, make: Any, names: list[str], nodes: list[Node], array: pa.Array) -> None:  # noqa: ANN401
+class _WordCursor:
+    """Reader of strings: the few distinct ones are made once and shared by all records."""
+
+    def __init__(self, array: pa.Array) -> None:
+        coded = array.dictionary_encode()
+        self._words: list[str] = coded.dictionary.to_pylist()
+        self._codes = coded.indices.to_numpy(zero_copy_only=False)
+
+    def take(self, start: int, stop: int) -> list[Any]:
+        words = self._words
+        return [words[k] for k in self._codes[start:stop].tolist()]
+
+
+class _CoordinatesCursor:
+    """Reader of tuples of numbers, which share one array: a slice for all of their members."""
+
+    def __init__(self, names: Iterable[str], array: pa.Array) -> None:
+        columns = [array.field(k) for k in _indices(array, names)]
+        self._values = np.column_stack([c.to_numpy(zero_copy_only=False) for c in columns])
+
+    def take(self, start: int, stop: int) -> list[Any]:
+        return [*map(tuple, self._values[start:stop].tolist())]
+
+
+class _RecordCursor:
+    """Reader of records: their numbers of one type share an array, all else has its own reader."""
+
+    def __init__(self, make: Maker, fields: Iterable[Field], arrays: Iterable[pa.Array]) -> None:
         self._make = make
-        self._valid = _validity(array)
-        self._columns = [
-            cursor(node, array.field(k))
-            for k, node in zip(_indices(array, names), nodes, strict=True)
-        ]
+        self._others: list[tuple[int, Cursor]] = []
+        numbers: dict[str, tuple[list[int], list[np.ndarray[Any, Any]]]] = {}
+        for place, (field, array) in enumerate(zip(fields, arrays, strict=True)):
+            if not isinstance(field.node, Leaf) or field.node.kind == "string" or array.null_count:
+                self._others.append((place, cursor(field.node, array)))
+                continue
+            places, columns = numbers.setdefault(field.node.kind, ([], []))
+            places.append(place)
+            columns.append(array.to_numpy(zero_copy_only=False))
+        self._numbers = [(places, np.stack(columns)) for places, columns in numbers.values()]
+        self._width = len(self._others) + sum(len(places) for places, _ in self._numbers)
 
     def take(self, start: int, stop: int) -> list[Any]:
-        columns = [column.take(start, stop) for column in self._columns]
-        made = zip(*columns, strict=True) if self._make is tuple else map(self._make, *columns)
-        return _nulled(list(made), self._valid, start, stop)
+        columns: list[list[Any]] = [[]] * self._width
+        for places, block in self._numbers:
+            for place, values in zip(places, block[:, start:stop].tolist(), strict=True):
+                columns[place] = values
+        for place, reader in self._others:
+            columns[place] = reader.take(start, stop)
+        return self._make(columns, stop - start)
 
 
 class _ListCursor:
     def __init__(self, node: Node, array: pa.Array) -> None:
-        self._valid = _validity(array)
         self._offsets = array.offsets.to_numpy()
         self._items = cursor(node, array.values)
 
     def take(self, start: int, stop: int) -> list[Any]:
-        if start >= stop:
-            return []
         offsets = self._offsets[start : stop + 1].tolist()
-        first = offsets[0]
-        items = self._items.take(first, offsets[-1])
-        rows = [tuple(items[a - first : b - first]) for a, b in itertools.pairwise(offsets)]
-        return _nulled(rows, self._valid, start, stop)
+        first, last = offsets[0], offsets[-1]
+        if first == last:  # most lists of moved objects
+            return [()] * (stop - start)
+        items = self._items.take(first, last)
+        return [tuple(items[a - first : b - first]) for a, b in itertools.pairwise(offsets)]
 
 
-Cursor = _LeafCursor | _StructCursor | _ListCursor
+class _SparseCursor:
+    """Reader of values some of which are null: a reader of the others, and their places."""
+
+    def __init__(self, node: Node, array: pa.Array) -> None:
+        self._valid = array.is_valid().to_numpy(zero_copy_only=False)
+        self._before = np.concatenate([[0], np.cumsum(self._valid)])
+        """Number of values that are there before each row."""
+        self._others = cursor(node, array.drop_null())
+
+    def take(self, start: int, stop: int) -> list[Any]:
+        first, last = self._before[start], self._before[stop]
+        if first == last:  # most poses of outcomes
+            return [None] * (stop - start)
+        there = self._others.take(first, last)
+        if last - first == stop - start:
+            return there
+        following = iter(there)
+        return [next(following) if ok else None for ok in self._valid[start:stop].tolist()]
+
+
+class Cursor(Protocol):
+    """Reader of one column."""
+
+    def take(self, start: int, stop: int) -> list[Any]:
+        """Return the values of rows start … stop - 1."""
 
 
 def cursor(node: Node, array: pa.Array) -> Cursor:
@@ -178,33 +239,20 @@ def cursor(node: Node, array: pa.Array) -> Cursor:
         `node` is a mapping, which has no columns.
 
     """
+    if array.null_count:
+        return _SparseCursor(node, array)
     if isinstance(node, Leaf):
-        return _LeafCursor(array, is_text=node.kind == "string")
-    if isinstance(node, Sequence):
+        return _WordCursor(array) if node.kind == "string" else _NumberCursor(array)
+    if isinstance(node, SequenceNode):
         return _ListCursor(node.item, array)
     if isinstance(node, Coordinates):
-        return _StructCursor(tuple, list(node.names), [node.leaf] * len(node.names), array)
+        return _CoordinatesCursor(node.names, array)
     if isinstance(node, Keyed):
         raise TypeError("a mapping has no columns")
-    fields = node.fields
-    return _StructCursor(node.cls, [f.name for f in fields], [f.node for f in fields], array)
+    names = [field.name for field in node.fields]
+    children = [array.field(k) for k in _indices(array, names)]
+    return _RecordCursor(_maker(node.cls, {}), node.fields, children)
 
 
-def _indices(array: pa.Array, names: list[str]) -> list[int]:
+def _indices(array: pa.Array, names: Iterable[str]) -> list[int]:
     return [array.type.get_field_index(name) for name in names]
-
-
-def _validity(array: pa.Array) -> np.ndarray[Any, Any] | None:
-    if not array.null_count:
-        return None
-    valid: np.ndarray[Any, Any] = array.is_valid().to_numpy(zero_copy_only=False)
-    return valid
-
-
-def _nulled(
-    values: list[Any], valid: np.ndarray[Any, Any] | None, start: int, stop: int
-) -> list[Any]:
-    if valid is None:
-        return values
-    flags = valid[start:stop].tolist()
-    return [v if ok else None for v, ok in zip(values, flags, strict=True)]
