@@ -21,12 +21,13 @@ import statistics
 import sys
 import tempfile
 from collections import Counter
-from itertools import groupby
+from itertools import groupby, product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from internav_data.dataset import compute_stats, load_dataset
 from internav_data.generation import generate, load_config
+from internav_data.generation.config import EPISODE_PRESETS
 from internav_data.records import type_affordances
 from internav_data.world import Action, HouseModel, World
 from internav_data.world.actions import INTERACTION_KINDS
@@ -48,10 +49,10 @@ TARGETS = {
 SPACING_M = 0.25
 
 
-def made(out: Path, settings: Sequence[str], scenes: int) -> float:
+def made(out: Path, preset: str, settings: Sequence[str], scenes: int) -> float:
     """Make a dataset; return the processor time of its workers, seconds."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    generate(out, load_config(None, settings), scenes, workers=1)
+    generate(out, load_config(None, settings, episode_preset=preset), scenes, workers=1)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
@@ -146,11 +147,11 @@ def _share(part: int, whole: int) -> float | None:
     return round(part / whole, 4) if whole else None
 
 
-def case(settings: list[str], scenes: int, *, rate: bool) -> dict[str, Any]:
+def case(preset: str, settings: list[str], scenes: int, *, rate: bool) -> dict[str, Any]:
     """Return the figures of one preset and strength."""
     with tempfile.TemporaryDirectory(prefix="internav-confounding-") as folder:
         out = Path(folder) / "dataset"
-        first_s = made(out, [*settings, "episodes.blind_expert=true"], scenes)
+        first_s = made(out, preset, [*settings, "episodes.blind_expert=true"], scenes)
         data, stats = load_dataset(out), compute_stats(out)
         figures: dict[str, Any] = {
             **(stats["confounding"] or {}),
@@ -162,8 +163,8 @@ def case(settings: list[str], scenes: int, *, rate: bool) -> dict[str, Any]:
         }
         if rate:
             # Without the blind expert, and with what the first time has left in the cache.
-            made(Path(folder) / "known", settings, scenes)
-            again_s = made(Path(folder) / "again", settings, scenes)
+            made(Path(folder) / "known", preset, settings, scenes)
+            again_s = made(Path(folder) / "again", preset, settings, scenes)
             figures["episodes_per_cpu_s"] = round(len(data) / again_s, 3)
     return figures
 
@@ -173,6 +174,7 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, default=40)
     parser.add_argument("--episodes-per-scene", type=int, default=10)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--presets", nargs="+", default=list(EPISODE_PRESETS))
     parser.add_argument("--strengths", type=float, nargs="+", default=list(STRENGTHS))
     parser.add_argument("--set", action="append", default=[], help="a config value, as a.b=c")
     parser.add_argument("--rate", action="store_true", help="measure the cost, too")
@@ -180,12 +182,12 @@ def main() -> None:
     args = parser.parse_args()
     common = [*args.set, f"seed={args.seed}", f"episodes_per_scene={args.episodes_per_scene}"]
     results: dict[str, Any] = {"targets": TARGETS}
-    for strength in args.strengths:
+    for preset, strength in product(args.presets, args.strengths):
         hidden = ["catalog.attributes=hidden", f"catalog.strength={strength}"]
-        found = case([*common, *hidden], args.scenes, rate=args.rate)
-        results[f"strength {strength:g}"] = found
+        found = case(preset, [*common, *hidden], args.scenes, rate=args.rate)
+        results.setdefault(preset, {})[f"{strength:g}"] = found
         print(
-            f"strength {strength:g}: base rate {found['base_rate']:.1%}, guess "
+            f"{preset}, strength {strength:g}: base rate {found['base_rate']:.1%}, guess "
             f"{found['guess_accuracy']:.1%}, information {found['information_share']:.1%}",
             file=sys.stderr,
         )

@@ -97,12 +97,6 @@ def test_shares_are_as_the_strength_says(strength):
     assert max(levels.values()) < 1.5 * min(levels.values())
 
 
-def test_about_a_quarter_of_the_obstacles_is_fixed():
-    types, assets = hidden().types, catalogue().spawnable
-    shares = [FIXED_SHARES[types[asset.type].affordance] for asset in assets]
-    assert 0.2 < statistics.fmean(shares) < 0.33
-
-
 @pytest.mark.parametrize(
     ("config", "message"),
     [
