@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from internav_data.envs.order import EpisodeOrder
     from internav_data.envs.tasks import Task, TaskStep
     from internav_data.records import Episode, PushModel
+    from internav_data.world.config import Hands
 
 
 class Arguments(TypedDict, total=False):
@@ -31,6 +32,7 @@ class Arguments(TypedDict, total=False):
     max_steps: int
     failed_done_reward: float
     push_model: PushModel
+    hands: Hands
     episodes_per_house: int
     shuffle: bool
     house_cache_size: int
@@ -153,6 +155,8 @@ class EnvSlot:
         world = source.world_config
         if "push_model" in arguments:
             world = replace(world, push_model=arguments["push_model"])
+        if "hands" in arguments:
+            world = replace(world, hands=arguments["hands"])
         config = TaskConfig(
             arguments.get("max_steps", TaskConfig().max_steps),
             arguments.get("failed_done_reward", 0.0),

@@ -186,7 +186,7 @@ class InteractiveNavigation(Task):
             reward += self._ended(result)
         self.statistics.reward += reward
         self._lattice = self.world.lattice
-        return reward, kind == "done"
+        return reward, kind == "done" and result.reason != "hands are full"
 
     def metrics(self) -> dict[str, float | int | bool]:
         """Return the metrics of the episode; their means over episodes are the paper's."""
@@ -232,6 +232,8 @@ class InteractiveNavigation(Task):
     def _ended(self, result: StepResult) -> float:
         """Return the reward of Done."""
         self.success = result.success
+        if result.reason == "hands are full":
+            return 0.0
         return SUCCESS if result.success else self.config.failed_done_reward
 
 

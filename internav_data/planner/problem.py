@@ -27,6 +27,8 @@ PUSH_PRICE: Final = 2
 """Estimated cost of pushing an object out of the way, actions."""
 FURNITURE_PRICE: Final = 2
 """Extra price of the house's furniture."""
+CARRY_PRICE: Final = 3
+"""Extra price of picking up an object that must be put down again: hands are real."""
 DROP_PRICE: Final = 2
 """Extra price of picking up an object while another one is held."""
 EVERYTHING: Final = (1 << MAX_OBJECTS) - 1
@@ -116,6 +118,7 @@ class PlanningProblem:
         """
         prices = self.risks.copy()
         full = DROP_PRICE if world.held >= 0 else 0
+        full += CARRY_PRICE if world.config.hands == "real" else 0
         furniture = len(world.model.items)
         for bit, k in enumerate(self.objects):
             pickable = world.items[k].dynamics.pickable

@@ -214,7 +214,7 @@ class _BestFirstSearch:
         self.best: tuple[int, ...] | None = None
         self.bound = limit + 1
         """Length below which a plan is an improvement."""
-        self.tries_left = MAX_TRIES
+        self.tries_left = MAX_TRIES * (2 if world.config.hands == "real" else 1)
         self.queries_left = MAX_QUERIES
         self.queue: list[tuple[int, int, int, SearchNode | Candidate]] = []
         self.entries = 0
@@ -274,10 +274,10 @@ class _BestFirstSearch:
         pose = problem.pose(state.world)
         poses, entered = problem.path(state.masks, node.banned, state.prices, node.costs, pose)
         bits = bits_in_order(entered.tolist())
-        if not bits:
+        if not bits and not state.world.carrying:
             self._accept(state, poses.tolist())
             return
-        if node.banned == 0:
+        if node.banned == 0 and not state.world.carrying:
             # Before any interaction is tried: a short way round may make all of them needless.
             self._detour(state, pose)
             if f_cost >= self.bound:
@@ -296,8 +296,9 @@ class _BestFirstSearch:
                 wanted |= dynamics.pickable
                 if dynamics.pushable or not full:
                     self._propose(node, bit, reach, back, path)
-        if full and wanted:
-            first = int(np.flatnonzero(entered)[0])
+        # What can block is put down before anything else, and before Done.
+        if full and (wanted or state.world.carrying):
+            first = int(np.flatnonzero(entered)[0]) if bits else len(poses) - 1
             self._propose_drops(node, poses[: first + 1].tolist(), reach, back)
 
     def _detour(self, state: SearchState, pose: int) -> None:
@@ -404,6 +405,8 @@ class _BestFirstSearch:
         if entry.action.kind == "push" and state.world.count_movers(*entry.last) > MAX_MOVERS:
             return
         world = state.world.copy()
+        if world.carrying and not self._walks(world, entry):
+            return  # what is held is in the way
         self._place(world, entry.pose, entry.horizon)
         if self.knowledge.excludes(world, entry.action, entry.index):
             if entry.fallback is not None:
@@ -423,6 +426,11 @@ class _BestFirstSearch:
             self._enter(world, actions, entry.last, entry.penalty)
         elif entry.fallback is not None and result.cause in _AGENTS_FAULT:
             self._push(entry.fallback.f_cost, _RANKS[entry.action], entry.fallback)
+
+    def _walks(self, world: World, entry: Candidate) -> bool:
+        """Walk to the pose of a candidate in a world, which this changes; return whether it can."""
+        walk = self.problem.walk(entry.state.masks, entry.back, entry.pose)
+        return all(world.step(action).success for action in moves(walk))
 
     def _repeat(self, world: World, entry: Candidate) -> int:
         """Push on in a world, which this changes, while it is likely to help; count the pushes."""

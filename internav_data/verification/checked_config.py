@@ -21,6 +21,7 @@ class CheckedConfig:
     push_model: Literal["force", "kick", "step"] = "force"
     force_n: float = 200.0
     """Force of the agent's pushes, newtons."""
+    hands: Literal["free", "real"] = "free"
     gap_m: float = GAP_M
     """Minimum distance of a spawned obstacle from everything else, metres."""
     solvable: bool = False
@@ -52,8 +53,15 @@ def checked_config(config: Mapping[str, Any]) -> CheckedConfig:
             f"manifest.json: config.world.force_n: expected newtons, got {force!r}; generate the "
             "dataset again"
         )
+    hands = world.get("hands", "free")
+    if hands not in ("free", "real"):
+        raise CorruptDataError(
+            f"manifest.json: config.world.hands: expected free or real, got {hands!r}; generate "
+            "the dataset again"
+        )
     return CheckedConfig(
         push_model=model,
+        hands=hands,
         force_n=float(force),
         gap_m=float(gap) if isinstance(gap, int | float) else GAP_M,
         solvable=values.get("keep_unsolvable") is False,

@@ -150,6 +150,7 @@ Reason = Literal[
     "no room to drop it",
     "not at the goal",
     "did not move",
+    "no room for what is held",
 ]
 """Reason of an action's failure; empty after a success. "did not move" stands for every reason that
 would tell something about hidden attributes."""

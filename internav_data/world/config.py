@@ -1,9 +1,9 @@
-"""Settings of the world: how an agent's pushes act on the objects."""
+"""Settings of the world: how an agent's pushes and hands act on the objects."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final, Literal, get_args
 
 from internav_data.core.config import Bounds, check_bounds, from_mapping
 from internav_data.records.errors import CorruptDataError, UsageError
@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from internav_data.records import PushSpec
 
 
+Hands = Literal["free", "real"]
+"""Part of a held object in the world: none, or that of a thing that can block."""
+
+
 @dataclass(frozen=True, slots=True)
 class WorldConfig:
     """Settings of the world that outcomes, experts and environments share."""
@@ -25,6 +29,9 @@ class WorldConfig:
     most `force_n`, held at 0.5 m/s for 0.22 m."""
     force_n: Annotated[float, Bounds(1.0, 2000.0)] = FORCE_N
     """Force of the agent's pushes, newtons; `kick` has none."""
+    hands: Hands = "free"
+    """`free`: what the agent holds is nowhere. `real`: it is carried before the agent and can block
+    steps and turns, and Done fails while it is held."""
 
     def check(self, prefix: str = "world.") -> None:
         """Check all values.
@@ -36,11 +43,14 @@ class WorldConfig:
 
         """
         check_bounds(self, "{key}: expected {expected}, got {value}", prefix)
-        if self.push_model not in PUSH_SPECS:
-            raise UsageError(
-                f"{prefix}push_model: expected one of {', '.join(PUSH_SPECS)}, "
-                f"got {self.push_model!r}"
-            )
+        for key, value, names in (
+            ("push_model", self.push_model, PUSH_SPECS),
+            ("hands", self.hands, get_args(Hands)),
+        ):
+            if value not in names:
+                raise UsageError(
+                    f"{prefix}{key}: expected one of {', '.join(names)}, got {value!r}"
+                )
 
     @property
     def push_spec(self) -> PushSpec:

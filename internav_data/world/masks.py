@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from internav_data.world.actions import ACTIONS, HORIZONS_DEG, Action
+from internav_data.world.carrying import can_step, can_turn, has_room
 from internav_data.world.world import AHEAD, carries
 
 if TYPE_CHECKING:
@@ -15,23 +16,36 @@ if TYPE_CHECKING:
 
 
 def action_mask(world: World) -> Bools:
-    """Return whether each action could succeed, (actions,) bool; Done always can end the episode.
+    """Return whether each action could succeed, (actions,) bool.
 
-    What is masked out would fail and change nothing. What is not may still fail: a push that
-    physics refuses, a drop without room.
+    Done always can end the episode, unless hands are real and full. What is masked out would fail
+    and change nothing. What is not may still fail: a push that physics refuses, a drop without
+    room.
     """
     return np.array([_could_succeed(world, action) for action in ACTIONS], np.bool_)
 
 
 def _could_succeed(world: World, action: Action) -> bool:
-    if action.kind == "move":
-        return bool(world.lattice.edge_free(world.i, world.j, *AHEAD[world.quarter]))
-    if action.kind == "look":
+    kind = action.kind
+    if kind == "move":
+        ahead = AHEAD[world.quarter]
+        free = bool(world.lattice.edge_free(world.i, world.j, *ahead))
+        return free and (not world.carrying or can_step(world, ahead))
+    if kind == "turn":
+        return not world.carrying or can_turn(world, action.quarter_turns)
+    if kind == "look":
         last = HORIZONS_DEG[-1 if action == Action.LOOK_DOWN else 0]
         return world.horizon_deg != last
-    if action.kind == "push":
+    if kind == "push":
         return world.target(pick=False) >= 0
-    if action.kind == "pick":
-        target = world.target(pick=True) if world.held < 0 else -1
-        return target >= 0 and not carries(world, target)
-    return world.held >= 0 if action.kind == "drop" else True
+    if kind == "pick":
+        return _could_pick(world)
+    return not world.carrying if kind == "done" else world.held >= 0
+
+
+def _could_pick(world: World) -> bool:
+    target = world.target(pick=True) if world.held < 0 else -1
+    if target < 0 or carries(world, target):
+        return False
+    real = world.config.hands == "real"
+    return not real or has_room(world, target, world.position, world.quarter)

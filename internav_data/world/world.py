@@ -28,6 +28,7 @@ from internav_data.world.actions import (
     Reason,
     StepResult,
 )
+from internav_data.world.carrying import can_step, can_turn, has_room
 from internav_data.world.config import DEFAULT_WORLD
 from internav_data.world.drop import DropObstructions, drop
 from internav_data.world.house_model import HouseModel, MovableObject, dop8_rows
@@ -76,12 +77,16 @@ def _move(world: World, _: Action) -> StepResult:
     di, dj = AHEAD[world.quarter]
     if not world.lattice.edge_free(world.i, world.j, di, dj):
         return _BLOCKED
+    if world.carrying and not can_step(world, (di, dj)):
+        return _failed(Action.MOVE_AHEAD, "no room for what is held")
     world.i += di
     world.j += dj
     return _STEPPED
 
 
 def _rotate(world: World, action: Action) -> StepResult:
+    if world.carrying and not can_turn(world, action.quarter_turns):
+        return _failed(action, "no room for what is held")
     world.quarter = (world.quarter + action.quarter_turns) % 4
     return StepResult(action, success=True)
 
@@ -138,6 +143,8 @@ def _pick(world: World, action: Action) -> StepResult:
         return StepResult(action, success=False, reason="something rests on it", target=target)
     if not world.items[target].dynamics.pickable:
         return _refused(world, action, target, "not pickable")
+    if world.config.hands == "real" and not has_room(world, target, world.position, world.quarter):
+        return StepResult(action, success=False, reason="no room for what is held", target=target)
     world.put([(target, None)])
     world.held = target
     return StepResult(action, success=True, target=target)
@@ -196,6 +203,8 @@ def _drop(world: World, action: Action) -> StepResult:
 def _done(world: World, action: Action) -> StepResult:
     if math.dist(world.position, world.goal_point) > GOAL_M:
         return _failed(action, "not at the goal")
+    if world.carrying:
+        return _failed(action, "hands are full")
     return StepResult(action, success=True)
 
 
@@ -539,6 +548,11 @@ class World:
             handles[k] = -1 if pose is None else lattice.add(items[k].footprint)
         self.lattice, self.items = lattice, tuple(items)
         self._handles, self._dop8s = tuple(handles), dop8s
+
+    @property
+    def carrying(self) -> bool:
+        """Whether the agent holds something that can block (`world.hands = "real"`)."""
+        return self.held >= 0 and self.config.hands == "real"
 
     @property
     def push_spec(self) -> PushSpec:

@@ -376,6 +376,40 @@ def test_a_failed_interaction_of_a_blind_expert_is_no_untruth(scenes):
     assert found_in(changed(scenes, 0, 0, expert=failing), 0, 0) == {"physics.expert-action"}
 
 
+def test_what_an_expert_holds_is_in_nothing_and_put_down(scenes, monkeypatch):
+    """A world of real hands that lets things through walls, and lets a full hand be done."""
+    world = internav_data.world.world
+    real = WorldConfig(hands="real")
+    house, (shut, _) = physical.crowded()
+    shut = physical.played(house, shut, real)
+    assert shut.expert.actions.count(9) == shut.expert.actions.count(10) == 1
+    strict = replace(FORCE, hands="real")
+
+    def found(actions):
+        counts = {
+            "steps": len(actions),
+            "picks": actions.count(9),
+            "path_m": 0.25 * actions.count(0),
+        }
+        expert = replace(shut.expert, actions=tuple(actions), **counts)
+        report = FindingCollector("episodes", house.scene_id)
+        scene = CheckedScene(CheckedLayout(house, Shapes(ASSETS)), strict)
+        replay_episode(scene, replace(shut, expert=expert), report)
+        return set(report.by_predicate)
+
+    actions = list(shut.expert.actions)
+    assert found(actions) == set()
+    for name in ("has_room", "can_step", "can_turn"):
+        monkeypatch.setattr(world, name, lambda *_: True)
+    assert found(actions) == set(), "still nothing met"
+    at = actions.index(9) + 1
+    assert "physics.expert-hands" in found([*actions[:at], 1, *[0] * 16])
+    # Nor does the world mind full hands at the goal: the drop is left out.
+    monkeypatch.setattr(World, "carrying", False)
+    kept = [action for action in actions if action != 10]
+    assert "physics.expert-hands" in found(kept)
+
+
 def test_a_detour_is_no_untruth(scenes):
     assert not found_in(expert_changed(scenes, 2, 1, lambda actions: [1, 2, *actions]), 2, 1)
 

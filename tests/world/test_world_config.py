@@ -29,6 +29,7 @@ KEPT = Path(__file__).parents[1] / "data" / "dataset-10"
         ("world.force_n=1e9", "world.force_n: expected 1.0 … 2000.0, got 1000000000.0"),
         ("world.force_n=nan", "world.force_n: expected a finite number, got nan"),
         ("world.force_n=strong", "world.force_n: expected a number, got 'strong'"),
+        ("world.hands=three", "world.hands is 'three': expected one of free, real"),
         ("episodes.push_model=kick", "'episodes.push_model' is called 'world.push_model' now"),
     ],
 )
@@ -42,6 +43,8 @@ def test_bad_values_get_one_line(setting, message):
 def test_an_unknown_push_model_is_refused_in_python():
     with pytest.raises(UsageError, match=r"^world.push_model: expected .* got 'shove'$"):
         GenerationConfig(world=WorldConfig(push_model="shove")).check()  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match=r"^world.hands: expected .* got 'three'$"):
+        GenerationConfig(world=WorldConfig(hands="three")).check()  # type: ignore[arg-type]
 
 
 def test_specs_of_pushes():

@@ -46,7 +46,7 @@ class CheckedScene:
 
     def world(self, episode: Episode) -> World:
         """Return the world of an episode at its start."""
-        config = WorldConfig(self.config.push_model, self.config.force_n)
+        config = WorldConfig(self.config.push_model, self.config.force_n, self.config.hands)
         return World.of_episode(self.model, episode, self.assets, config, self.engine(episode))
 
     def engine(self, episode: Episode) -> str:

@@ -20,6 +20,7 @@ from internav_data.verification.interactions import (
     ROTATE_LEFT,
     ROTATE_RIGHT,
 )
+from internav_data.verification.replay.carrying import what_is_in_the_way
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -63,6 +64,7 @@ class ExpertReplay:
         self._quarter = episode.start.yaw_deg // 90
         self._trail = [self._node]
         """Nodes visited since objects last moved."""
+        self._held = -1
 
     @property
     def _position(self) -> tuple[float, float]:
@@ -94,7 +96,19 @@ class ExpertReplay:
             self._check_clear(before, what)
             if action != DROP:
                 self._check_reach(before[result.target], what)
+            if action in {PICK, DROP}:
+                self._held = result.target if action == PICK else -1
+        self._check_hands(action, what)
         return True
+
+    def _check_hands(self, action: int, what: str) -> None:
+        """Check that what is held is in nothing, and that nothing is held at Done."""
+        if self._held < 0 or self._theatre.config.hands == "free":
+            return
+        where = (self._held, self._position, self._quarter)
+        met = what_is_in_the_way(self._theatre, self._world.items, *where)
+        self._expect(not met, f"{self._prefix}-hands", f"{what}: room for what is held", met)
+        self._expect(action != DONE, f"{self._prefix}-hands", f"{what}: empty hands", "full ones")
 
     def check_goal(self, actions: Sequence[int]) -> None:
         """Check the end: Done, at the goal."""
