@@ -133,6 +133,7 @@ WORDS = {
     "look": "hidden",
     "": "4",
     "force": "kick",
+    "free": "real",
     "bullet": "another",
     "keep": "drop",
 }

@@ -109,8 +109,13 @@ def test_a_dataset_of_an_earlier_release_is_extended_with_its_push_model(tmp_pat
     there, defaults = identity_of(manifest), GenerationConfig().identity(manifest.catalogue_digest)
 
     def asked(name):
-        world = {"push_model": name, "force_n": 200.0}
-        return replace(there, config={**there.config, "world": world})
+        config = {
+            key: {**value, **there.config.get(key, {})} if isinstance(value, dict) else value
+            for key, value in {**defaults, **there.config}.items()
+            for value in [defaults.get(key, value) if isinstance(value, dict) else value]
+        }
+        world = {**defaults["world"], "push_model": name}
+        return replace(there, config={**config, "world": world})
 
     open_staging(tmp_path, asked(model), defaults)
     other = "kick" if model == "force" else "force"
