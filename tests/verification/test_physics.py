@@ -448,8 +448,10 @@ def test_world_that_reaches_everything(scenes, monkeypatch):
     assert found_in(early, 2, 0) == {"physics.expert-reach"}
 
 
-@pytest.mark.parametrize("into", [{"z": -0.02}, {"x": 3.7, "y": 1.0}])
-def test_world_that_pushes_into_floor_or_wall(scenes, monkeypatch, into):
+@pytest.mark.parametrize(
+    "into", [{"z": -0.02}, {"x": 3.7, "y": 1.0}, {"x": 1.67, "y": 0.97}, {"x": 6.5, "y": 0.5}]
+)
+def test_world_that_pushes_into_floor_wall_or_furniture(scenes, monkeypatch, into):
     push = World.simulate_push
 
     def sinking(world, *args, **options):
@@ -468,12 +470,16 @@ def test_what_leans_through_a_window_is_not_in_the_wall(scenes):
     walls = tuple(w for w in house.walls if w is not wall)
     x, y = (wall.x_min + wall.x_max) / 2, (wall.y_min + wall.y_max) / 2
     board = asset("Board", part("box", (0.0,) * 3, (0.4, 0.4, 0.04)))
+    item = MovableObject.of(Body.of(board, Pose(1.0, 1.0, 0.0, UPRIGHT)))
     assets = {**ASSETS, "Board": board}
     for through, sills in ((house, 0), (replace(house, walls=(*walls, sill, lintel)), 1)):
         scene = CheckedScene(CheckedLayout(through, Shapes(assets)), FORCE)
         for z, inside in ((0.5, True), (0.925, False), (1.5, False), (2.2, True)):
             pose = Pose(x, y, z, UPRIGHT)
-            assert scene.overlaps_walls("Board", pose, 0.01) == (inside or not sills)
+            items = (*scene.model.items, item)
+            found = scene.intrusions(items, {len(items) - 1: pose}, 0.01)
+            expected = [(len(items) - 1, "a wall")]
+            assert found == (expected if inside or not sills else [])
 
 
 def test_what_carries_something_is_not_picked_up(scenes):

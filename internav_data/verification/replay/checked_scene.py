@@ -10,7 +10,7 @@ import shapely
 from shapely import Point
 
 from internav_data.physics import DEFAULT_ENGINE, ENGINES
-from internav_data.verification.overlaps import overlapping_slabs
+from internav_data.verification.overlaps import WALL_ID, Solids, intrusions
 from internav_data.world import HouseModel, World
 from internav_data.world.config import WorldConfig
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from internav_data.records import Asset, Episode, Pose
     from internav_data.verification.checked_config import CheckedConfig
     from internav_data.verification.checked_layout import CheckedLayout
+    from internav_data.verification.shapes import Slab
     from internav_data.world import MovableObject
 
 
@@ -42,7 +43,7 @@ class CheckedScene:
         self.assets: dict[str, Asset] = dict(layout.shapes.assets)
         self.model = HouseModel.of(replace(layout.house, assets=self.assets))
         self._footprints: dict[tuple[str, Pose], tuple[Geometry, ...]] = {}
-        self._spans: dict[tuple[str, Pose], tuple[float, float]] = {}
+        self._slabs: dict[tuple[str, Pose], list[Slab]] = {}
 
     def world(self, episode: Episode) -> World:
         """Return the world of an episode at its start."""
@@ -85,24 +86,53 @@ class CheckedScene:
             self._footprints[key] = tuple(self.layout.shapes.footprint(asset_id, pose))
         return self._footprints[key]
 
-    def span(self, asset_id: str, pose: Pose) -> tuple[float, float]:
-        """Return the lowest and highest point of an asset, metres, computed once a pose."""
+    def slabs(self, asset_id: str, pose: Pose) -> list[Slab]:
+        """Return the slabs of an asset, computed once for each pose."""
         key = (asset_id, pose)
-        if key not in self._spans:
-            slabs = self.layout.shapes.slabs(asset_id, pose)
-            self._spans[key] = (min(s.low for s in slabs), max(s.high for s in slabs))
-        return self._spans[key]
+        if key not in self._slabs:
+            self._slabs[key] = self.layout.shapes.slabs(asset_id, pose)
+        return self._slabs[key]
 
-    def overlaps_walls(self, asset_id: str, pose: Pose, depth_m: float) -> bool:
-        """Return whether an asset reaches deeper than `depth_m` into a wall.
+    def span(self, asset_id: str, pose: Pose) -> tuple[float, float]:
+        """Return the lowest and highest point of an asset, metres."""
+        slabs = self.slabs(asset_id, pose)
+        return min(s.low for s in slabs), max(s.high for s in slabs)
+
+    def intrusions(
+        self, items: Sequence[MovableObject], changes: dict[int, Pose], depth_m: float
+    ) -> list[tuple[int, str]]:
+        """Return items that end over `depth_m` inside something: their indices, and what it is.
 
         In space, not in plan: an object that leans over a window's sill is above the wall there.
+
+        Parameters
+        ----------
+        items
+            Items of a world: movable furniture, then obstacles.
+        changes
+            New poses of some of them, by index: these are looked at.
+        depth_m
+            Depth, metres: the diameter of a ball that two bodies share.
+
         """
-        own = self.layout.shapes.slabs(asset_id, pose)
-        plan = shapely.union_all([slab.plan for slab in own])
-        near = [slab for slab in self.layout.wall_slabs if shapely.intersects(slab.plan, plan)]
-        owners = [0] * len(near) + [1] * len(own)
-        return bool(overlapping_slabs([*near, *own], owners, lambda *_: False, depth_m))
+        moved = Solids.of((k, self.slabs(items[k].asset.asset_id, p)) for k, p in changes.items())
+        # The layout holds the furniture in its place, that which has moved among it.
+        ids = self.model.object_ids
+        gone = {ids[k] for k in changes if k < len(ids)}
+        still = Solids.of(
+            (k, self.slabs(item.asset.asset_id, item.pose))
+            for k, item in enumerate(items)
+            if k >= len(ids) and k not in changes and item.pose is not None
+        )
+        found = [
+            (k, "a wall" if owner == WALL_ID else f"object {owner}")
+            for k, owner in intrusions(moved, self.layout.solids, depth_m)
+            if owner not in gone
+        ]
+        for others in (still, moved):
+            pairs = intrusions(moved, others, depth_m)
+            found += [(k, items[other].asset.asset_id) for k, other in pairs]
+        return found
 
     def gap(self, asset_id: str, pose: Pose, point: tuple[float, float]) -> float:
         """Return the distance in the plane from a point to an asset's parts, metres."""

@@ -28,8 +28,8 @@ REST_M = 0.01
 """A rests on B if A's bottom is more than this above B's bottom and not above B's top."""
 TOUCH_M = 0.005
 """Maximum distance of touching objects."""
-SUNK_M = 0.01
-"""Maximum depth in the floor or a wall of a pushed object's end pose."""
+SUNK_M = 0.005
+"""Maximum depth in the floor or in anything else of an object that a push has moved."""
 
 
 def check_outcomes(scene: CheckedScene, episode: Episode, expect: Expect) -> None:
@@ -148,17 +148,17 @@ class OutcomeCheck:
         return shapely.union_all(list(self.scene.footprint(asset_id, pose)))
 
     def _not_sunk(self, world: World, ends: dict[int, Pose | None]) -> None:
-        """Check that nothing was pushed into the floor or a wall."""
+        """Check that nothing was pushed into the floor, a wall or another object."""
         scene = self.scene
-        for k, pose in ends.items():
+        moved = {k: pose for k, pose in ends.items() if pose is not None}
+        inside = dict(scene.intrusions(world.items, moved, SUNK_M))
+        for k, pose in moved.items():
             asset_id = world.items[k].asset.asset_id
-            if pose is None:
-                continue
             low, _ = scene.span(asset_id, pose)
             name = f"{asset_id} ends above the floor"
             self.expect("sunk", name, f"{low:.4f} m", holds=low >= -SUNK_M)
-            inside = scene.overlaps_walls(asset_id, pose, SUNK_M)
-            self.expect("sunk", f"{asset_id} ends clear of walls", "in one", holds=not inside)
+            name = f"{asset_id} ends inside nothing"
+            self.expect("sunk", name, f"inside {inside.get(k)}", holds=k not in inside)
 
     def _distances(self, world: World, changes: dict[int, Pose | None]) -> None:
         """Check both distances with objects where they came to rest."""
