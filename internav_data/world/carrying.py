@@ -28,8 +28,11 @@ CARRY_LOW_M: Final = 0.8
 """Height of a held object's lowest point, metres: what is lower is carried over."""
 CARRY_GAP_M: Final = 0.05
 """Distance between the agent's disc and a held object, metres."""
-SAMPLES: Final = (0.5, 1.0)
-"""Shares of a step or a turn at which a held object is looked at."""
+STEP_SAMPLES: Final = (0.5, 1.0)
+"""Shares of a lattice step at which a held object is looked at."""
+TURN_SAMPLES: Final = (0.25, 0.5, 0.75, 1.0)
+"""Shares of a quarter turn at which it is looked at: an apple swings by 12 cm from one to the next,
+so that it passes through no wall's end."""
 
 
 def carry_offset_m(plan: Polygons) -> float:
@@ -50,7 +53,7 @@ def has_room(world: World, index: int, position: Vec2, quarters: float) -> bool:
     position
         Position of the agent, metres.
     quarters
-        Quarter turns of the agent, counter-clockwise from +x; half ones while it turns.
+        Quarter turns of the agent, counter-clockwise from +x; parts of one while it turns.
 
     """
     asset = world.items[index].asset
@@ -78,7 +81,7 @@ def can_step(world: World, step: tuple[int, int]) -> bool:
             (SPACING_M * (i + share * step[0]), SPACING_M * (j + share * step[1])),
             world.quarter,
         )
-        for share in SAMPLES
+        for share in STEP_SAMPLES
     )
 
 
@@ -87,7 +90,7 @@ def can_turn(world: World, quarter_turns: int) -> bool:
     turn = quarter_turns if quarter_turns == 1 else -1
     return all(
         has_room(world, world.held, world.position, world.quarter + share * turn)
-        for share in SAMPLES
+        for share in TURN_SAMPLES
     )
 
 

@@ -1,8 +1,10 @@
 """Real hands: what is held is carried before the agent, blocks, and must be put down."""
 
+import math
+
 import numpy as np
 import pytest
-from builders import UPRIGHT, crate, one_room
+from builders import UPRIGHT, apple, crate, one_room
 
 from internav_data.envs.episode import EpisodeRun
 from internav_data.envs.source import LoadedHouse
@@ -62,6 +64,19 @@ def test_a_post_between_two_headings_is_met_on_the_way():
     post = at(crate("Post_0", (0.1, 0.1, 1.5)), 2.0 + 0.35, 2.0 + 0.35)
     world = holding(post)
     assert has_room(world, 0, world.position, 1.0)
+    assert tried(world, Action.ROTATE_LEFT) == "no room for what is held"
+
+
+@pytest.mark.parametrize("angle_deg", [22.5, 45.0, 67.5])
+def test_no_apple_swings_through_a_post(angle_deg):
+    angle = math.radians(angle_deg)
+    x, y = 2.0 + 0.3 * math.cos(angle), 2.0 + 0.3 * math.sin(angle)
+    post = at(crate("Post_0", (0.06, 0.06, 1.5)), x, y)
+    world = World(HALL, [at(apple(), 5.0, 3.5), post], (8, 8, 0), (20, 8), REAL)
+    world.put([(0, None)])
+    world.held = 0
+    assert has_room(world, 0, world.position, 0)
+    assert has_room(world, 0, world.position, 1)
     assert tried(world, Action.ROTATE_LEFT) == "no room for what is held"
 
 
