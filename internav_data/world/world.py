@@ -572,6 +572,8 @@ class World:
             parts.append(
                 struct.pack("<2d2?", own.mass_kg, own.friction, own.pushable, own.pickable)
             )
+            if item.affordance is not None:
+                parts.append(item.affordance.encode())
             if item.pose is not None:
                 p = item.pose
                 parts.append(struct.pack("<7d", p.x, p.y, p.z, *p.quaternion))

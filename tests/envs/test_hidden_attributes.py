@@ -160,3 +160,13 @@ def test_auxiliary_starts_stand_beside_fixed_obstacles_too():
         starts = [auxiliary_starts(r.loaded_house.model, r.episode, ASSETS, kind) for r in runs]
         assert starts[0]
         assert all(other == starts[0] for other in starts)
+
+
+def test_worlds_with_other_targets_are_in_other_states():
+    room = one_room(6.0, 3.0)
+    digests = set()
+    for affordance in (None, "push", "pick"):
+        standing = replace(obstacle(STOOL, 1.5, 1.5), affordance=affordance)
+        task = episode(room, start_of(3, 6, 0), goal(22, 6), [standing])
+        digests.add(World.of_episode(HouseModel.of(room), task, ASSETS).digest())
+    assert len(digests) == 3
