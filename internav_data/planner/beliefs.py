@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 GRAVITY: Final = 9.81
 """Acceleration of gravity, m/s²."""
+UNKNOWN: Final = Dynamics(mass_kg=1000.0, friction=1.0, pushable=False, pickable=False)
+"""Belief about an object of an unknown type: that it is fixed."""
 PRIOR_WEIGHT: Final = 2.0
 """Weight of a type's share of movable assets, in objects tried."""
 
@@ -117,7 +119,7 @@ class Experience:
     def _belief(self, item: MovableObject) -> Dynamics:
         belief = self._beliefs.get(item.asset.type)
         if belief is None:
-            return replace(item.asset.dynamics, pushable=False, pickable=False)
+            return UNKNOWN
         if item.affordance is None:
             return belief.dynamics
         # Where attributes are hidden, everybody knows what can be tried with a type.
