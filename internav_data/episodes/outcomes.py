@@ -11,7 +11,9 @@ from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
+from internav_data.geometry import round_m
 from internav_data.navigation import keeps_clear
+from internav_data.physics.displacement import shift_m
 from internav_data.records import MovedObject, Outcome
 from internav_data.world.world import carries
 
@@ -19,11 +21,14 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from internav_data.physics.pushing import PushResult
     from internav_data.records import Pose
     from internav_data.world import World
 
 PUSH_DIRECTIONS: Final = ("push_east", "push_north", "push_west", "push_south")
 """Actions of outcomes by heading 0 to 3: along +x, +y, -x and -y of the house."""
+MAX_REACH: Final = 4
+"""Maximum number of pushes in a row of an outcome."""
 PICK: Final = "pick"
 """Action of outcomes in which the obstacle is picked up."""
 
@@ -117,6 +122,7 @@ def _pushed(world: World, index: int, heading: int, before: Distances, lifted: _
         steps, obstructed_path_m = there.path_steps(), there.obstructed_path_m()
     else:
         steps, obstructed_path_m = lifted.laid(pushed.pose)
+    reach_m, reach_opened = _reach(world, index, heading, pushed, opens=before[0] is None)
     return Outcome(
         action=PUSH_DIRECTIONS[heading],
         success=True,
@@ -129,7 +135,34 @@ def _pushed(world: World, index: int, heading: int, before: Distances, lifted: _
         pose=pushed.pose,
         moved=tuple(_moved(world, key, pose) for key, pose in pushed.moved),
         at_rest=pushed.at_rest,
+        reach_m=reach_m,
+        reach_opened=reach_opened,
     )
+
+
+def _reach(
+    world: World, index: int, heading: int, pushed: PushResult, *, opens: bool
+) -> tuple[tuple[float, ...] | None, int | None]:
+    """Push on after a first push; return the distances, and how many pushes open the lattice.
+
+    `opens` says whether there is anything to open. (None, None) where a push ends by itself: to
+    push on is a matter of steps.
+    """
+    if not world.push_spec.distance_m:
+        return None, None
+    there, asset, begin = world.copy(), world.items[index].asset, world.body(index).pose
+    reach_m, opened = [pushed.displacement_m], None
+    while True:
+        there.put([(index, pushed.pose), *pushed.moved])
+        if opens and opened is None and there.path_steps() is not None:
+            opened = len(reach_m)
+        if len(reach_m) == MAX_REACH:
+            break
+        pushed = there.simulate_push(index, heading, agent=False)
+        if not pushed.success:
+            break
+        reach_m.append(round_m(shift_m(asset, begin, pushed.pose)))
+    return tuple(reach_m), opened
 
 
 def _moved(world: World, index: int, pose: Pose) -> MovedObject:

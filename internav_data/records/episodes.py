@@ -114,6 +114,13 @@ class Outcome:
     at_rest: bool | None = None
     """Whether all were at rest in the end, or time ran out; null in datasets of earlier releases.
     """
+    reach_m: tuple[float, ...] | None = None
+    """Distances of the obstacle from where it began after one to four such pushes in a row, metres,
+    up to the first that fails; null unless it was pushed, and pushes end after a step
+    (`world.push_model`)."""
+    reach_opened: int | None = None
+    """Number of these pushes after which the lattice is cut off no more; null where none does that,
+    or it was not before."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,9 @@ PICK_REASONS = ("", "not pickable", "something rests on it")
 PUSHED_M = 0.05
 """Minimum displacement of a successful push."""
 
+MAX_REACH = 4
+"""Maximum number of pushes in a row of an outcome."""
+
 ACTIONS = 12
 MOVE, ROTATE_LEFT, ROTATE_RIGHT = 0, 1, 2
 PUSHES = (5, 6, 7, 8)
@@ -55,6 +58,7 @@ class _InteractionCheck:
             for outcome in obstacle.outcomes:
                 self._outcome(obstacle, outcome, f"{what}, {outcome.action}")
                 self._poses(number, outcome, f"{what}, {outcome.action}")
+                self._reach(outcome, f"{what}, {outcome.action}")
             self._movable(obstacle, what)
 
     def _movable(self, obstacle: Obstacle, what: str) -> None:
@@ -123,6 +127,28 @@ class _InteractionCheck:
             "outcomes.moved",
             f"{what}: other objects, then other obstacles, ascending; none unless pushed",
             moved,
+        )
+
+    def _reach(self, outcome: Outcome, what: str) -> None:
+        """Check what pushes in a row say, where they are stored, against the first of them."""
+        reach, opened = outcome.reach_m, outcome.reach_opened
+        if reach is None:
+            self.expect(opened is None, "outcomes.reach_opened", f"{what}: null", opened)
+            return
+        pushed = outcome.success and outcome.action != PICK_OUTCOME
+        self.expect(
+            pushed and 1 <= len(reach) <= MAX_REACH and reach[0] == outcome.displacement_m,
+            "outcomes.reach_m",
+            f"{what}: of a successful push 1 … {MAX_REACH} distances from {outcome.displacement_m}",
+            reach,
+        )
+        blocked = self._episode.obstructed_path_steps is None
+        self.expect(
+            (opened is None or (blocked and 1 <= opened <= len(reach)))
+            and (opened == 1) == outcome.opened,
+            "outcomes.reach_opened",
+            f"{what}: 1 if opened, else null or up to {len(reach)} where the lattice was cut off",
+            opened,
         )
 
     def _distances(self, outcome: Outcome, what: str, *, pick: bool) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from internav_data.verification.interactions import OUTCOMES, PICK_REASONS, PUSH_REASONS
+from internav_data.verification.interactions import MAX_REACH, OUTCOMES, PICK_REASONS, PUSH_REASONS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -74,6 +74,8 @@ OUTCOME_RULES: Mapping[str, Rule] = {
     "seconds": Rule(0.0, MAX_PUSH_S),
     "reason": Rule(choices=tuple(sorted({*PUSH_REASONS, *PICK_REASONS}))),
     **{f"pose.{n}": rule for n, rule in POSE_RULES.items()},
+    "reach_m.element": Rule(0.0, 1e4, digits=METRES),
+    "reach_opened": Rule(1, MAX_REACH),
     "moved.element.obstacle": ID,
     "moved.element.object_id": ID,
     **{f"moved.element.pose.{n}": rule for n, rule in POSE_RULES.items()},

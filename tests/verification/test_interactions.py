@@ -157,6 +157,30 @@ def test_outcomes_of_some_obstacles_only(scenes):
     assert judged(replace(episode, obstacles=some)) == {"outcomes.all"}
 
 
+REACHES = {
+    "of another first push": ({"reach_m": (0.31, 0.5)}, "reach_m"),
+    "of none": ({"reach_m": ()}, "reach_m"),
+    "too many": ({"reach_m": (0.3,) * 5}, "reach_m"),
+    "opened before": ({"reach_m": (0.3, 0.5), "reach_opened": 0}, "reach_opened"),
+    "opened after": ({"reach_m": (0.3, 0.5), "reach_opened": 3}, "reach_opened"),
+    "opened at once, or not": ({"reach_m": (0.3, 0.5), "reach_opened": 1}, "reach_opened"),
+    "opened without a distance": ({"reach_opened": 2}, "reach_opened"),
+}
+
+
+@pytest.mark.parametrize("case", REACHES)
+def test_pushes_in_a_row_cannot_be(scenes, case):
+    changes, predicate = REACHES[case]
+    episode = scenes[0][1][0]
+    number = next(
+        k for k, o in enumerate(episode.obstacles[0].outcomes) if o.success and not o.opened
+    )
+    right = {"displacement_m": 0.3, "reach_m": (0.3, 0.5), "reach_opened": 2}
+    assert judged(with_outcome(episode, number, **right)) == set()
+    wrong = {"displacement_m": 0.3, "reach_m": None, "reach_opened": None} | changes
+    assert f"outcomes.{predicate}" in judged(with_outcome(episode, number, **wrong))
+
+
 EXPERTS = {
     "unknown action": (
         lambda e: {"actions": (ACTION_COUNT, *e.actions), "steps": e.steps + 1},

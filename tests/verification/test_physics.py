@@ -588,6 +588,40 @@ def test_weak_pushes_are_judged_as_weak(tmp_path, scenes):
     assert not judged(tmp_path / "b", weak).ok
 
 
+def test_steps_are_judged_as_steps_and_further_pushes_again(tmp_path):
+    stepped = physical.physical_scenes(WorldConfig("step"))
+    reaches = [o for b in stepped[0][1][0].obstacles for o in b.outcomes if o.reach_m]
+    assert {len(o.reach_m) for o in reaches} >= {4}
+    assert any(o.reach_opened for o in reaches)
+    assert all(o.reach_m[0] == o.displacement_m for o in reaches)
+    assert judged(tmp_path / "a", stepped, config={"world": {"push_model": "step"}}).ok
+    house, episodes = stepped[0]
+    step = replace(FORCE, push_model="step")
+
+    def found(episode, config=step):
+        report = FindingCollector("episodes", house.scene_id)
+        replay_episode(CheckedScene(CheckedLayout(house, Shapes(ASSETS)), config), episode, report)
+        return set(report.by_predicate)
+
+    def changed_reach(**changes):
+        (bar, *rest) = episodes[0].obstacles
+        at = next(k for k, o in enumerate(bar.outcomes) if o.reach_opened)
+        five = list(bar.outcomes)
+        values = {name: change(five[at]) for name, change in changes.items()}
+        five[at] = replace(five[at], **values)
+        return replace(episodes[0], obstacles=(replace(bar, outcomes=tuple(five)), *rest))
+
+    assert found(episodes[0]) == set()
+    for wrong in (
+        changed_reach(reach_m=lambda o: (*o.reach_m[:-1], o.reach_m[-1] + 0.001)),
+        changed_reach(reach_m=lambda o: o.reach_m[:-1]),
+        changed_reach(reach_m=lambda _: None),
+    ):
+        assert found(wrong) == {"physics.outcome-reach"}
+    late = changed_reach(reach_opened=lambda o: o.reach_opened + 1)
+    assert found(late) == {"physics.outcome-reach-opened"}
+
+
 @pytest.mark.parametrize(
     "world", [{"push_model": "shove"}, {"force_n": 0}, {"force_n": "much"}, {"force_n": True}]
 )

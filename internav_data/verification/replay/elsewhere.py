@@ -19,6 +19,7 @@ MEASURES: Final = frozenset((
     *("physics.outcome-displacement", "physics.outcome-seconds"),
     *("physics.outcome-path-steps-after", "physics.outcome-path-m-after"),
     *("physics.outcome-pose", "physics.outcome-moved", "physics.outcome-at-rest"),
+    *("physics.outcome-reach", "physics.outcome-reach-opened"),
 ))  # fmt: skip
 """Predicates of numbers that follow from poses: on other hardware they need not hold."""
 KINDS: Final = frozenset((

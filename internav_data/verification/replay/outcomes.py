@@ -12,18 +12,22 @@ from typing import TYPE_CHECKING
 import shapely
 
 from internav_data.verification.checked_path import CheckedPath
-from internav_data.verification.interactions import PICK_OUTCOME, PUSH_OUTCOMES
+from internav_data.verification.interactions import MAX_REACH, PICK_OUTCOME, PUSH_OUTCOMES
+from internav_data.verification.shapes import rotate
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from shapely import Geometry
 
+    from internav_data.physics.pushing import PushResult
     from internav_data.records import Asset, Episode, Outcome, Pose, SceneObject
     from internav_data.verification.obstacles import Expect
     from internav_data.verification.replay.checked_scene import Arrangement, CheckedScene
     from internav_data.world import MovableObject, World
 
+SHIFT_M = 3e-4
+"""Tolerance of a distance: it, the poses and the centre of mass are rounded to 0.1 mm."""
 REST_M = 0.01
 """A rests on B if A's bottom is more than this above B's bottom and not above B's top."""
 TOUCH_M = 0.005
@@ -94,8 +98,54 @@ class OutcomeCheck:
             if outcome.moved is None or not self.scene.config.same_hardware:
                 # Else the stored poses are these, and give the distances without physics.
                 self._distances(world, ends)
+            self._reach(world, index, pushed)
         else:
             self._poses(None, (), at_rest=pushed.at_rest)
+
+    def _reach(self, world: World, index: int, pushed: PushResult) -> None:
+        """Push on where pushes end after a step, and compare how far and what it opens."""
+        outcome = self.outcome
+        if self.scene.config.push_model != "step":
+            self.expect("reach", None, outcome.reach_m)
+            return
+        there, items = world.copy(), world.items
+        reach, opened = [outcome.displacement_m], None
+        ends: dict[int, Pose | None] = {}
+        while True:
+            ends |= {index: pushed.pose, **dict(pushed.moved)}
+            if self.episode.obstructed_path_steps is None and opened is None:
+                opened = len(reach) if math.isfinite(self._steps(items, ends)) else None
+            if len(reach) == MAX_REACH:
+                break
+            there.put([(index, pushed.pose), *pushed.moved])
+            pushed = there.simulate_push(index, PUSH_OUTCOMES.index(outcome.action), agent=False)
+            if not pushed.success:
+                break
+            reach.append(self._shift_m(items[index], pushed.pose))
+        stored = outcome.reach_m or ()
+        near = len(stored) == len(reach) and all(
+            abs(a - b) <= SHIFT_M for a, b in zip(stored, reach, strict=True)
+        )
+        self.expect("reach", reach, stored, holds=near)
+        self.expect("reach-opened", opened, outcome.reach_opened)
+
+    def _shift_m(self, item: MovableObject, end: Pose) -> float:
+        """Return the distance in the plane of a centre of mass from where it began, metres."""
+        middle = self.scene.layout.shapes.centre_of_mass(item.asset.asset_id)[None]
+        before, after = (
+            rotate(middle, pose.quaternion)[0] + (pose.x, pose.y, pose.z)
+            for pose in (item.pose, end)
+            if pose is not None
+        )
+        return math.dist(before[:2], after[:2])
+
+    def _steps(self, items: Sequence[MovableObject], changes: Mapping[int, Pose | None]) -> float:
+        """Return the lattice distance to the goal with some items elsewhere; inf if cut off."""
+        arrangement = self.scene.rearranged(items, dict(changes))
+        lattice, episode = arrangement.layout.lattice, self.episode
+        start = lattice.node(episode.start.i, episode.start.j)
+        goal = lattice.node(episode.goal.i, episode.goal.j)
+        return float(lattice.distances(goal, lattice.with_obstacles(arrangement.obstacles))[start])
 
     def pick(self, world: World, index: int) -> None:
         """Remove an obstacle and compare."""
