@@ -166,7 +166,9 @@ class _RecordCursor:
             if not isinstance(field.node, Leaf) or field.node.kind == "string" or array.null_count:
                 self._others.append((place, cursor(field.node, array)))
                 continue
-            places, columns = numbers.setdefault(field.node.kind, ([], []))
+            # Integers of all widths together: a list of Python's has no width.
+            kind = field.node.kind if field.node.kind in {"float64", "bool"} else "int"
+            places, columns = numbers.setdefault(kind, ([], []))
             places.append(place)
             columns.append(array.to_numpy(zero_copy_only=False))
         self._numbers = [(places, np.stack(columns)) for places, columns in numbers.values()]
@@ -201,7 +203,7 @@ class _SparseCursor:
 
     def __init__(self, node: Node, array: pa.Array) -> None:
         self._valid = array.is_valid().to_numpy(zero_copy_only=False)
-        self._before = np.concatenate([[0], np.cumsum(self._valid)])
+        self._before = memoryview(np.concatenate([[0], np.cumsum(self._valid)]))
         """Number of values that are there before each row."""
         self._others = cursor(node, array.drop_null())
 

@@ -126,10 +126,10 @@ class RowGroupCache:
 
     def group_of(self, row: int) -> tuple[int, int, Reader]:
         """Return the first row and the end of a row's group, and the group's reader."""
-        number = int(np.searchsorted(self.starts, row, side="right")) - 1
+        number = int(self.starts.searchsorted(row, side="right")) - 1
         with self._lock:
             bounds = self.bounds(number)
-            group = int(np.searchsorted(bounds, row, side="right")) - 1
+            group = int(bounds.searchsorted(row, side="right")) - 1
             first, end = int(bounds[group]), int(bounds[group + 1])
             if self._process != os.getpid():
                 self._open_anew()
