@@ -203,7 +203,7 @@ class _SparseCursor:
 
     def __init__(self, node: Node, array: pa.Array) -> None:
         self._valid = array.is_valid().to_numpy(zero_copy_only=False)
-        self._before = memoryview(np.concatenate([[0], np.cumsum(self._valid)]))
+        self._before = np.concatenate([[0], np.cumsum(self._valid)]).data
         """Number of values that are there before each row."""
         self._others = cursor(node, array.drop_null())
 
