@@ -45,6 +45,12 @@ def command(*, dataset: Path | None, split: str | None, as_json: bool) -> int:
         f"pickable, {stats['obstacles_fixed']} fixed"
         + ("" if stats["relevant_share"] is None else f"; {stats['relevant_share']:.1%} relevant")
     )
+    ratios = sorted(
+        (row["ratio"], row["type"]) for row in stats["type_shares"] if row["ratio"] is not None
+    )
+    if ratios:
+        listed = ", ".join(f"{kind} {ratio:.2f}" for ratio, kind in ratios)
+        click.echo(f"share of what stands to share of the draws: {listed}")
     click.echo(
         f"shortest_path_m: {_spread(stats['shortest_path_m'])}; "
         f"shortest_path_steps: {_spread(stats['shortest_path_steps'])}"

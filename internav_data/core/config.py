@@ -2,8 +2,8 @@
 
 A field states its type, its bounds and its default, as in `size: Annotated[int, Bounds(16, 1024)] =
 64`, and in the docstring below it its meaning. Checks, error messages and documentation derive from
-these. Types are bool, int, float, str, Literal, optional and tuples of these, and dataclasses
-inside dataclasses. Errors name the key and the place that its value comes from.
+these. Types are bool, int, float, str, Literal, optional, tuples and mappings of these, and
+dataclasses inside dataclasses. Errors name the key and the place that its value comes from.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import math
 import textwrap
 import types
 import typing
+from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -24,7 +25,7 @@ from internav_data.core.files import FileLimits, parse_toml, read_toml
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     from _typeshed import DataclassInstance
@@ -111,6 +112,8 @@ def _bounded(config: DataclassInstance, prefix: str) -> Iterator[tuple[str, floa
         elif value is not None and (bounds := hints.get(field.name)):
             if isinstance(value, tuple):
                 yield from ((f"{key}[{k}]", item, bounds) for k, item in enumerate(value))
+            elif isinstance(value, Mapping):
+                yield from ((f"{key}.{k}", item, bounds) for k, item in value.items())
             else:
                 yield key, value, bounds
 
@@ -127,9 +130,11 @@ def bounds_of(cls: type[DataclassInstance]) -> Mapping[str, Bounds]:
 
 
 def _in_hint(hint: Any) -> Iterator[Bounds]:  # noqa: ANN401 - a type hint
-    """Yield the first bounds in a hint: of a number, or of a tuple's items."""
+    """Yield the first bounds in a hint: of a number, or of a tuple's or mapping's items."""
     if typing.get_origin(hint) is tuple:
         hint = typing.get_args(hint)[0]
+    elif typing.get_origin(hint) is Mapping:
+        hint = typing.get_args(hint)[1]
     yield from (note for note in getattr(hint, "__metadata__", ())[:1] if isinstance(note, Bounds))
 
 
@@ -151,7 +156,7 @@ def plain(value: Any) -> Any:  # noqa: ANN401 - whatever a config holds
         return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
     if isinstance(value, tuple):
         return [plain(item) for item in value]
-    return value
+    return dict(value) if isinstance(value, Mapping) else value
 
 
 def from_mapping(
@@ -202,6 +207,8 @@ def from_mapping(
                 raise UsageError(f"{where}: {key} is a table of settings, got {value!r}")
             changes[name] = from_mapping(current, value, where, elsewhere, f"{key}.")
         else:
+            if isinstance(current, Mapping) and isinstance(value, dict):
+                value = {**current, **value}  # noqa: PLW2901 - names of other layers stay
             changes[name] = _typed(value, hints[name], f"{where}: {key}")
     return dataclasses.replace(config, **changes)
 
@@ -267,7 +274,7 @@ def _hint_of(config: object, key: str) -> Any:  # noqa: ANN401 - a type hint
 
 
 def _is_text(hint: Any) -> bool:  # noqa: ANN401 - a type hint
-    if typing.get_origin(hint) is tuple:
+    if typing.get_origin(hint) in {tuple, Mapping}:
         return False
     return hint is str or str in typing.get_args(hint) or typing.get_origin(hint) is typing.Literal
 
@@ -293,6 +300,10 @@ def _typed(value: Any, hint: Any, where: str) -> Any:  # noqa: ANN401 - checked 
         (inner,) = (member for member in members if member is not type(None))
         nothing = value is None or (value == NOTHING and inner is not str)
         return None if nothing else _typed(value, inner, where)
+    if origin is Mapping:
+        if not isinstance(value, Mapping):
+            raise UsageError(f"{where}: expected a table of values by name, got {value!r}")
+        return {name: _typed(item, members[1], f"{where}.{name}") for name, item in value.items()}
     if origin is tuple:
         return _typed_tuple(value, members, where)
     fits = type(value) is hint or (hint is float and type(value) is int)
@@ -366,7 +377,9 @@ def _table(config: DataclassInstance, name: str) -> list[str]:
 
 
 def _value(value: Any) -> str:  # noqa: ANN401 - what configs hold
-    """Return a value in TOML, which writes strings, numbers, booleans and lists as JSON does."""
+    """Return a value in TOML, which writes all but tables as JSON does."""
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{json.dumps(k)} = {_value(v)}' for k, v in value.items())}}}"
     return json.dumps(list(value) if isinstance(value, tuple) else value, ensure_ascii=False)
 
 

@@ -76,6 +76,7 @@ def identity_of(manifest: Manifest) -> Identity:
         manifest.catalogue_version,
         manifest.catalogue_digest,
         manifest.config,
+        obstacle_shares=manifest.obstacle_shares or {},
     )
 
 
@@ -140,7 +141,10 @@ def _refuse_strangers(store: Store, ours: Iterable[str] = ()) -> None:
 
 def _same(out: str, there: Identity, wanted: Identity, defaults: Mapping[str, Any]) -> None:
     there = replace(
-        there, config=_filled(present_settings(there.config), defaults), rules=wanted.rules
+        there,
+        config=_filled(present_settings(there.config), defaults),
+        rules=wanted.rules,
+        obstacle_shares=wanted.obstacle_shares,
     )
     old, new = (json.loads(json.dumps(asdict(i))) for i in (there, wanted))
     if difference := _first_difference(old, new, ""):
@@ -309,6 +313,7 @@ def _manifest(
         tuple(entry for _, entry in sorted(quarantined.items())),
         files,
         hardware=_hardware(old),
+        obstacle_shares=dict(identity.obstacle_shares) or None,
     )
 
 

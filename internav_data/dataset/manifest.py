@@ -132,6 +132,8 @@ class Manifest:
     hardware: tuple[str, ...] = ()
     """Names of the arithmetic (`internav_data.core.hardware`) that the scenes were made with; empty
     where it is not known. Machines of the same name make the same bytes."""
+    obstacle_shares: Mapping[str, float] | None = None
+    """Share of each type of obstacle among what is drawn; null in datasets of earlier releases."""
     sha256: str = ""
     """SHA-256 of the canonical text of all other keys (docs/dataset.md), 64 hexadecimal digits;
     filled in when the manifest is written."""

@@ -18,7 +18,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -68,6 +68,9 @@ class Identity:
     rules: str = ""
     """Digest of the code that makes scenes. Staged scenes of other rules are made again; a
     finished dataset does not hold it, and is extended by later rules of the same version."""
+    obstacle_shares: Mapping[str, float] = field(default_factory=dict)
+    """Share of each type of obstacle among what is drawn, which follows from all that is above;
+    empty where it is not known."""
 
     def digest(self) -> str:
         """Return the sha256 of all values, 64 hexadecimal digits."""

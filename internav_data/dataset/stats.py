@@ -85,6 +85,19 @@ class RoomsRow:
 
 
 @dataclass(frozen=True, slots=True)
+class TypeShare:
+    """A type's share of what is drawn and of what stands in the end."""
+
+    type: str
+    drawn: float | None
+    """Share of the draws; null where the manifest does not state it, as in earlier releases."""
+    standing: float
+    """Share of the obstacles."""
+    ratio: float | None
+    """Standing to drawn; null without a share of the draws."""
+
+
+@dataclass(frozen=True, slots=True)
 class Stats:
     """Statistics of a dataset or of one of its splits."""
 
@@ -102,6 +115,8 @@ class Stats:
     obstacle_count: Mapping[str, int]
     """Episodes by number of obstacles."""
     obstacle_types: Mapping[str, int]
+    type_shares: tuple[TypeShare, ...]
+    """Types that are drawn or stand: draws are not what stands, since small objects fit oftener."""
     obstacles_pushable: int
     obstacles_pickable: int
     obstacles_fixed: int
@@ -240,6 +255,7 @@ def _stats(
         room_count=counts(table.column("room_count")),
         obstacle_count=counts(table.column("obstacle_count")),
         obstacle_types=counts(kinds.column("type")),
+        type_shares=_type_shares(counts(kinds.column("type")), manifest.obstacle_shares),
         obstacles_pushable=int(push.sum()),
         obstacles_pickable=int(pick.sum()),
         obstacles_fixed=int((~(push | pick)).sum()),
@@ -257,6 +273,18 @@ def _stats(
         redraws=dict(manifest.redraws),
         quarantined=len(manifest.quarantined),
     )
+
+
+def _type_shares(
+    standing: Mapping[str, int], drawn: Mapping[str, float] | None
+) -> tuple[TypeShare, ...]:
+    total, rows = sum(standing.values()), []
+    for kind in sorted({*standing, *(drawn or ())}):
+        stands = share(standing.get(kind, 0), total)
+        draws = None if drawn is None else drawn.get(kind, 0.0)
+        ratio = share(stands, draws) if draws else None
+        rows.append(TypeShare(kind, draws, stands, ratio))
+    return tuple(rows)
 
 
 def _rooms_row(

@@ -17,6 +17,7 @@ from internav_data.catalog.attributes import DRAWS
 from internav_data.episodes.config import EpisodeConfig
 from internav_data.episodes.idle import drop_idle, relevance_of
 from internav_data.episodes.outcomes import outcomes_of
+from internav_data.episodes.pool import ObstaclePool
 from internav_data.episodes.site import SpawnSite
 from internav_data.episodes.spawn import EpisodeDraft, spawn
 from internav_data.geometry import round_m
@@ -104,7 +105,7 @@ def build_episodes(
     Raises
     ------
     UsageError
-        No physics engine has the config's name.
+        No physics engine has the config's name, or all assets have weight 0.
     QuarantineError
         An episode cannot be made within the bounds of the settings.
 
@@ -137,11 +138,11 @@ def build_batch(
     """
     config = config or EpisodeConfig()
     settings = _WorldSettings(world_config, beliefs)
-    site = SpawnSite.of(house, hidden)
+    site, weighed = SpawnSite.of(house, hidden), ObstaclePool.of(pool, config)
     redraws: Counter[Redraw] = Counter()
     episodes = []
     for index in range(first, first + count):
-        episode, again = _build_episode(site, index, pool, config, settings, attempt)
+        episode, again = _build_episode(site, index, weighed, config, settings, attempt)
         episodes.append(episode)
         redraws += again
     return EpisodeBatch(tuple(episodes), dict(sorted(redraws.items())))
@@ -166,7 +167,7 @@ def mode_of(scene: int, index: int) -> Mode:
 def _build_episode(
     site: SpawnSite,
     index: int,
-    pool: Sequence[Asset],
+    pool: ObstaclePool,
     config: EpisodeConfig,
     settings: _WorldSettings,
     attempt: int,
@@ -190,7 +191,7 @@ def _build_episode(
 def _draw(
     site: SpawnSite,
     index: int,
-    pool: Sequence[Asset],
+    pool: ObstaclePool,
     config: EpisodeConfig,
     settings: _WorldSettings,
     key: tuple[int, int, int, int],
@@ -221,7 +222,7 @@ def _draw(
 def _drawn(
     site: SpawnSite,
     index: int,
-    pool: Sequence[Asset],
+    pool: ObstaclePool,
     config: EpisodeConfig,
     key: tuple[int, int, int, int],
 ) -> EpisodeDraft | Redraw:

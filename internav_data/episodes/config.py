@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping  # noqa: TC003 - read at run time by the settings
+from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal, get_args
 
 from internav_data.core.config import Bounds, check_bounds
@@ -10,6 +11,7 @@ from internav_data.physics.engines import DEFAULT_ENGINE, ENGINES
 from internav_data.records.errors import UsageError
 
 IdleObstacles = Literal["keep", "drop"]
+Weight = Annotated[float, Bounds(0.0, 1000.0)]
 ObstacleCount = Annotated[int, Bounds(1)]
 
 
@@ -52,6 +54,12 @@ class EpisodeConfig:
     """Refuse starts whose first step ahead a wall or furniture blocks."""
     min_start_nodes: Annotated[int, Bounds(1)] = 1
     """Minimum number of nodes within reach of the start before any interaction."""
+    asset_weights: Mapping[str, Weight] = field(default_factory=dict)
+    """Weights of types of obstacles, with which each asset of a type is drawn; 1 where a type has
+    none, 0 for never."""
+    balance: bool = False
+    """Draw by weights that let each type of the catalogue stand about as often as its share of the
+    assets, where uniform draws leave few large objects."""
     engine: str = DEFAULT_ENGINE
     """Physics engine of settling, outcomes, expert and environments; `bullet` is the only one."""
     blind_expert: bool = False

@@ -24,12 +24,13 @@ from internav_data.physics.narrow_phase import prisms_of
 from internav_data.records import Pose
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from numpy.random import Generator
 
     from internav_data.core.typing import Floats
     from internav_data.episodes.config import EpisodeConfig
+    from internav_data.episodes.pool import ObstaclePool
     from internav_data.episodes.site import SpawnSite
     from internav_data.navigation import Lattice
     from internav_data.physics import SettleResult
@@ -110,7 +111,7 @@ def _standing(asset: Asset, yaw_deg: int) -> Polygons:
     return footprint(asset, Pose(0.0, 0.0, 0.0, yaw_quaternion(yaw_deg)))
 
 
-def spawn(draft: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> bool:
+def spawn(draft: EpisodeDraft, pool: ObstaclePool, rng: Generator) -> bool:
     """Put obstacles on the paths of a draft until the condition of its mode holds.
 
     Parameters
@@ -138,12 +139,12 @@ def spawn(draft: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> bool:
     return draft.done
 
 
-def _try_spot(draft: EpisodeDraft, pool: Sequence[Asset], rng: Generator) -> None:
+def _try_spot(draft: EpisodeDraft, pool: ObstaclePool, rng: Generator) -> None:
     """Draw an asset and a spot, and add the obstacle if it fits.
 
     Each try takes the same number of random numbers, whether it succeeds or not.
     """
-    asset = pool[int(rng.integers(len(pool)))]
+    asset = pool.draw(rng)
     path = draft.node_paths[int(rng.integers(len(draft.node_paths)))]
     segment = int(rng.integers(len(path.points) - 1))
     # Uniform along the path, normally distributed across it (paper, section 5.1).

@@ -43,6 +43,7 @@ from internav_data.generation.rules import source_digest
 from internav_data.generation.scenes import (
     ScenePayload,
     asset_folders,
+    obstacle_shares,
     scene_maker,
 )
 from internav_data.houses.quota import room_count
@@ -224,6 +225,7 @@ def identity_for(config: GenerationConfig, assets: Catalogue) -> Identity:
         catalogue_digest=assets.digest,
         config=config.identity(assets.digest),
         rules=source_digest(),
+        obstacle_shares=obstacle_shares(assets, config),
     )
 
 

@@ -81,12 +81,36 @@ def build_scene(
 
 
 def obstacle_pool(catalogue: Catalogue, config: GenerationConfig, split: Split) -> Sequence[Asset]:
-    """Return the assets that obstacles of a split are drawn from."""
-    from internav_data.catalog import split_of_asset  # noqa: PLC0415 - needed with one option only
+    """Return the assets that obstacles of a split are drawn from.
 
+    Raises
+    ------
+    UsageError
+        No obstacle has a type that the settings weigh.
+
+    """
+    from internav_data.catalog import split_of_asset  # noqa: PLC0415 - needed with one option only
+    from internav_data.episodes.pool import check_types  # noqa: PLC0415 - numpy when used
+
+    check_types(config.episodes.asset_weights, catalogue.spawnable)
     if not config.episodes.unseen_assets:
         return catalogue.spawnable
     return tuple(asset for asset in catalogue.spawnable if split_of_asset(asset) == split)
+
+
+def obstacle_shares(catalogue: Catalogue, config: GenerationConfig) -> dict[str, float]:
+    """Return the share of each type of obstacle among what is drawn, over all splits.
+
+    Raises
+    ------
+    UsageError
+        No obstacle has a type that the settings weigh, or all have weight 0.
+
+    """
+    from internav_data.episodes.pool import ObstaclePool, check_types  # noqa: PLC0415 - as above
+
+    check_types(config.episodes.asset_weights, catalogue.spawnable)
+    return ObstaclePool.of(catalogue.spawnable, config.episodes).shares()
 
 
 def beliefs_for(catalogue: Catalogue, config: GenerationConfig) -> Mapping[str, TypeBelief] | None:

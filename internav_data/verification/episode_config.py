@@ -34,6 +34,8 @@ class EpisodeRequest:
     """Whether no start faces a wall."""
     min_start_nodes: int = 1
     """Minimum number of nodes within reach of the start."""
+    never: frozenset[str] = frozenset()
+    """Types of obstacles that are never drawn."""
 
 
 def episode_request(config: Mapping[str, Any]) -> EpisodeRequest:
@@ -66,7 +68,16 @@ def episode_request(config: Mapping[str, Any]) -> EpisodeRequest:
         number("min_interactions", 0),
         second_of("refuse_facing_wall", *BOOLEANS),
         number("min_start_nodes", 1),
+        _never_drawn(values.get("asset_weights") or {}),
     )
+
+
+def _never_drawn(weights: object) -> frozenset[str]:
+    if not isinstance(weights, dict) or not all(
+        isinstance(weight, int | float) and weight >= 0 for weight in weights.values()
+    ):
+        raise _unknown("asset_weights", "weights by type", weights)
+    return frozenset(kind for kind, weight in weights.items() if weight == 0)
 
 
 def _unknown(key: str, expected: str, value: object) -> CorruptDataError:
@@ -96,6 +107,9 @@ def check_episode_config(
         interactions = episode.expert.pushes + episode.expert.picks
         low = request.min_interactions
         expect(interactions >= low, "min-interactions", f"at least {low}", interactions)
+    if request.never:
+        found = request.never & {obstacle.type for obstacle in episode.obstacles}
+        expect(not found, "asset-weights", "no type of weight 0", sorted(found))
     start = episode.start
     if request.refuses_walls:
         expect(start.faces_wall is False, "facing-wall", "a free step ahead", start.faces_wall)

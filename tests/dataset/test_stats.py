@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import statistics
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import pytest
 from internav_data.core.field_docs import descriptions
 from internav_data.dataset import compute_stats, load_dataset, read_manifest
 from internav_data.dataset.nodes import Record, Sequence
+from internav_data.dataset.stats import stats_of
 from internav_data.dataset.summary_statistics import path_efficiency
 from internav_data.dataset.tables import TABLES
 
@@ -101,6 +103,18 @@ def test_interactions_are_those_of_the_records(dataset_folder, split):
     # 130 scenes of 6: refused draws count for the dataset, not for a split.
     assert expert["refused"] == 13
     assert expert["refused_share"] == pytest.approx(13 / (13 + 130 * 6), abs=1e-6)
+
+
+def test_shares_of_types_compare_what_stands_with_what_is_drawn(dataset_folder):
+    manifest = read_manifest(dataset_folder)
+    rows = stats_of(dataset_folder, manifest).type_shares
+    assert {row.drawn for row in rows} == {None}
+    assert sum(row.standing for row in rows) == pytest.approx(1.0, abs=1e-4)
+    kind, other = rows[0].type, "Zebra"
+    drawn = replace(manifest, obstacle_shares={kind: 0.25, other: 0.75})
+    by_type = {row.type: row for row in stats_of(dataset_folder, drawn).type_shares}
+    assert by_type[kind].ratio == pytest.approx(rows[0].standing / 0.25, abs=1e-5)
+    assert (by_type[other].standing, by_type[other].ratio) == (0.0, 0.0)
 
 
 def test_stats_file_equals_compute_stats(dataset_folder):

@@ -3,8 +3,10 @@ from importlib import resources
 
 import pytest
 
-from internav_data.core.config import known_keys
+from internav_data.catalog import catalogue
+from internav_data.core.config import config_toml, known_keys
 from internav_data.generation.config import EPISODE_PRESETS, GenerationConfig, load_config
+from internav_data.generation.scenes import obstacle_pool, obstacle_shares
 from internav_data.records.errors import UsageError
 
 
@@ -152,9 +154,44 @@ def test_every_value_but_paths_is_identity(key):
         text = WORDS[value]
     else:
         other = {bool: "false" if value else "true", int: "3", float: "0.77", tuple: "[1, 1, 1]"}
+        other[dict] = "{Sofa = 2}"
         text = other[type(value)]
     changed = load_config(overrides=[f"{key}={text}"])
     assert base.identity("c") != changed.identity("c")
+
+
+def test_tables_of_values_are_merged_and_read_back(tmp_path):
+    path = tmp_path / "c.toml"
+    path.write_text("[episodes.asset_weights]\nSofa = 4\nApple = 0.5\n")
+    config = load_config(path, ["episodes.asset_weights.Sofa=2", "episodes.asset_weights={Pot=3}"])
+    assert config.episodes.asset_weights == {"Sofa": 2.0, "Apple": 0.5, "Pot": 3.0}
+    path.write_text(config_toml(config))
+    assert load_config(path) == config
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("episodes.asset_weights=[1]", ["asset_weights: expected a table of values by name"]),
+        ("episodes.asset_weights={Sofa='x'}", ["asset_weights.Sofa: expected a number, got 'x'"]),
+        ("episodes.asset_weights={Sofa=-1}", ["asset_weights.Sofa: expected 0.0", "got -1.0"]),
+        ("episodes.asset_weights.Sofa=nan", ["asset_weights.Sofa: expected a finite number"]),
+        ("episodes.balance=1", ["balance: expected true or false, got 1"]),
+        ("episodes.idle_obstacles=hide", ["idle_obstacles is 'hide'", "keep, drop"]),
+        ("episodes.refuse_facing_wall=2", ["refuse_facing_wall: expected true or false"]),
+    ],
+)
+def test_bad_values_of_episodes_are_refused_in_a_line(override, words):
+    message = refusal(override)
+    assert all(word in message for word in words), message
+
+
+def test_an_unknown_type_is_refused_before_a_run():
+    config = load_config(overrides=["episodes.asset_weights={Soffa = 2}"])
+    with pytest.raises(UsageError, match="'Soffa'; did you mean Sofa"):
+        obstacle_shares(catalogue(), config)
+    with pytest.raises(UsageError, match="'Soffa'; did you mean Sofa"):
+        obstacle_pool(catalogue(), config, "train")
 
 
 def test_one_set_is_one_setting():
