@@ -3,6 +3,7 @@
 import itertools
 
 import pytest
+from builders import UPRIGHT, crate, one_room
 
 from internav_data.catalog import catalogue
 from internav_data.episodes import build_episodes
@@ -10,7 +11,9 @@ from internav_data.episodes.outcomes import PICK, PUSH_DIRECTIONS, outcomes_of
 from internav_data.geometry import Polygons
 from internav_data.houses import HouseConfig, build_house
 from internav_data.navigation import Lattice, TangentGraph
-from internav_data.world import HouseModel, World
+from internav_data.physics import Body
+from internav_data.records import Pose
+from internav_data.world import HouseModel, World, WorldConfig
 
 
 @pytest.fixture(scope="module")
@@ -103,3 +106,28 @@ def test_distances_are_those_of_fresh_graphs(tables):
                 )
                 checked += 1
     assert checked >= 10
+
+
+def test_short_pushes_in_a_row_say_how_far_and_when_they_open():
+    """A crate before a door: pushed on four times by hand, all else as the pushes left it."""
+    model = HouseModel.of(one_room(6.0, 1.5))
+    body = Body.of(crate("Crate_0", (0.8, 0.8, 0.5), mass_kg=12.0), Pose(2.0, 0.75, 0.0, UPRIGHT))
+    step = WorldConfig(push_model="step")
+    world = World(model, [body], (4, 3, 0), (8, 3), step)
+    before = world.digest()
+    east, north, *_ = outcomes_of(world)[0]
+    assert world.digest() == before
+    by_hand, opened = [], None
+    for count in range(1, 5):
+        pushed = world.simulate_push(0, 0, agent=False)
+        world.put([(0, pushed.pose)])
+        by_hand.append(pushed.pose.x - 2.0)
+        if opened is None and world.path_steps() is not None:
+            opened = count
+    assert east.reach_m == pytest.approx(by_hand, abs=2e-4)
+    assert east.reach_opened == opened == 3
+    assert not east.opened
+    assert len(north.reach_m or ()) < 4, "a wall is near"
+    for config in (WorldConfig(), WorldConfig("kick")):
+        once = outcomes_of(World(model, [body], (4, 3, 0), (8, 3), config))[0]
+        assert all(o.reach_m is None and o.reach_opened is None for o in once)
