@@ -168,6 +168,7 @@ def place_furniture(draft: HouseDraft) -> None:
         (*draft.doors, *draft.windows),
         draft.ceiling_cm / 100.0,
         draft.config.furnishing,
+        draft.config.clutter,
         draft.catalogue,
     )
 

@@ -51,6 +51,9 @@ class HouseConfig:
     """Further factor for houses of 6-10 rooms."""
     furnishing: Annotated[float, Bounds(0.0, 2.0)] = 1.0
     """Amount of furniture beyond the indispensable: 0 bare, 1 lived in, 2 crowded."""
+    clutter: Annotated[float, Bounds(0.0, 1.0)] = 0.0
+    """Small things on surfaces and floors beyond the furniture: 0 none; at 1 a room has about as
+    many things as ProcTHOR's, 22."""
     loops: Annotated[float, Bounds(0.0, 1.0)] = 0.95
     """Share of the sensible further doors that are built, so that paths have alternatives."""
     wide_openings: Annotated[float, Bounds(0.0, 1.0)] = 0.95

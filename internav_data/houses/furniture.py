@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from internav_data.geometry import round_m
+from internav_data.houses.clutter import clutter_room
 from internav_data.houses.furnishing import RoomState, quarter_quaternion, room_state
 from internav_data.houses.group_makers import GROUP_MAKERS
 from internav_data.houses.groups import RoomContext
@@ -37,6 +38,7 @@ def furnish(
     openings: Sequence[Opening],
     ceiling_m: float,
     density: float,
+    clutter: float,
     catalogue: Catalogue,
 ) -> tuple[SceneObject, ...]:
     """Return the furniture of a house, by room and group.
@@ -53,6 +55,8 @@ def furnish(
         Height of the rooms, metres.
     density
         `HouseConfig.furnishing`.
+    clutter
+        `HouseConfig.clutter`.
     catalogue
         Assets to choose from.
     """
@@ -71,6 +75,9 @@ def furnish(
                 best = state
             if not _missing(best, types):
                 break
+        if best is not None and clutter > 0.0:
+            rng = key.generator(Purpose.CLUTTER, draw=room)
+            clutter_room(best, Picker(catalogue, rng), clutter)
         if best is not None:
             objects += _scene_objects(best, len(objects), _groups(objects))
     return tuple(objects)

@@ -58,6 +58,8 @@ class Purpose(IntEnum):
     """Hidden attributes of the obstacles of an episode: key as for `SPAWN`."""
     FURNITURE_ATTRIBUTES = 14
     """Hidden attributes of the furniture of a house."""
+    CLUTTER = 15
+    """Small things in one room: `draw` is the room's id."""
 
 
 class ProgrammeStream(IntEnum):
