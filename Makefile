@@ -154,7 +154,7 @@ bench: $(STAMP) ## run the benchmarks: JSON into bench-results/
 	$(BIN)/python benchmarks/houses.py --out bench-results/houses.json
 	$(BIN)/python benchmarks/table2.py > bench-results/table2.json
 	$(BIN)/python benchmarks/confounding.py --rate --out bench-results/confounding.json >/dev/null
-	for room in navigation verification world camera expert; do \
+	for room in navigation verification world camera expert holds; do \
 	  $(BIN)/python benchmarks/$$room.py > bench-results/$$room.json; \
 	done
 	$(BIN)/internav-gen generate --out bench-results/dataset --scenes 24 --episodes-per-scene 5

@@ -91,7 +91,7 @@ class PushResult:
     success: bool
     reason: Failure
     at_rest: bool
-    """False when something still rolled after five seconds."""
+    """False when something still moved 10 s after the release: the poses are of that moment."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +137,8 @@ def push(
     Parameters
     ----------
     body
-        Object to push, at its pose in the house.
+        Object to push, at its pose in the house. One that does not move (`Body.moves`) is too
+        heavy, without any simulation.
     heading
         0, 1, 2, 3: along +x, +y, -x, -y.
     near
@@ -158,6 +159,8 @@ def push(
 
     """
     problem = _Problem.of(body, heading, near, spec, engine)
+    if not body.moves:
+        return _unmoved(body)
     solution = free = _push_alone(problem)
     movers: Movers = ()
     failure: Failure = "too heavy"
@@ -198,6 +201,8 @@ def count_movers(
 
     """
     problem = _Problem.of(body, heading, near, spec, engine)
+    if not body.moves:
+        return 0
     free = _push_alone(problem)
     if not _is_moved(body, problem.frame, free):
         return 0
@@ -289,6 +294,20 @@ def _met(
         met = met_on_path(asset, path, frame, prisms, margin)
         found.update(pair for pair, touched in zip(asked, met, strict=True) if touched)
     return found
+
+
+def _unmoved(body: Body) -> PushResult:
+    """Return the result of a push at a body that stays, as one of infinite mass would."""
+    return PushResult(
+        pose=body.pose,
+        displacement_m=0.0,
+        seconds=0.0,
+        toppled=False,
+        moved=(),
+        success=False,
+        reason="too heavy",
+        at_rest=True,
+    )
 
 
 def _judged(

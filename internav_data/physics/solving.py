@@ -6,7 +6,6 @@ An engine knows nothing of either: it steps scenes, and is read after every step
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from internav_data.geometry import centre_of_mass, multiply, rotation_matrix
@@ -17,23 +16,38 @@ from internav_data.records import Pose
 if TYPE_CHECKING:
     from internav_data.physics.engines.protocol import Engine, Simulation
     from internav_data.physics.scene import Body, PhysicsScene
-    from internav_data.physics.sweep import SweepRecorder
     from internav_data.records import PushSpec, Quaternion, Vec3
 
-RULES: Final = 4
+    _Placement = tuple[Vec3, Quaternion]
+    """Centre of mass and orientation of a body."""
+
+RULES: Final = 5
 """Number of the rules by which scenes are built and solved, whatever the engine. Raised with every
 change of results: a dataset of other rules is not taken for a wrong one."""
-REST_SPEED: Final = 0.001
+REST_SPEED: Final = 0.0005
 """Speed below which a body counts as slow, m/s."""
-REST_SPIN: Final = 0.01
+REST_SPIN: Final = 0.005
 """Angular speed below which a body counts as slow, rad/s."""
-REST_STEPS: Final = 10
-"""Number of successive slow steps after which a body is at rest."""
+REST_S: Final = 0.04
+"""Time for which a body must stay slow to be at rest, seconds."""
+STEADY: Final = 0.5
+"""Share of `REST_SPEED` and of `REST_SPIN` by which a velocity may change meanwhile: at most
+6 mm/s² of acceleration. A swing turns slowly, too, and does not stay."""
+WINDOW_S: Final = 0.1
+"""Length of the windows in which bodies that are never calm are looked at, seconds."""
+STILL_WINDOWS: Final = 2
+"""Number of successive windows after which bodies are at rest that tremble in place: they drift no
+faster than `REST_SPEED` and `REST_SPIN`. In one window alone a swing may turn."""
+CREEP_S: Final = 2.0
+"""Time after which bodies are at rest that stay close to one pose, seconds. Jammed ones creep for
+ever; one that creeps over an edge has fallen by then."""
+CREEP_M: Final = 0.0025
+"""Distance of a pose that is close to another, metres."""
+CREEP_RAD: Final = 0.0125
+"""Angle of a pose that is close to another, radians."""
 SETTLE_LIMIT_S: Final = 1.0
 """Time limit of a settle, simulated seconds."""
-CREEP_STEPS: Final = 24
-"""Interval at which trembling bodies are looked at, steps."""
-PUSH_LIMIT_S: Final = 5.0
+PUSH_LIMIT_S: Final = 10.0
 """Time limit of a push after the release, simulated seconds; a body still rolling is left there."""
 
 
@@ -41,14 +55,14 @@ def solve_settle(engine: Engine, scene: PhysicsScene) -> SettleSolution:
     """Let the first body of a scene fall until it is at rest, for one second at most."""
     body = scene.bodies[0]
     radius = bounding_radius_m(body.asset)
-    reach, calm, steps = 0.0, 0, 0
-    limit = round(SETTLE_LIMIT_S / engine.step_s)
+    reach, steps, limit = 0.0, 0, round(SETTLE_LIMIT_S / engine.step_s)
+    rest = _RestRule([0], engine.step_s)
     with engine.load(scene) as simulation:
         start, start_turn = simulation.placement(0)
-        while steps < limit and calm < REST_STEPS:
+        while steps < limit and not rest.holds:
             simulation.step()
             steps += 1
-            calm = calm + 1 if _is_slow(simulation, 0) else 0
+            rest.note(simulation, slow=_is_slow(simulation, 0), held=False)
             now, turn = simulation.placement(0)
             shift = math.hypot(now[0] - start[0], now[1] - start[1])
             # A bound for all corners: the shift of the centre of mass plus the arc of the farthest.
@@ -56,7 +70,7 @@ def solve_settle(engine: Engine, scene: PhysicsScene) -> SettleSolution:
         return SettleSolution(
             pose=_pose(simulation, 0, body),
             seconds=steps * engine.step_s,
-            at_rest=calm >= REST_STEPS,
+            at_rest=rest.holds,
             penetration_m=simulation.penetration_m(0),
             reach_m=reach,
         )
@@ -72,7 +86,7 @@ def solve_push(engine: Engine, scene: PhysicsScene, spec: PushSpec) -> PushSolut
     limit = pusher.steps_left + round(PUSH_LIMIT_S / engine.step_s)
     recorders = [sweep_recorder(scene.bodies[k].asset, limit) for k in moving]
     movers = list(zip(moving, recorders, strict=True))
-    rest = _RestRule(recorders, engine.step_s)
+    rest = _RestRule(moving, engine.step_s)
     steps = 0
     with engine.load(scene) as simulation:
         pusher.begin(simulation.placement(0)[0])
@@ -82,12 +96,13 @@ def solve_push(engine: Engine, scene: PhysicsScene, spec: PushSpec) -> PushSolut
             pusher.act(simulation)
             simulation.step()
             steps += 1
-            slow = not pusher.steps_left
+            slow = not pusher.holds
             for k, recorder in movers:
                 shift = recorder.follow(*simulation.placement(k))
                 # Asking for a speed costs time.
                 slow = slow and shift < rest.slow_m and _is_slow(simulation, k)
-            rest.note(slow=slow)
+            if rest.note(simulation, slow=slow, held=pusher.holds):
+                pusher.let_go()
         return PushSolution(
             poses=tuple(_pose(simulation, k, scene.bodies[k]) for k in moving),
             sweeps=tuple(recorder.dop8 for recorder in recorders),
@@ -109,6 +124,15 @@ class _Pusher:
         self.steps_left = round(spec.seconds / step_s)
         """Number of steps until the body is let go at the latest; 0 once it is."""
 
+    @property
+    def holds(self) -> bool:
+        """Whether the body is not let go yet."""
+        return self.steps_left > 0
+
+    def let_go(self) -> None:
+        """Let go of the body."""
+        self.steps_left = 0
+
     def begin(self, middle: Vec3) -> None:
         """Take hold of the body, whose centre of mass is here."""
         if self._spec.distance_m:
@@ -121,7 +145,7 @@ class _Pusher:
         spec = self._spec
         speed, spin = simulation.velocity(0)
         if self._goal < math.inf and simulation.placement(0)[0][0] >= self._goal:
-            self.steps_left = 0
+            self.let_go()
             return
         self.steps_left -= 1
         missing = spec.speed_m_s - speed[0]
@@ -133,38 +157,102 @@ class _Pusher:
         else:
             # The last impulse is scaled: it gives just the speed that is missing.
             simulation.set_velocity(0, (spec.speed_m_s, speed[1], speed[2]), spin)
-            self.steps_left = 0
+            self.let_go()
 
 
-@dataclass(slots=True)
-class _RestRule:
-    """Rule by which all bodies of a push are at rest: slow for a while, or trembling in place."""
+class _Calm:
+    """Rule by which bodies are calm: all slow for a while, without speeding up or slowing down."""
 
-    recorders: list[SweepRecorder]
-    step_s: float
-    calm: int = 0
-    """Number of slow steps in a row."""
-    steps: int = 0
-    holds: bool = False
-    """Whether all bodies are at rest."""
+    def __init__(self, bodies: list[int], step_s: float) -> None:
+        self._bodies, self._enough = bodies, round(REST_S / step_s)
+        self._steps = 0
+        """Number of slow steps in a row."""
+        self._velocities: list[tuple[Vec3, Vec3]] = []
+        """Velocities of the bodies after the first of these."""
 
     @property
-    def slow_m(self) -> float:
-        """Distance in one step above which a body cannot be slow, metres."""
-        return 10.0 * REST_SPEED * self.step_s
+    def holds(self) -> bool:
+        """Whether all bodies are calm."""
+        return self._steps >= self._enough
 
-    def note(self, *, slow: bool) -> None:
+    def note(self, simulation: Simulation, *, slow: bool) -> None:
         """Take notice of a step: whether all bodies were slow in it."""
-        self.steps += 1
-        self.calm = self.calm + 1 if slow else 0
-        self.holds = self.calm >= REST_STEPS
-        if self.steps % CREEP_STEPS == 0:
-            # Trembling counts as rest; a body that has not yielded to a constant push by now
-            # never will.
-            seconds = CREEP_STEPS * self.step_s
-            far_m, far_rad = REST_SPEED * seconds, REST_SPIN * seconds
-            crept = [recorder.crept(far_m, far_rad) for recorder in self.recorders]
-            self.holds = self.holds or not any(crept)
+        self._steps = self._steps + 1 if slow else 0
+        if self._steps not in {1, self._enough}:
+            return
+        before = self._velocities
+        self._velocities = [simulation.velocity(k) for k in self._bodies]
+        if self._steps > 1 and not all(map(_steady, before, self._velocities)):
+            self._steps = 1
+
+
+class _RestRule:
+    """Rule by which all bodies that move are at rest.
+
+    A pushed one is let go, and all are calm, or have stayed in place for some windows of time.
+    """
+
+    def __init__(self, bodies: list[int], step_s: float) -> None:
+        self._bodies = bodies
+        self._calm = _Calm(bodies, step_s)
+        self.slow_m = 10.0 * REST_SPEED * step_s
+        """Distance in one step above which a body cannot be slow, metres."""
+        self._window = round(WINDOW_S / step_s)
+        self._steps, self._still, self._close, self._held = 0, 0, 0, True
+        self._latest: list[_Placement] = []
+        """Placements at the end of the latest window."""
+        self._first: list[_Placement] = []
+        """Placements to which the bodies have stayed close for `_close` windows."""
+        self.holds = False
+        """Whether all bodies are at rest."""
+
+    def note(self, simulation: Simulation, *, slow: bool, held: bool) -> bool:
+        """Take notice of a step: whether all were slow in it, and the first one is still held.
+
+        Returns
+        -------
+        bool
+            Whether the held body stays where it is: one that has not yielded by now never will.
+
+        """
+        if self._held and not held:
+            self._look(simulation)
+            self._steps, self._still, self._close, self._first = 0, 0, 0, self._latest
+        self._held = held
+        self._steps += 1
+        self._calm.note(simulation, slow=slow)
+        if self._steps % self._window == 0:
+            self._look(simulation)
+        stay = self._still >= STILL_WINDOWS or self._close * WINDOW_S >= CREEP_S
+        self.holds = not held and (self._calm.holds or stay)
+        return held and self._still > 0
+
+    def _look(self, simulation: Simulation) -> None:
+        """Look at how far the bodies have drifted since earlier windows."""
+        now = [simulation.placement(k) for k in self._bodies]
+        still = _close(self._latest, now, REST_SPEED * WINDOW_S, REST_SPIN * WINDOW_S)
+        self._still = self._still + 1 if still else 0
+        self._latest = now
+        if _close(self._first, now, CREEP_M, CREEP_RAD):
+            self._close += 1
+        else:
+            self._first, self._close = now, 0
+
+
+def _close(before: list[_Placement], after: list[_Placement], far_m: float, far_rad: float) -> bool:
+    """Return whether all placements differ by less than a distance and an angle; False for none."""
+    return bool(before) and all(
+        math.dist(here, there) < far_m and _angle(turn, turned) < far_rad
+        for (here, turn), (there, turned) in zip(before, after, strict=True)
+    )
+
+
+def _steady(before: tuple[Vec3, Vec3], after: tuple[Vec3, Vec3]) -> bool:
+    """Return whether a body's velocity and spin hardly changed."""
+    return (
+        math.dist(before[0], after[0]) < STEADY * REST_SPEED
+        and math.dist(before[1], after[1]) < STEADY * REST_SPIN
+    )
 
 
 def _is_slow(simulation: Simulation, body: int) -> bool:

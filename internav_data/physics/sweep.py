@@ -97,7 +97,6 @@ class SweepRecorder:
     _radius: float
     _state: Floats
     _kept: Poses
-    _before: tuple[float, ...] | None = None
 
     def follow(self, middle: Vec3, turn: Quaternion) -> float:
         """Add the body's present centre of mass and orientation to the record.
@@ -109,15 +108,6 @@ class SweepRecorder:
 
         """
         return _follow(self._state, self._kept, self._corners, self._radius, *middle, *turn)
-
-    def crept(self, far_m: float, far_rad: float) -> bool:
-        """Return whether it moved farther, or turned more, since the last call of this method."""
-        now = tuple(self._state[_LATEST : _LATEST + _POSE].tolist())
-        before, self._before = self._before, now
-        if before is None or math.dist(before[:3], now[:3]) > far_m:
-            return True
-        turn = abs(sum(p * q for p, q in zip(before[3:], now[3:], strict=True)))
-        return 2.0 * math.acos(min(1.0, turn)) > far_rad
 
     @property
     def dop8(self) -> Dop8:

@@ -35,7 +35,7 @@ class Dynamics:
 
     @property
     def fixed(self) -> bool:
-        """Whether no interaction of the agent can act on it: it is as if bolted down."""
+        """Whether it is bolted down: nothing can act on it, and it stays whatever strikes it."""
         return not (self.pushable or self.pickable)
 
 

@@ -505,7 +505,8 @@ class World:
             # An object may stand closer than the collider's radius: the collider must not begin
             # inside it.
             x, y = self.position
-            loose = touching(self._dop8s, dop8_of_square(x, y, AGENT_M))
+            near = touching(self._dop8s, dop8_of_square(x, y, AGENT_M))
+            loose = (k for k in near if not self.items[k].dynamics.fixed)
             gap = min((self.distance_to(k, x, y) for k in loose), default=math.inf)
         return push(
             self.body(index),
@@ -591,7 +592,7 @@ class World:
         return SPACING_M * self.goal[0], SPACING_M * self.goal[1]
 
     def body(self, index: int) -> Body:
-        """Return an object as a body of physics: geometry, pose and dynamics.
+        """Return an object as a body of physics: geometry, pose, dynamics, and whether it moves.
 
         Raises
         ------
@@ -604,7 +605,7 @@ class World:
             raise UsageError(
                 f"World: object {index} ({item.asset.asset_id}) is held, it has no pose"
             )
-        return Body(item.asset, item.pose, item.dynamics)
+        return Body(item.asset, item.pose, item.dynamics, moves=not item.dynamics.fixed)
 
     def distance_to(self, index: int, x: float, y: float) -> float:
         """Return the distance from a point to an object's footprint, metres.

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import pytest
 
 from internav_data.physics import cache
+
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # `holds`
 
 
 @pytest.fixture

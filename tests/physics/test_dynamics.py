@@ -91,10 +91,10 @@ def test_an_episodes_stored_dynamics_decide_what_a_world_does(hand_house):
 
 def test_outcomes_of_an_episode_follow_its_stored_values():
     house = build_house(0, 0, HouseConfig(), catalogue())
-    (episode,) = build_episodes(house, 1, catalogue().spawnable)
+    episodes = build_episodes(house, 4, catalogue().spawnable)
     model, assets = HouseModel.of(house), catalogue().assets
-    number, _ = next(
-        (k, o) for k, o in enumerate(episode.obstacles) if o.outcomes[0].reason != "not pushable"
+    episode, number = next(
+        (episode, k) for episode in episodes for k, o in enumerate(episode.obstacles) if o.pushable
     )
 
     def outcomes(**changes):
