@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from internav_data.catalog.config import CatalogConfig
     from internav_data.records import Affordance, Asset
 
-FIXED_SHARES: Final[Mapping[Affordance, float]] = MappingProxyType({"push": 0.55, "pick": 0.1})
+FIXED_SHARES: Final[Mapping[Affordance, float]] = MappingProxyType({"push": 0.5, "pick": 0.1})
 """Share of fixed objects, by the affordance of their type, of those whose attributes are drawn: a
 quarter of all obstacles, of which more are picked up than pushed."""
 MASS_FACTORS: Final = (0.5, 0.8, 1.25, 2.0)

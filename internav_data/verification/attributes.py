@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from internav_data.records import Asset, Dynamics, House, Obstacle
     from internav_data.verification.findings import FindingCollector
 
-FIXED = {"push": 0.55, "pick": 0.1}
+FIXED = {"push": 0.5, "pick": 0.1}
 """Share of fixed objects among those with attributes of their own, by their type's affordance."""
 MASSES = (0.5, 0.8, 1.25, 2.0)
 """Levels of mass over the median of the type's assets."""
