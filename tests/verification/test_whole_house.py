@@ -11,7 +11,7 @@ from builders import UPRIGHT, asset, part, scene_object
 from scenery import ASSETS
 
 from internav_data.geometry import centre_of_mass
-from internav_data.physics import get_solver
+from internav_data.physics import cache_disabled, get_solver
 from internav_data.physics.engines import bullet_scene
 from internav_data.records import MovedObject, Pose
 from internav_data.verification.checked_config import CheckedConfig
@@ -80,6 +80,20 @@ def test_what_is_true_holds(crowded):
     assert found_in(*crowded) == (Counter(), [])
 
 
+def test_a_house_that_is_built_changes_no_solution(crowded):
+    """Bullet has globals that all of a process's clients share."""
+    house, episode = crowded
+
+    def solved():
+        with cache_disabled():
+            get_solver().forget()
+            return physical.played(house, episode)
+
+    before = solved()
+    found_in(house, episode)
+    assert solved() == before
+
+
 def test_an_obstacle_in_the_air_does_not_hold(crowded):
     house, episode = crowded
     found, texts = found_in(house, with_obstacle(episode, 1, z=0.1, outcomes=()))
@@ -122,6 +136,21 @@ def test_an_obstacle_carries_what_a_push_has_put_on_it(crowded):
     assert found_in(house, with_outcome(episode, 1, "push_south", pose=onto)) == (Counter(), [])
     found, _ = found_in(house, with_outcome(episode, 1, "push_south", pose=replace(onto, x=4.5)))
     assert found["physics.house-holds"] == 1
+
+
+def test_what_a_moved_object_leans_on_can_give_way(crowded):
+    """A pot on the edge of a stand tips it over; in its middle it does not."""
+    leg = part("box", (0.0, 0.0, 0.25), (0.2, 0.2, 0.5))
+    stand = asset("Stand_1", leg, part("box", (0.0, 0.0, 0.51), (0.8, 0.8, 0.02)), mass_kg=2.0)
+    house = builders.one_room(5.0, 4.0)
+    pot = builders.obstacle(ASSETS["Pot_1"], 1.0, 2.0)
+    obstacles = (pot, builders.obstacle(stand, 3.0, 2.0))
+    episode = builders.episode(house, builders.start(2, 2), builders.goal(16, 4), obstacles)
+    pushed = push_of(crowded[1], 1, "push_west")
+    for x, given in ((3.0, Counter()), (3.3, Counter({"physics.house-holds": 2}))):
+        end = replace(pushed, pose=Pose(x, 2.0, 0.522, UPRIGHT), moved=())
+        one = with_obstacle(episode, 0, outcomes=(end,))
+        assert found_in(house, one, {**ASSETS, "Stand_1": stand})[0] == given
 
 
 @pytest.mark.parametrize(
