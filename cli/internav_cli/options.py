@@ -43,7 +43,6 @@ _CONFIG = (
     click.option(
         "--episode-preset",
         type=click.Choice(["paper", "dense", "long"]),
-        default="paper",
         help="As in the paper, obstacles that all matter, or interactions of several actions.  "
         "[default: paper]",
     ),
@@ -78,7 +77,7 @@ def config_from(
     rooms: str | None = None,
     floor_plan: str | None = None,
     folders: tuple[str, ...] = (),
-    episode_preset: str = "paper",
+    episode_preset: str | None = None,
     **more: Any,  # noqa: ANN401 - further settings by key, __ for a dot
 ) -> GenerationConfig:
     """Return the config that the options describe: preset, file, then options, then --set."""
@@ -92,7 +91,7 @@ def config_from(
         "assets": list(folders) or None,
     } | {key.replace("__", "."): value for key, value in more.items()}
     chosen = {key: value for key, value in options.items() if value is not None}
-    config = load_config(config_file, overrides, chosen, episode_preset)
+    config = load_config(config_file, overrides, chosen, episode_preset or "paper")
     config.check()
     return config
 
