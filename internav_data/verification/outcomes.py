@@ -89,14 +89,16 @@ class _OutcomeCheck:
 
     def _can_move(self, other: MovedObject) -> bool:
         if other.obstacle is not None:
-            return 0 <= other.obstacle < len(self.episode.obstacles)
+            obstacles = self.episode.obstacles
+            known = 0 <= other.obstacle < len(obstacles)
+            return known and not obstacles[other.obstacle].dynamics.fixed
         placed = self._objects.get(-1 if other.object_id is None else other.object_id)
         if placed is None:
             return False
         asset = self.layout.shapes.assets[placed.asset_id]
         own = placed.dynamics or asset.dynamics
         of_obstacles = asset.spawnable or placed.affordance is not None
-        return of_obstacles and (own.pushable or own.pickable)
+        return of_obstacles and not own.fixed
 
     def distances(self, scope: Scope) -> None:
         """Derive the distances after the outcomes of a scope."""

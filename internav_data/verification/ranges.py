@@ -21,8 +21,8 @@ METRES = 4
 """Decimals of positions and lengths (0.1 mm)."""
 TURNS = 6
 """Decimals of quaternions."""
-MAX_PUSH_S = 5.5
-"""Maximum duration of a push: half a second of force, five until at rest."""
+MAX_PUSH_S = 11.0
+"""Maximum duration of a push: a second at most until the release, ten until at rest."""
 PATTERNS = ("plain", "planks", "tiles", "stripes", "carpet", "bricks")
 """Patterns of floors and walls."""
 PART_MATERIALS = (

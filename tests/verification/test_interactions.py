@@ -243,7 +243,7 @@ def test_a_missing_expert_is_untrue_where_one_was_promised(tmp_path, scenes):
 RANGES = {
     "reason": (lambda e: with_outcome(e, 0, reason="no luck"), "outcomes.element.reason"),
     "action": (lambda e: with_outcome(e, 0, action="kick_east"), "outcomes.element.action"),
-    "seconds": (lambda e: with_outcome(e, 0, seconds=5.6), "outcomes.element.seconds"),
+    "seconds": (lambda e: with_outcome(e, 0, seconds=11.1), "outcomes.element.seconds"),
     "unrounded": (
         lambda e: with_outcome(e, 0, path_m_after=6.12345678),
         "outcomes.element.path_m_after",

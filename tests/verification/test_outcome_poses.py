@@ -87,6 +87,17 @@ def test_contradiction_is_found(scenes, layouts, case):
     assert found_in(layouts[scene], wrong) == {f"outcome.{predicate}"}
 
 
+def test_a_fixed_obstacle_that_was_moved(scenes, layouts):
+    (other,) = scenes[2][1][0].obstacles[1].outcomes[1].moved
+    moved = (MovedObject(0, None, other.pose),)
+    episode = outcome_changed(scenes, *PUSHED, moved=moved)[2][1][0]
+    safe, pot = episode.obstacles
+    assert "outcome.moved" not in found_in(layouts[2], episode)
+    bolted = replace(safe, pushable=False, pickable=False)
+    wrong = replace(episode, obstacles=(bolted, pot))
+    assert found_in(layouts[2], wrong) == {"outcome.moved"}
+
+
 def test_an_end_as_far_away_but_elsewhere(scenes, layouts):
     """The bar ends in the door again: only the stored pose tells that this shuts it."""
     bar = scenes[0][1][0].obstacles[0]

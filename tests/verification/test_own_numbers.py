@@ -7,7 +7,8 @@ import pytest
 from internav_data.core.field_docs import descriptions
 from internav_data.houses import standards
 from internav_data.physics import fall_clearance
-from internav_data.records import Material, Part
+from internav_data.physics.solving import PUSH_LIMIT_S
+from internav_data.records import PUSH_SPECS, Material, Part
 from internav_data.verification import houses, interactions, objects, ranges
 from internav_data.verification.ranges import EPISODE_RULES
 from internav_data.verification.replay import settling
@@ -51,6 +52,11 @@ def test_the_replay_of_experts_knows_what_every_action_does(action):
 def test_the_validator_accepts_every_action_and_no_other():
     rule = EPISODE_RULES["expert.actions.element"]
     assert (rule.low, rule.high) == (0, ACTION_COUNT - 1)
+
+
+def test_a_push_may_take_as_long_as_the_slowest_one():
+    slowest = max(spec.seconds for spec in PUSH_SPECS.values())
+    assert slowest + PUSH_LIMIT_S == ranges.MAX_PUSH_S
 
 
 def test_the_validators_lengths_are_those_of_houses():
