@@ -79,13 +79,26 @@ def settle(
 
 
 def _judged(body: int, asset: Asset, start: Pose) -> SettledPose | None:
-    calm = steps = 0
-    while steps < 240 and calm < 10:
+    calm = still = steps = 0
+    first, latest = (np.zeros(3), np.zeros(3)), None
+    # At rest: slow for ten steps at nearly one velocity, or in place over two windows of 24.
+    while steps < 240 and calm < 10 and still < 2:
         bullet.stepSimulation(physicsClientId=CLIENT)
         steps += 1
-        speed, spin = bullet.getBaseVelocity(body, physicsClientId=CLIENT)
-        slow = math.hypot(*speed) < 0.001 and math.hypot(*spin) < 0.01
+        speed, spin = map(np.array, bullet.getBaseVelocity(body, physicsClientId=CLIENT))
+        slow = np.linalg.norm(speed) < 0.0003 and np.linalg.norm(spin) < 0.003
         calm = calm + 1 if slow else 0
+        if calm == 1:
+            first = speed, spin
+        if calm == 10 and not _alike(first, (speed, spin), 0.00024, 0.0024):
+            calm, first = 1, (speed, spin)
+        if steps % 24 == 0:
+            here = tuple(
+                map(np.array, bullet.getBasePositionAndOrientation(body, physicsClientId=CLIENT))
+            )
+            # A quaternion's entries change by half of a small angle.
+            still = still + 1 if latest and _alike(latest, here, 0.00003, 0.00015) else 0
+            latest = here
     position, turn = bullet.getBasePositionAndOrientation(body, physicsClientId=CLIENT)
     matrix = np.array(bullet.getMatrixFromQuaternion(turn)).reshape(3, 3)
     origin = np.array(position) - matrix @ np.array(_middle(asset))
@@ -94,10 +107,18 @@ def _judged(body: int, asset: Asset, start: Pose) -> SettledPose | None:
     )
     moved = math.hypot(origin[0] - start.x, origin[1] - start.y)
     tilt = math.degrees(math.acos(max(-1.0, min(1.0, float(matrix[2, 2])))))
-    if calm < 10 or moved > 0.05 or tilt > 5.0 or depth > 0.002:
+    if (calm < 10 and still < 2) or moved > 0.05 or tilt > 5.0 or depth > 0.002:
         return None
     x, y, z = (round(float(v), 4) for v in origin)
     return SettledPose(Pose(x, y, z, tuple(round(q, 6) for q in turn)), steps * STEP, depth)
+
+
+def _alike(before: Sequence[Any], after: Sequence[Any], first: float, second: float) -> bool:
+    """Return whether two pairs of vectors differ by less than these."""
+    return bool(
+        np.linalg.norm(before[0] - after[0]) < first
+        and np.linalg.norm(before[1] - after[1]) < second
+    )
 
 
 def _surface(body: int, friction: float) -> None:

@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 RULES: Final = 5
 """Number of the rules by which scenes are built and solved, whatever the engine. Raised with every
 change of results: a dataset of other rules is not taken for a wrong one."""
-REST_SPEED: Final = 0.0005
+REST_SPEED: Final = 0.0003
 """Speed below which a body counts as slow, m/s."""
-REST_SPIN: Final = 0.005
+REST_SPIN: Final = 0.003
 """Angular speed below which a body counts as slow, rad/s."""
 REST_S: Final = 0.04
 """Time for which a body must stay slow to be at rest, seconds."""
-STEADY: Final = 0.5
+STEADY: Final = 0.8
 """Share of `REST_SPEED` and of `REST_SPIN` by which a velocity may change meanwhile: at most
 6 mm/s² of acceleration. A swing turns slowly, too, and does not stay."""
 WINDOW_S: Final = 0.1
@@ -41,9 +41,9 @@ faster than `REST_SPEED` and `REST_SPIN`. In one window alone a swing may turn."
 CREEP_S: Final = 2.0
 """Time after which bodies are at rest that stay close to one pose, seconds. Jammed ones creep for
 ever; one that creeps over an edge has fallen by then."""
-CREEP_M: Final = 0.0025
+CREEP_M: Final = 0.001
 """Distance of a pose that is close to another, metres."""
-CREEP_RAD: Final = 0.0125
+CREEP_RAD: Final = 0.005
 """Angle of a pose that is close to another, radians."""
 SETTLE_LIMIT_S: Final = 1.0
 """Time limit of a settle, simulated seconds."""

@@ -10,6 +10,7 @@ from builders import crate, scene_object, screen
 from internav_data.catalog import catalogue
 from internav_data.episodes import EpisodeConfig, build_episodes
 from internav_data.episodes.build import _draw_endpoints
+from internav_data.episodes.pool import ObstaclePool
 from internav_data.episodes.site import SpawnSite
 from internav_data.episodes.spawn import spawn
 from internav_data.geometry import clearance, footprint
@@ -42,7 +43,7 @@ def drafts():
     for seed in range(30):
         rng = np.random.default_rng(seed)
         draft = _draw_endpoints(site, "lengthened" if seed % 2 else "blocked", config, rng)
-        spawn(draft, (screen(), LEGGED), rng)
+        spawn(draft, ObstaclePool((screen(), LEGGED), None), rng)
         made.append(draft)
     return made
 
