@@ -45,7 +45,7 @@ class HouseConfig:
     """Lengths of rooms times this; 1.1 makes houses 21 % larger. `paper` only."""
     scale_small: Annotated[float, Bounds(0.7, 2.0)] = 0.89
     """Further factor for houses of 1-2 rooms."""
-    scale_medium: Annotated[float, Bounds(0.7, 2.0)] = 0.935
+    scale_medium: Annotated[float, Bounds(0.7, 2.0)] = 0.95
     """Further factor for houses of 3-5 rooms."""
     scale_large: Annotated[float, Bounds(0.7, 2.0)] = 0.975
     """Further factor for houses of 6-10 rooms."""

@@ -16,7 +16,7 @@ SCENES = 33
 ALL_TYPES = "hall,living,dining,kitchen,laundry,office,storage,studio,bathroom,bedroom"
 
 GOLDEN = {
-    "paper": "94781f1902670b5a68ed89eaa24b368c1718c205cc3edf20447dfcd8436fa4e2",
+    "paper": "b3f22dd35a33f634c5f536acdca9a684f6f0fb271f1c5975d439d0adadb6d23a",
     "paper, every type": "5951052b92a500b594a9af75044cb54134c76896e5386a61a72245c27cc2b435",
     "realistic": "d1b3780eea61427536b4660c7d33fb28c84cb0a4c19d5cdcf0330ddd3063cc33",
     "realistic, every type": "4f587de007bcc6c43edb3c404a0bd1502d401a2f9232afd1949cc647729d637b",
