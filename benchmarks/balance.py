@@ -62,6 +62,7 @@ def main() -> None:
     parser.add_argument("--episodes-per-scene", type=int, default=8)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--anew", action="store_true", help="begin with equal weights")
+    parser.add_argument("--episode-preset", default="balanced", help="as of internav-gen generate")
     parser.add_argument("--set", action="append", default=[], help="a config value, as a.b=c")
     args = parser.parse_args()
     build.outcomes_of = lambda world, _: ((),) * len(world.obstacles)
@@ -71,7 +72,8 @@ def main() -> None:
     weights = dict.fromkeys(listed, 1.0) | ({} if args.anew else dict(BALANCE_WEIGHTS))
     for number in range(args.rounds):
         text = ", ".join(f"{kind} = {weight:.6g}" for kind, weight in weights.items())
-        config = load_config(None, [*args.set, f"episodes.asset_weights={{{text}}}"])
+        weighed = [f"episodes.asset_weights={{{text}}}", "episodes.balance=false"]
+        config = load_config(None, [*args.set, *weighed], episode_preset=args.episode_preset)
         scenes = range(args.first + number * args.scenes, args.first + (number + 1) * args.scenes)
         types, table = standing(config, scenes, args.episodes_per_scene)
         found = ratios(types, listed)

@@ -58,6 +58,7 @@ def main() -> None:
     parser.add_argument("--episodes-per-scene", type=int, default=10)
     parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1])
     parser.add_argument("--workers", type=int, default=0)
+    parser.add_argument("--episode-preset", default="paper", help="as of internav-gen generate")
     parser.add_argument("--set", action="append", default=[], help="a config value, as a.b=c")
     args = parser.parse_args()
     results = []
@@ -68,7 +69,9 @@ def main() -> None:
             f"episodes_per_scene={args.episodes_per_scene}",
             f"test_episodes_per_scene={args.episodes_per_scene}",
         ]
-        result = compared(load_config(None, given), args.scenes, args.workers)
+        result = compared(
+            load_config(None, given, episode_preset=args.episode_preset), args.scenes, args.workers
+        )
         results.append(result)
         refused = result["expert"]["refused_share"]
         print(

@@ -42,9 +42,9 @@ _CONFIG = (
     ),
     click.option(
         "--episode-preset",
-        type=click.Choice(["paper", "dense", "long"]),
-        help="As in the paper, obstacles that all matter, or interactions of several actions.  "
-        "[default: paper]",
+        type=click.Choice(["paper", "balanced", "dense", "long"]),
+        help="As in the paper, types of obstacles balanced, obstacles that all matter, or "
+        "interactions of several actions.  [default: paper]",
     ),
     click.option(
         "--rooms",

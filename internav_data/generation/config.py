@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from internav_data.records import Split
 
-EPISODE_PRESETS: Final = ("paper", "dense", "long")
+EPISODE_PRESETS: Final = ("paper", "balanced", "dense", "long")
 """Names of the presets of episodes, each a TOML file in the folder `presets`: settings that differ
 from the defaults, of any section."""
 TEST_SHARE = 10

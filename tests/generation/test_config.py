@@ -42,7 +42,7 @@ def test_a_file_wins_over_a_preset_and_both_are_overridden(tmp_path):
     config = load_config(path, ["episodes.min_interactions=2"], episode_preset="dense")
     assert (config.episodes.min_detour_steps, config.episodes.min_interactions) == (3, 2)
     assert config.episodes.max_obstacles == dense.episodes.max_obstacles
-    with pytest.raises(UsageError, match="'sparse': expected one of paper, dense, long"):
+    with pytest.raises(UsageError, match="'sparse': expected one of paper, balanced, dense, long"):
         load_config(episode_preset="sparse")
 
 
