@@ -26,7 +26,7 @@ COOKING = ("Stove", "Sink", "CounterTop")
 """Types of asset that a kitchenette needs."""
 CERTAIN = 1.0
 """Share from which on a rule is indispensable: its group is tried at any furnishing."""
-TRIES = 4
+TRIES = 8
 """Number of times that a room is furnished while it lacks what it needs."""
 MAX_GROUPS = 4
 """Largest number of groups that one rule puts into one room."""
