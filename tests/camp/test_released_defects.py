@@ -79,7 +79,7 @@ def test_defect_4_a_move_counts_once(houses):
 
     env, moves = InterNavEnv(houses, 16, sensors=()), 0
     env.reset(seed=0)
-    for action in np.random.default_rng(0).choice([0, 0, 1, 2, 3, 4, 5, 9], 120).tolist():
+    for action in np.random.default_rng(0).choice([0, 0, 1, 2, 3, 4, 5, 9], 400).tolist():
         *_, info = env.step(action)
         moves += action == 0 and info["action_success"]
     *_, info = env.step(11)
