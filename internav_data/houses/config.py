@@ -82,10 +82,8 @@ class HouseConfig:
 
         """
         if self.preset not in {"paper", "realistic"}:
-            raise UsageError(f"preset is '{self.preset}': use 'paper' or 'realistic'")
-        check_bounds(
-            self, "{key} is {value}: choose a number from {bounds.min:g} to {bounds.max:g}"
-        )
+            raise UsageError(f"house.preset: expected paper or realistic, got {self.preset!r}")
+        check_bounds(self, "{key}: expected {expected}, got {value}", "house.")
         if self.floor_plan is not None and self.rooms:
             raise UsageError("rooms and floor_plan exclude each other: leave one of them out")
         return parse_rooms(self.rooms)
