@@ -46,6 +46,21 @@ def tilt_deg(before: Quaternion, after: Quaternion) -> float:
 def is_still(here: Pose, there: Pose) -> bool:
     """Return whether two poses differ by less than an engine's bodies tremble at rest."""
     near = math.dist((here.x, here.y, here.z), (there.x, there.y, there.z)) < STILL_M
-    # q and -q are one orientation; the angle between two is twice the arc cosine of |p . q|.
-    turn = abs(sum(p * q for p, q in zip(here.quaternion, there.quaternion, strict=True)))
-    return near and 2.0 * math.acos(min(1.0, turn)) < STILL_RAD
+    return near and _turn_rad(here.quaternion, there.quaternion) < STILL_RAD
+
+
+def _turn_rad(before: Quaternion, after: Quaternion) -> float:
+    """Return the angle between two orientations, radians.
+
+    From the chord of the unit quaternions. Their product would not do: a length that rounding to
+    1e-6 leaves 1e-6 short looks like a turn of 3 mrad in its arc cosine.
+    """
+    p, q = _unit(before), _unit(after)
+    # q and -q are one orientation.
+    chord = min(math.dist(p, q), math.dist(p, tuple(-n for n in q)))
+    return 4.0 * math.asin(min(1.0, chord / 2.0))
+
+
+def _unit(quaternion: Quaternion) -> tuple[float, ...]:
+    length = math.hypot(*quaternion)
+    return tuple(n / length for n in quaternion)

@@ -6,6 +6,8 @@ import math
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, Literal
 
+from scipy.spatial.transform import Rotation
+
 from internav_data.verification.checked_path import CheckedPath
 from internav_data.verification.interactions import PICK_OUTCOME
 from internav_data.verification.shapes import rotate
@@ -27,6 +29,12 @@ one of them: a visibility graph takes ten milliseconds, a house without a piece 
 """
 DISPLACED_M: Final = 3e-4
 """Tolerance of a displacement: it, the poses and the centre of mass are rounded to 0.1 mm."""
+MOVED_M: Final = 5e-4
+"""Distance from which another object counts as moved, metres."""
+MOVED_RAD: Final = 1e-3
+"""Angle from which another object counts as moved, radians."""
+TIE: Final = 1e-9
+"""Difference that arithmetic alone can make, metres and radians."""
 
 
 def check_outcomes(
@@ -66,7 +74,7 @@ class _OutcomeCheck:
         return self._report.expect(holds, f"outcome.{name}", expected, got, self.episode.episode_id)
 
     def poses(self, number: int, obstacle: Obstacle, outcome: Outcome) -> None:
-        """Check the displacement of a push, and that all others that it moved can move."""
+        """Check the displacement of a push, and that all others that it moved can move and did."""
         what = _name(number, obstacle, outcome)
         if outcome.pose is not None:
             found = self._displacement_m(obstacle, outcome.pose)
@@ -77,7 +85,10 @@ class _OutcomeCheck:
                 outcome.displacement_m,
             )
         for other in outcome.moved or ():
-            self.expect(self._can_move(other), "moved", f"{what}: objects that can move", other)
+            if self.expect(
+                self._can_move(other), "moved", f"{what}: objects that can move", other
+            ):
+                self.expect(self._has_moved(other), "moved", f"{what}: objects that moved", other)
 
     def _displacement_m(self, obstacle: Obstacle, end: Pose) -> float:
         middle = self.layout.shapes.centre_of_mass(obstacle.asset_id)[None]
@@ -99,6 +110,16 @@ class _OutcomeCheck:
         own = placed.dynamics or asset.dynamics
         of_obstacles = asset.spawnable or placed.affordance is not None
         return of_obstacles and not own.fixed
+
+    def _has_moved(self, other: MovedObject) -> bool:
+        if other.obstacle is not None:
+            before = self.episode.obstacles[other.obstacle].pose
+        else:
+            before = self._objects[-1 if other.object_id is None else other.object_id].pose
+        after = other.pose
+        far = math.dist((before.x, before.y, before.z), (after.x, after.y, after.z))
+        turn = Rotation.from_quat(before.quaternion).inv() * Rotation.from_quat(after.quaternion)
+        return far >= MOVED_M - TIE or float(turn.magnitude()) >= MOVED_RAD - TIE
 
     def distances(self, scope: Scope) -> None:
         """Derive the distances after the outcomes of a scope."""

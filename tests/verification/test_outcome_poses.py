@@ -87,6 +87,14 @@ def test_contradiction_is_found(scenes, layouts, case):
     assert found_in(layouts[scene], wrong) == {f"outcome.{predicate}"}
 
 
+def test_furniture_that_stayed_has_not_moved(scenes, layouts):
+    (other,) = scenes[2][1][0].obstacles[1].outcomes[1].moved
+    (placed,) = (p for p in scenes[2][0].objects if p.object_id == other.object_id)
+    moved = (replace(other, pose=replace(placed.pose, x=placed.pose.x + 0.0004)),)
+    episode = outcome_changed(scenes, *PUSHED, moved=moved)[2][1][0]
+    assert "outcome.moved" in found_in(layouts[2], episode, "poses")
+
+
 def test_a_fixed_obstacle_that_was_moved(scenes, layouts):
     (other,) = scenes[2][1][0].obstacles[1].outcomes[1].moved
     moved = (MovedObject(0, None, other.pose),)
