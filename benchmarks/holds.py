@@ -31,7 +31,8 @@ from internav_data.geometry import centre_of_mass, part_corners
 from internav_data.houses import HouseConfig, build_house
 from internav_data.physics.kdop import grown
 from internav_data.physics.sweep import extent_of
-from internav_data.world import HouseModel, World
+from internav_data.world import HouseModel, World, WorldConfig
+from internav_data.world.config import DEFAULT_WORLD
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -169,7 +170,7 @@ def push_drift(world: World, moved: Sequence[tuple[int, Pose]]) -> list[tuple[fl
     return drift(bodies)[: len(moved)]
 
 
-def made(seed: int) -> Iterator[tuple[World, Episode]]:
+def made(seed: int, world_config: WorldConfig = DEFAULT_WORLD) -> Iterator[tuple[World, Episode]]:
     """Make worlds of episodes, four a house."""
     pool, config = catalogue().spawnable, HouseConfig()
     scene = 0
@@ -177,7 +178,7 @@ def made(seed: int) -> Iterator[tuple[World, Episode]]:
         house = build_house(seed, scene, config, catalogue())
         model = HouseModel.of(house)
         for episode in build_episodes(house, 4, pool):
-            yield World.of_episode(model, episode, catalogue().assets), episode
+            yield World.of_episode(model, episode, catalogue().assets, world_config), episode
         scene += 1
 
 
@@ -202,13 +203,9 @@ def main() -> None:
 
     count: Counter[str] = Counter()
     failed: list[dict[str, Any]] = []
-    for world, episode in made(args.seed):
+    for world, episode in made(args.seed, WorldConfig(push_model=args.push_model)):
         if count["pushes"] >= args.pushes:
             break
-        if args.push_model != "force":
-            from internav_data.world.config import WorldConfig
-
-            world.config = WorldConfig(push_model=args.push_model)
         _, bodies = around(world, world.obstacles)
         count["starts"] += len(world.obstacles)
         count["starts_that_move"] += sum(

@@ -38,6 +38,7 @@ from internav_data.records import (
 from internav_data.records.errors import QuarantineError
 from internav_data.world import World
 from internav_data.world.config import DEFAULT_WORLD
+from internav_data.world.world import AHEAD
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -52,8 +53,6 @@ if TYPE_CHECKING:
 
 PAIRS = 64
 """Maximum number of pairs of nodes drawn for one start and goal; most are far enough apart."""
-AHEAD = ((1, 0), (0, 1), (-1, 0), (0, -1))
-"""Step of the lattice straight ahead by quarter turns counter-clockwise from +x."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from functools import lru_cache
 from math import fsum
 from typing import TYPE_CHECKING, Final
 
+from internav_data.planner.push_heuristic import GRAVITY
 from internav_data.records import Dynamics
 
 if TYPE_CHECKING:
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from internav_data.records import Asset, PushSpec
     from internav_data.world import MovableObject, World
 
-GRAVITY: Final = 9.81
-"""Acceleration of gravity, m/s²."""
 UNKNOWN: Final = Dynamics(mass_kg=1000.0, friction=1.0, pushable=False, pickable=False)
 """Belief about an object of an unknown type: that it is fixed."""
 PRIOR_WEIGHT: Final = 2.0

@@ -252,7 +252,7 @@ class World:
     goal : (int, int)
         Lattice node to reach.
     config : WorldConfig
-        Settings: what a push does.
+        Settings of pushes and hands.
     engine : str
         Name of the physics engine.
     interaction : Interaction or None
