@@ -85,9 +85,7 @@ class _OutcomeCheck:
                 outcome.displacement_m,
             )
         for other in outcome.moved or ():
-            if self.expect(
-                self._can_move(other), "moved", f"{what}: objects that can move", other
-            ):
+            if self.expect(self._can_move(other), "moved", f"{what}: objects that can move", other):
                 self.expect(self._has_moved(other), "moved", f"{what}: objects that moved", other)
 
     def _displacement_m(self, obstacle: Obstacle, end: Pose) -> float:
