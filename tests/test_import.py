@@ -11,7 +11,18 @@ from pathlib import Path
 
 import pytest
 
-HEAVY = {"pybullet", "torch", "numba", "cv2", "shapely", "networkx", "scipy", "trimesh", "coacd"}
+HEAVY = {
+    "pybullet",
+    "mujoco",
+    "torch",
+    "numba",
+    "cv2",
+    "shapely",
+    "networkx",
+    "scipy",
+    "trimesh",
+    "coacd",
+}
 HEAVY |= {"pandas", "matplotlib", "click", "duckdb", "polars", "gymnasium"}
 
 
@@ -118,6 +129,7 @@ def test_the_lowest_versions_are_those_that_the_package_states():
     lines = (root / "constraints-lowest.txt").read_text().splitlines()
     lowest = dict(line.split("==") for line in lines if not line.startswith("#"))
     bounds = dict(re.match(r"([\w-]+)>=([\d.]+)", each).groups() for each in stated)
+    assert bounds["pybullet"] == re.match(r"pybullet>=([\d.]+)", *extras["bullet"])[1]
     assert lowest.keys() == bounds.keys()
     del lowest["torch"]  # the page says why
     for name, version in lowest.items():

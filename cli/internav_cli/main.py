@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import click
 
 from internav_cli.streams import prepare_streams
+from internav_data.core.machine import END_SIGNALS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -33,7 +34,6 @@ COMMANDS = {
 }
 LONGEST_LINE = 1000
 """Characters of an error: one that quotes a file may be as long as the file."""
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class InterruptedCommandError(KeyboardInterrupt):
@@ -124,18 +124,18 @@ def launch(command: click.Command, program: str, arguments: list[str] | None = N
 
 @contextlib.contextmanager
 def _signals_raise() -> Iterator[None]:
-    """Have the first of `SIGNALS` end the block by an exception, the next one the process."""
+    """Have the first of `END_SIGNALS` end the block by an exception, the next one the process."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
     def end(signum: int, _frame: FrameType | None) -> None:
-        for each in SIGNALS:
+        for each in END_SIGNALS:
             signal.signal(each, signal.SIG_DFL)
         raise InterruptedCommandError(signum)
 
     # A signal that is ignored, as in a background job of a plain shell, stays ignored.
-    before = {signum: signal.getsignal(signum) for signum in SIGNALS}
+    before = {signum: signal.getsignal(signum) for signum in END_SIGNALS}
     for signum, handler in before.items():
         if handler is not signal.SIG_IGN:
             signal.signal(signum, end)

@@ -57,13 +57,13 @@ def command(
     as_json: bool,
 ) -> int:
     """Prove DATASET right by independent, slower ways, or say what in it is wrong."""
-    from internav_data.generation.executors import cores
+    from internav_data.core.machine import available_cores
     from internav_data.records.errors import ValidationError
     from internav_data.verification import validate
 
     progress = _show_progress if sys.stderr.isatty() else None
     folder = dataset_to_read(dataset)
-    findings = validate(folder, level, sample, workers or cores(), progress)
+    findings = validate(folder, level, sample, workers or available_cores(), progress)
     if progress is not None:
         click.echo("\r\033[K", nl=False, err=True)
     click.echo(findings.to_json() if as_json else findings.summary())

@@ -9,14 +9,15 @@ EXTRAS: Final = {
     "numpy": "",
     "pyarrow": "",
     "click": "generate",
+    "mujoco": "generate",
     "numba": "generate",
     "networkx": "generate",
     "cv2": "generate",
     "platformdirs": "generate",
-    "pybullet": "generate",
     "scipy": "generate",
     "shapely": "generate",
     "trimesh": "generate",
+    "pybullet": "bullet",
     "coacd": "meshes",
     "rtree": "meshes",
     "gymnasium": "train",
@@ -24,8 +25,8 @@ EXTRAS: Final = {
     "torch": "train",
     "tensorboard": "tensorboard",
 }
-"""Extra that installs each module; none for what every installation has."""
-DISTRIBUTIONS: Final = {"cv2": "opencv-python-headless"}
+"""Extra that installs each module on every machine; none for what every installation has."""
+DISTRIBUTIONS: Final = {"cv2": "opencv-python-headless", "mujoco": "mujoco-core"}
 """Names of modules at the package index, where they differ."""
 
 

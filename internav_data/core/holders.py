@@ -19,7 +19,7 @@ def lock_holder(descriptor: int) -> str:
     try:
         process = _holder(os.fstat(descriptor))
         began = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(_start_s(process)))
-    except (OSError, ValueError, IndexError):
+    except (AttributeError, OSError, ValueError, IndexError):  # not on Linux, or not told
         return ""
     return f"process {process} on {socket.gethostname()}, which began at {began}"
 

@@ -7,13 +7,11 @@ import signal
 import threading
 from typing import TYPE_CHECKING, Self
 
+from internav_data.core.machine import END_SIGNALS
 from internav_data.records.errors import InternavError
 
 if TYPE_CHECKING:
     from types import FrameType, TracebackType
-
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""Signals by which a user, a batch system or a terminal that closes asks a command to end."""
 
 
 class InterruptedRunError(InternavError):
@@ -42,7 +40,7 @@ class Interrupts:
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
-            for signum in SIGNALS:
+            for signum in END_SIGNALS:
                 if signal.getsignal(signum) is not signal.SIG_IGN:
                     self._before[signum] = signal.signal(signum, self._caught)
         return self

@@ -25,6 +25,9 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from internav_data.core.machine import END_SIGNALS, WINDOWS
+from internav_data.records.errors import UsageError
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from types import FrameType
@@ -43,8 +46,6 @@ SINGLE_THREADED = dict.fromkeys(
     "1",
 )
 """Environment of a child: one thread a process, as processes share the cores already."""
-_FOR_THE_PARENT = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""Signals that a terminal or a batch system sends to an entire group of processes."""
 _PR_SET_PDEATHSIG = 1
 """Option of Linux's prctl: signal that a process receives when its parent dies."""
 _ORPHANED = 1
@@ -67,6 +68,11 @@ class Child:
         process's.
     pass_fds
         File descriptors that it inherits, under the same numbers.
+
+    Raises
+    ------
+    UsageError
+        This is Windows, where no process can inherit its end of a pipe so.
     """
 
     def __init__(
@@ -76,6 +82,10 @@ class Child:
         quiet: bool = True,
         pass_fds: Sequence[int] = (),
     ) -> None:
+        if WINDOWS:
+            raise UsageError(
+                "processes of our own cannot be started on Windows: ask for one worker, or use WSL"
+            )
         ours, theirs = socket.socketpair()
         self._stderr = tempfile.TemporaryFile() if quiet else None  # noqa: SIM115 - lives as long as the process
         with theirs:
@@ -84,7 +94,7 @@ class Child:
             flags = subprocess._args_from_interpreter_flags()  # type: ignore[attr-defined] # noqa: SLF001
             words = [sys.executable, *flags, "-c", _entry(serve, fd)]
             # Signals of the group wait until the child has been set up for them.
-            before = signal.pthread_sigmask(signal.SIG_BLOCK, _FOR_THE_PARENT)
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, END_SIGNALS)
             try:
                 self.process = subprocess.Popen(  # noqa: S603 - our own interpreter and words
                     words,
@@ -186,7 +196,7 @@ def become_child(parent: int) -> None:
     # Linux also sends the death signal when only the thread ends that started this process, so it
     # must be one that a handler may look into.
     signal.signal(signal.SIGTERM, _end_if_orphaned)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, _FOR_THE_PARENT)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, END_SIGNALS)
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
     end_if_orphaned()

@@ -15,10 +15,11 @@ import shutil
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 
 from internav_data.core.files import check_replaceable, open_regular, size_of_regular
 from internav_data.core.holders import lock_holder
+from internav_data.core.machine import WINDOWS
 from internav_data.records.errors import InternavError, UsageError
 
 if TYPE_CHECKING:
@@ -266,7 +267,7 @@ class FolderStore:
 
         """
         self.root.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(self.root, os.O_RDONLY)
+        descriptor = os.open(*_lock_file(self.root))
         _HELD.add(descriptor)
         try:
             # Some network file systems cannot lock folders: there we trust the user.
@@ -284,9 +285,32 @@ class FolderStore:
             os.close(descriptor)
 
 
+def _lock_file(folder: Path) -> tuple[Path, int]:
+    """Return the file whose lock is that of a folder, and the flags to open it with.
+
+    It is the folder itself. Windows opens no folder: there a file of the user's temporary folder
+    stands for it, and processes of other machines are not kept out.
+    """
+    if not WINDOWS:
+        return folder, os.O_RDONLY
+    import tempfile  # noqa: PLC0415 - slow to import, and of use here alone
+
+    name = hashlib.sha256(os.path.realpath(folder).encode()).hexdigest()[:32]
+    return Path(tempfile.gettempdir(), f"internav-{name}.lock"), os.O_RDWR | os.O_CREAT
+
+
 def try_lock(descriptor: int) -> bool:
     """Lock a file if nobody else holds its lock, and return whether nobody does."""
-    import fcntl  # noqa: PLC0415 - POSIX only; readers need no lock
+    if WINDOWS:
+        import msvcrt  # noqa: PLC0415 - of Windows alone
+
+        lock: Any = msvcrt
+        try:
+            lock.locking(descriptor, lock.LK_NBLCK, 1)
+        except PermissionError:
+            return False
+        return True
+    import fcntl  # noqa: PLC0415 - of POSIX alone; readers need no lock
 
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -386,8 +410,10 @@ def _new(path: Path, make: Callable[..., object]) -> Path:
 
 
 def sync(path: Path) -> None:
-    """Wait until a file or folder is on the disk."""
-    descriptor = os.open(path, os.O_RDONLY)
+    """Wait until a file or folder is on the disk; Windows waits for files alone."""
+    if WINDOWS and path.is_dir():
+        return
+    descriptor = os.open(path, os.O_RDWR if WINDOWS else os.O_RDONLY)
     try:
         os.fsync(descriptor)
     finally:

@@ -15,6 +15,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from internav_data.core.machine import user_id
 from internav_data.core.storage import try_lock
 
 _PREFIX = "internav-process-"
@@ -49,9 +50,9 @@ def sweep_folders() -> None:
 
 
 def _sweep(folder: Path) -> None:
-    if folder.is_symlink() or folder.stat().st_uid != os.geteuid():
+    if folder.is_symlink() or folder.stat().st_uid != user_id():
         return
-    descriptor = os.open(folder / _LOCK, os.O_RDWR | os.O_NOFOLLOW)
+    descriptor = os.open(folder / _LOCK, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
     try:
         settled = time.time() - os.fstat(descriptor).st_mtime > _SETTLED_S
         if settled and try_lock(descriptor):

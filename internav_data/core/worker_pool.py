@@ -1,6 +1,7 @@
 """Worker processes, each on a pipe: one that dies costs one retry of its task.
 
-A `ProcessPoolExecutor` fails all pending work when one of its processes dies.
+A `ProcessPoolExecutor` fails all pending work when one of its processes dies. On Windows, where
+`Child` cannot be started, the pool does its tasks in this process.
 """
 
 from __future__ import annotations
@@ -10,10 +11,11 @@ from collections import Counter, deque
 from multiprocessing.connection import wait
 from typing import TYPE_CHECKING, Any, Self
 
+from internav_data.core.machine import WINDOWS
 from internav_data.core.messages import Done, Failed, Fatal, Ready, WorkerExited
 from internav_data.core.processes import GRACE_S, Child
 from internav_data.core.storage import held_locks
-from internav_data.core.worker import serve
+from internav_data.core.worker import run_task, serve
 from internav_data.records.errors import InternavError
 
 if TYPE_CHECKING:
@@ -118,6 +120,9 @@ class WorkerPool:
             A worker cannot read or write a file, as when the disk is full.
 
         """
+        if WINDOWS:
+            yield from self._run_here(tasks, tick)
+            return
         todo, crashes = deque(tasks), Counter[Any]()
         while tick():
             self._assign(todo)
@@ -125,6 +130,18 @@ class WorkerPool:
                 return
             yield from self._collect(todo, crashes)
         yield from self._drain()
+
+    def _run_here(self, tasks: Iterable[Any], tick: Callable[[], bool]) -> Iterator[Done | Failed]:
+        """Do the tasks in this process, one after the other, where it can start no others."""
+        work = None
+        for task in tasks:
+            if not tick():
+                return
+            work = work or self._recipe.setup(self._recipe.payload)
+            result = run_task(work, task)
+            if isinstance(result, Fatal):
+                raise result.error()
+            yield result
 
     def _assign(self, todo: deque[Any]) -> None:
         """Give each idle worker a task, and start workers while there are tasks for them."""

@@ -15,12 +15,13 @@ from typing import Literal
 
 from internav_data.core import compile_cache
 from internav_data.core.extras import DISTRIBUTIONS, EXTRAS, install_command
+from internav_data.core.machine import available_cores, memory_gib
 
 CheckState = Literal["good", "warning", "bad"]
 """Result of a check."""
 
-WHEELS_UP_TO = (3, 11)
-"""pybullet 3.2.7 has wheels up to CPython 3.11; elsewhere it compiles for 5-9 minutes."""
+TRIED_UP_TO = (3, 14)
+"""Latest version of Python for which every package is known to have wheels."""
 BYTES_AN_EPISODE = 1000
 PAPER_EPISODES = 595_500
 GIB = 1 << 30
@@ -53,25 +54,29 @@ def examine(out: Path) -> list[Check]:
 
 def _python() -> Check:
     found = platform.python_version()
-    if sys.version_info[:2] <= WHEELS_UP_TO:
+    if sys.version_info[:2] <= TRIED_UP_TO:
         return Check("Python", "good", found, "")
-    return Check(
-        "Python",
-        "warning",
-        found,
-        "pybullet has wheels up to Python 3.11 only: pip compiles it for 5-9 minutes and needs "
-        "a C++ compiler; with Python 3.11 it installs in seconds",
-    )
+    latest = ".".join(map(str, TRIED_UP_TO))
+    remedy = f"tried up to Python {latest}: where a package has no wheel yet, use that one"
+    return Check("Python", "warning", found, remedy)
 
 
 def _platform() -> Check:
-    found = f"{platform.system()} {platform.machine()}"
-    if platform.system() == "Linux":
+    system = platform.system()
+    found = f"{system} {platform.machine()}"
+    if system == "Linux":
         return Check("platform", "good", found, "")
-    return Check("platform", "warning", found, "tested on Linux only; use a container or WSL")
+    remedies = {
+        "Darwin": "never tried on macOS, though all packages have wheels: tell us what fails",
+        "Windows": "never tried on Windows, and one process makes all scenes there: WSL is Linux",
+    }
+    remedy = remedies.get(system, "tried on Linux only: use a container")
+    return Check("platform", "warning", found, remedy)
 
 
 _USES = {
+    "bullet": "needed only for datasets of the engine bullet, and compiled for minutes where it "
+    "has no wheel (all but CPython 3.11 on Linux x86-64): ",
     "meshes": "needed only for meshes of your own: ",
     "train": "needed only for environments, training and evaluation: ",
     "tensorboard": "needed only for TensorBoard's files: ",
@@ -110,14 +115,13 @@ def _numbers(version: str) -> tuple[int, ...]:
 
 
 def _cores() -> Check:
-    count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return Check("cores", "good", f"{count}, so many workers by default", "")
+    return Check("cores", "good", f"{available_cores()}, so many workers by default", "")
 
 
 def _memory() -> Check:
-    pages, size = os.sysconf("SC_PHYS_PAGES"), os.sysconf("SC_PAGE_SIZE")
-    total = pages * size / GIB
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+    total, cores = memory_gib(), available_cores()
+    if total is None:
+        return Check("memory", "good", "not known on this system", "")
     if total >= cores:
         return Check("memory", "good", f"{total:.1f} GiB", "")
     remedy = f"a worker takes up to 1 GB: use --workers {max(1, int(total))}"

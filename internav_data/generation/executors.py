@@ -7,10 +7,10 @@ Results may come in any order; the dataset's bytes do not depend on it.
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
+from internav_data.core.machine import available_cores
 from internav_data.core.worker_pool import WorkerPool
 from internav_data.records.errors import UsageError
 
@@ -69,7 +69,7 @@ class LocalExecutor:
     @property
     def slots(self) -> int:
         """Number of processes."""
-        return self.workers or cores()
+        return self.workers or available_cores()
 
     def run(
         self, recipe: Recipe, tasks: Iterable[Any], tick: Callable[[], bool]
@@ -97,8 +97,3 @@ def get_executor(name: str, workers: int = 0) -> Executor:
     if name not in EXECUTORS:
         raise UsageError(f"executor is '{name}': expected one of {', '.join(EXECUTORS)}")
     return EXECUTORS[name](workers)
-
-
-def cores() -> int:
-    """Return the number of processors that this process may use."""
-    return len(os.sched_getaffinity(0))

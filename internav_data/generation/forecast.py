@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from internav_data.core.machine import available_cores
 from internav_data.core.progress import clock
-from internav_data.generation.executors import DEFAULT_EXECUTOR, cores, get_executor
+from internav_data.generation.executors import DEFAULT_EXECUTOR, get_executor
 from internav_data.generation.progress import GenerationProgress
 from internav_data.generation.run import check_scenes
 from internav_data.generation.scenes import asset_folders, build_scene
@@ -92,7 +93,7 @@ def forecast(
     share = made / tried
     episodes = sum(config.episodes_of(split_of_scene(scene)) for scene in range(scenes))
     workers = get_executor(DEFAULT_EXECUTOR, workers).slots
-    at_once = min(workers, cores(), scenes)
+    at_once = min(workers, available_cores(), scenes)
     alone = scenes * sample.house_s / made + episodes * sample.episode_s / len(sample.episodes)
     size = _bytes(sample, scenes, episodes)
     return Forecast(

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import ast
 import os
-import re
 import subprocess
 import sys
 import tomllib
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 from internav_data.core.extras import DISTRIBUTIONS, EXTRAS, install_command, require
 
@@ -62,10 +62,41 @@ def without(tmp_path, module, code, *arguments):
     )  # fmt: skip
 
 
-def packages_of(extra):
+def requirements(extra):
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     lines = project["optional-dependencies"][extra] if extra else project["dependencies"]
-    return {re.split(r"[>=<\[]", line)[0] for line in lines}
+    return [Requirement(line) for line in lines]
+
+
+def packages_of(extra):
+    """Names of what an extra installs on every machine."""
+    return {each.name for each in requirements(extra) if each.marker is None}
+
+
+MACHINES = [
+    (python, system, machine)
+    for python in ("3.11", "3.12", "3.13", "3.14")
+    for system, machine in (
+        ("linux", "x86_64"),
+        ("linux", "aarch64"),
+        ("darwin", "arm64"),
+        ("win32", "AMD64"),
+    )
+]
+
+
+@pytest.mark.parametrize("machine", MACHINES, ids="-".join)
+def test_bullet_is_installed_where_it_has_a_wheel_and_nowhere_else(machine):
+    """pybullet 3.2.7 has wheels up to CPython 3.11, for manylinux2014 on x86-64 alone."""
+    names = dict(
+        zip(("python_version", "sys_platform", "platform_machine"), machine, strict=True),
+        platform_python_implementation="CPython",
+    )
+    (bullet,) = [each for each in requirements("generate") if each.name == "pybullet"]
+    assert bullet.marker.evaluate(names) == (machine == ("3.11", "linux", "x86_64"))
+    assert not bullet.marker.evaluate({**names, "platform_python_implementation": "PyPy"})
+    (asked,) = requirements("bullet")
+    assert (asked.name, asked.specifier, asked.marker) == ("pybullet", bullet.specifier, None)
 
 
 @pytest.mark.parametrize("extra", sorted(set(EXTRAS.values())))

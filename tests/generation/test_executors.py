@@ -9,6 +9,7 @@ import pytest
 import worker_stubs
 from scene_stubs import CATALOGUE, stub
 
+from internav_data.core.machine import available_cores
 from internav_data.core.messages import Done, Fatal, Recipe
 from internav_data.core.worker import run_task
 from internav_data.generation.config import load_config
@@ -16,7 +17,6 @@ from internav_data.generation.executors import (
     EXECUTORS,
     Executor,
     LocalExecutor,
-    cores,
     get_executor,
 )
 from internav_data.generation.run import generate
@@ -79,7 +79,7 @@ def test_executors_are_chosen_by_name():
         assert isinstance(made, Executor)
         assert isinstance(made, executor)
         assert made.slots == 3
-        assert get_executor(name).slots == cores()
+        assert get_executor(name).slots == available_cores()
     with pytest.raises(UsageError, match=r"executor is 'cluster': expected one of local"):
         get_executor("cluster")
     with pytest.raises(UsageError, match=r"workers is -1: ask for 1 or more"):

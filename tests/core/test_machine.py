@@ -1,0 +1,127 @@
+"""Systems that lack what POSIX has: each use has another way, or one line that says so."""
+
+import fcntl
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+import worker_stubs
+
+from internav_data.core import machine, processes, storage, worker_pool
+from internav_data.core.holders import lock_holder
+from internav_data.core.machine import available_cores, memory_gib, user_id
+from internav_data.core.messages import Failed, Recipe
+from internav_data.core.storage import FolderStore, LockedError, sync, write_atomically
+from internav_data.core.temporary import sweep_folders
+from internav_data.core.worker_pool import WorkerPool
+from internav_data.records.errors import UsageError
+
+NO_POSIX = """
+import os, signal, sys
+import tempfile, subprocess, multiprocessing.connection, socket, click
+for module, names in (
+    (os, "sched_getaffinity geteuid getuid sysconf major minor register_at_fork memfd_create "
+         "O_NOFOLLOW O_NONBLOCK O_NOCTTY fork"),
+    (signal, "SIGHUP SIGKILL pthread_sigmask SIG_BLOCK SIG_UNBLOCK SIG_SETMASK"),
+):
+    for name in names.split():
+        if hasattr(module, name):
+            delattr(module, name)
+sys.modules["fcntl"] = sys.modules["resource"] = None
+"""
+"""Takes from a process what Windows lacks."""
+
+
+@pytest.fixture
+def windows(monkeypatch, tmp_path):
+    """A system without POSIX's locks, folders that can be opened, and pipes to children."""
+    held = {}
+
+    def locking(descriptor, mode, size):
+        assert (mode, size) == (2, 1)
+        place = os.fstat(descriptor).st_ino
+        if held.get(place, descriptor) != descriptor:
+            raise PermissionError(13, "Permission denied")
+        held[place] = descriptor
+
+    real = os.open
+
+    def opened(path, flags, *mode):
+        if Path(path).is_dir():
+            raise PermissionError(13, "Permission denied", str(path))
+        return real(path, flags, *mode)
+
+    for module in (processes, storage, worker_pool):
+        monkeypatch.setattr(module, "WINDOWS", True)
+    monkeypatch.setattr(os, "open", opened)
+    monkeypatch.setitem(sys.modules, "msvcrt", SimpleNamespace(locking=locking, LK_NBLCK=2))
+    monkeypatch.setitem(sys.modules, "fcntl", None)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    return held
+
+
+def test_a_folder_is_locked_by_a_file_that_stands_for_it(windows, tmp_path, monkeypatch):
+    monkeypatch.setattr(storage, "_ENDING_S", 0.0)
+    one, other = FolderStore(tmp_path / "one"), FolderStore(tmp_path / "other")
+    with one.lock("busy"), other.lock("busy"):
+        assert list(one.root.iterdir()) == []
+        # By whatever name: a path with a link in it is the same folder.
+        (tmp_path / "link").symlink_to(one.root)
+        with pytest.raises(LockedError, match="busy"), FolderStore(tmp_path / "link").lock("busy"):
+            pass
+    windows.clear()
+    with one.lock("busy"):
+        pass
+
+
+def test_files_are_written_and_synced_where_no_folder_can_be(windows, tmp_path):
+    write_atomically(tmp_path / "file", b"bytes")
+    sync(tmp_path)
+    assert (tmp_path / "file").read_bytes() == b"bytes"
+
+
+def test_a_pool_works_in_this_process(windows, tmp_path):
+    with WorkerPool(2, Recipe(worker_stubs.square, 1)) as pool:
+        assert [(r.task, r.value) for r in pool.run(range(3))] == [(0, 1), (1, 2), (2, 5)]
+        assert pool.processes == ()
+        assert [r.value for r in pool.run(iter(range(9)), lambda: False)] == []
+    with pytest.raises(UsageError, match=r"duck\.obj is no mesh"):
+        list(WorkerPool(2, Recipe(worker_stubs.refusing, "duck.obj")).run([1]))
+    (failed,) = WorkerPool(2, Recipe(worker_stubs.troubled, str(tmp_path))).run([7])
+    assert isinstance(failed, Failed)
+
+
+def test_a_process_of_its_own_is_refused_in_a_line(windows):
+    with pytest.raises(UsageError, match="Windows: ask for one worker, or use WSL"):
+        processes.Child(worker_stubs.square)
+
+
+def test_what_a_system_does_not_tell_is_done_without(monkeypatch, tmp_path):
+    for name in ("sched_getaffinity", "sysconf", "geteuid", "major"):
+        monkeypatch.delattr(os, name)
+    assert available_cores() == os.cpu_count()
+    assert memory_gib() is None
+    assert user_id() == 0
+    sweep_folders()
+    with (tmp_path / "file").open("wb") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        assert lock_holder(file.fileno()) == ""
+
+
+def test_commands_run_without_what_posix_alone_has(tmp_path):
+    code = f"{NO_POSIX}\nfrom internav_cli.main import main; main()"
+    for words, code_expected in ((["--help"], 0), (["schema"], 0), (["stats", "nothing"], 5)):
+        done = subprocess.run(
+            [sys.executable, "-c", code, *words], capture_output=True, text=True, check=False,
+            cwd=tmp_path,
+        )  # fmt: skip
+        assert done.returncode == code_expected, done.stderr
+        assert len(done.stderr.splitlines()) <= 2, done.stderr
+
+
+def test_signals_that_end_a_command_are_those_that_there_are():
+    assert machine.END_SIGNALS == (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
