@@ -152,6 +152,30 @@ def best_of(work: Callable[[], object]) -> float:
     return 1e6 * min(times)
 
 
+def frame_rates(house: House, views: list[CameraView], seconds: float) -> dict[str, list[float]]:
+    """Return frames per second of our camera and of Bullet's renderer, by name and size."""
+    client = bullet_scene(house)
+    rates: dict[str, list[float]] = {}
+    for size in (300, 84, 64):
+        camera, whole = Camera(size), Camera(size, portals=False)
+        buffers = camera.frames(len(views))
+        camera.render(views, buffers)
+        # Both in turns, so that a busy machine slows both.
+        for _ in range(2):
+            rates.setdefault(f"ours_{size}", []).extend(
+                rate(lambda c=camera, b=buffers: c.render(views, b), len(views), seconds)
+            )
+            few = views[:6]
+            if size != 84:
+                rates.setdefault(f"tiny_{size}", []).extend(
+                    rate(lambda s=size, f=few: [tiny(client, v, s) for v in f], len(few), 0.5)
+                )
+        rates[f"ours_without_portals_{size}"] = rate(
+            lambda c=whole, b=buffers: c.render(views, b), len(views), 0.5
+        )
+    return rates
+
+
 def main() -> int:
     """Measure, print JSON, return 1 when a target is missed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -172,25 +196,7 @@ def main() -> int:
         },
         "views": len(views),
     }  # fmt: skip
-    client = bullet_scene(house)
-    rates: dict[str, list[float]] = {}
-    for size in (300, 84, 64):
-        camera, whole = Camera(size), Camera(size, portals=False)
-        buffers = camera.frames(len(views))
-        camera.render(views, buffers)
-        # Both in turns, so that a busy machine slows both.
-        for _ in range(2):
-            rates.setdefault(f"ours_{size}", []).extend(
-                rate(lambda c=camera, b=buffers: c.render(views, b), len(views), options.seconds)
-            )
-            few = views[:6]
-            if size != 84:
-                rates.setdefault(f"tiny_{size}", []).extend(
-                    rate(lambda s=size, f=few: [tiny(client, v, s) for v in f], len(few), 0.5)
-                )
-        rates[f"ours_without_portals_{size}"] = rate(
-            lambda c=whole, b=buffers: c.render(views, b), len(views), 0.5
-        )
+    rates = frame_rates(house, views, options.seconds)
     best = {name: max(values) for name, values in rates.items()}
     result["frames_per_s"] = {name: round(value, 1) for name, value in best.items()}
     result["frames_per_s_median"] = {

@@ -188,6 +188,20 @@ def _reflex_corners(floor: shapely.Geometry) -> tuple[np.ndarray, np.ndarray, np
     return stacked[:, :2], stacked[:, 2:4], stacked[:, 4:]
 
 
+def blockers_of(house: House) -> list[shapely.Polygon]:
+    """Return the plans of all that blocks: walls and furniture between the two heights."""
+    walls = [
+        shapely.box(w.x_min, w.y_min, w.x_max, w.y_max)
+        for w in house.walls
+        if w.z_min < HIGH and w.z_max > LOW
+    ]
+    return walls + [
+        plan
+        for thing in house.objects
+        for plan in plan_of(house.assets[thing.asset_id], thing.pose)
+    ]
+
+
 @dataclass
 class SharedHouse:
     """Data of a house that its episodes share."""
@@ -209,13 +223,7 @@ class SharedHouse:
     @staticmethod
     def of(house: House) -> SharedHouse:
         """Compute the data of a house that its episodes share."""
-        blockers = [
-            shapely.box(w.x_min, w.y_min, w.x_max, w.y_max)
-            for w in house.walls
-            if w.z_min < HIGH and w.z_max > LOW
-        ]
-        for thing in house.objects:
-            blockers += plan_of(house.assets[thing.asset_id], thing.pose)
+        blockers = blockers_of(house)
         tree = shapely.STRtree(blockers)
         outline = shapely.Polygon(house.outline)
         x_max, y_max = outline.bounds[2:]

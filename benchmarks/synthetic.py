@@ -35,6 +35,7 @@ from internav_data.records import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from internav_data.dataset import Manifest
@@ -95,9 +96,37 @@ def _house(scene: int, rng: np.random.Generator, assets: tuple[Asset, ...]) -> H
         )
         for k, (x, y) in enumerate(cells)
     )
+    doors = _doors(cells, rng)
+    things = tuple(
+        _thing(n, int(rng.integers(count)), rng, assets[int(rng.integers(len(assets)))])
+        for n in range(6 * count)
+    )
+    walls = tuple(
+        Wall(*_point(rng, 20, 2), *_point(rng, 20, 2), 0.0, 2.6) for _ in range(8 * count)
+    )
+    return House(
+        scene_id=f"scene-{scene:06d}",
+        scene=scene,
+        seed=0,
+        split="val" if scene % 120 == 0 else "test" if scene % 120 == 1 else "train",
+        preset="paper",
+        outline=((0.0, 0.0), (wide * 5.0, 0.0), (wide * 5.0, wide * 5.0), (0.0, wide * 5.0)),
+        rooms=rooms,
+        doors=doors,
+        windows=(),
+        walls=walls,
+        objects=things,
+        materials=(Material("oak", (120, 90, 60), "planks"),),
+        room_graph=tuple(sorted({d.rooms for d in doors})),
+        area_m2=25.0 * count,
+        assets={},
+    )
+
+
+def _doors(cells: Sequence[tuple[float, float]], rng: np.random.Generator) -> tuple[Door, ...]:
     doors = []
-    for a in range(count):
-        for b in range(a + 1, count):
+    for a in range(len(cells)):
+        for b in range(a + 1, len(cells)):
             dx, dy = cells[b][0] - cells[a][0], cells[b][1] - cells[a][1]
             if (
                 dx + dy == 5
@@ -114,30 +143,7 @@ def _house(scene: int, rng: np.random.Generator, assets: tuple[Asset, ...]) -> H
                         len(doors), (a, b), "single", x, y, 90.0 if dx else 0.0, 1.0, 2.1, open=True
                     )
                 )
-    things = tuple(
-        _thing(n, int(rng.integers(count)), rng, assets[int(rng.integers(len(assets)))])
-        for n in range(6 * count)
-    )
-    walls = tuple(
-        Wall(*_point(rng, 20, 2), *_point(rng, 20, 2), 0.0, 2.6) for _ in range(8 * count)
-    )
-    return House(
-        scene_id=f"scene-{scene:06d}",
-        scene=scene,
-        seed=0,
-        split="val" if scene % 120 == 0 else "test" if scene % 120 == 1 else "train",
-        preset="paper",
-        outline=((0.0, 0.0), (wide * 5.0, 0.0), (wide * 5.0, wide * 5.0), (0.0, wide * 5.0)),
-        rooms=rooms,
-        doors=tuple(doors),
-        windows=(),
-        walls=walls,
-        objects=things,
-        materials=(Material("oak", (120, 90, 60), "planks"),),
-        room_graph=tuple(sorted({d.rooms for d in doors})),
-        area_m2=25.0 * count,
-        assets={},
-    )
+    return tuple(doors)
 
 
 def _thing(number: int, room: int, rng: np.random.Generator, asset: Asset) -> SceneObject:
@@ -166,6 +172,16 @@ def _paths(house: House, a: int, b: int) -> list[tuple[int, ...]]:
     return sorted(found, key=lambda p: (len(p), p))[:_LIMIT]
 
 
+def _node_path(
+    house: House, rooms: tuple[int, ...], start: tuple[float, float], goal: tuple[float, float]
+) -> NodePath:
+    doors = {door.rooms: door for door in house.doors}
+    through = [doors[min(p, q), max(p, q)] for p, q in pairwise(rooms)]
+    return NodePath(
+        tuple(d.door_id for d in through), (start, *((d.x, d.y) for d in through), goal)
+    )
+
+
 def _episode(
     house: House, index: int, rng: np.random.Generator, assets: tuple[Asset, ...], full: bool
 ) -> Episode:
@@ -178,12 +194,7 @@ def _episode(
     ]
     (i, j), (k, l) = ends
     paths = _paths(house, a, b)
-    doors = {door.rooms: door for door in house.doors}
-    node_paths = []
-    for path in paths:
-        through = [doors[min(p, q), max(p, q)] for p, q in pairwise(path)]
-        points = ((i / 4, j / 4), *((d.x, d.y) for d in through), (k / 4, l / 4))
-        node_paths.append(NodePath(tuple(d.door_id for d in through), points))
+    node_paths = tuple(_node_path(house, p, (i / 4, j / 4), (k / 4, l / 4)) for p in paths)
     mode = "blocked" if (house.scene + index) % 2 == 0 else "lengthened"
     clear = int(rng.integers(8, 70))
     obstacles = tuple(
@@ -210,17 +221,17 @@ def _episode(
         goal=Goal(k, l, k / 4, l / 4, b),
         room_paths=tuple(paths),
         room_paths_truncated=False,
-        node_paths=tuple(node_paths),
+        node_paths=node_paths,
         node_paths_truncated=False,
         obstacles=obstacles,
         expert=_expert(rng, index) if full else None,
-        physics=Physics(
-            "bullet",
-            "3.2.7",
-            max(o.settle_s for o in obstacles),
-            max(o.settle_penetration_m for o in obstacles),
-        ),
+        physics=_physics(obstacles),
     )
+
+
+def _physics(obstacles: tuple[Obstacle, ...]) -> Physics:
+    seconds, depth = (o.settle_s for o in obstacles), (o.settle_penetration_m for o in obstacles)
+    return Physics("bullet", "3.2.7", max(seconds), max(depth))
 
 
 def _expert(rng: np.random.Generator, index: int) -> Expert | None:

@@ -13,6 +13,7 @@ dialect   a class, function, argument, attribute, module or module constant has 
           replaced by the field's word
 meaning   one class name or type alias is defined in two modules of the package
 shapes    a public function of arrays states no shape in its docstring
+length    a function has more than 50 lines of code, docstrings and comments not counted
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ SCRIPTS = frozenset(FOLDERS) - {"cli"}
 DEFAULT_PATHS = ("internav_data", "cli", "benchmarks", "docs", "examples")
 """Checked when no path is given, below the root of the repository."""
 LONG_FUNCTION = 50
-"""Lines of code above which the report counts a function as long."""
+"""Largest number of lines of code of a function."""
 
 FRAGMENTS = {
     "Of": "name the thing itself: 'Of the run.' is 'Run configuration.'",
@@ -277,7 +278,7 @@ REFERENCE = re.compile(r"See `[\w.]+`")
 ALIAS = re.compile(r"_*[A-Z]\w*[a-z]\w*$")
 """Name of a type alias: in capitals and small letters."""
 
-RULES = ("fragment", "raises", "dialect", "meaning", "shapes")
+RULES = ("fragment", "raises", "dialect", "meaning", "length", "shapes")
 """Names of the rules, in the order of the report."""
 
 # ---------------------------------------------------------------------------------------------
@@ -703,6 +704,18 @@ def missing_shapes(module: Module, aliases: frozenset[str]) -> Iterator[Finding]
             yield Finding(module.path, made.line, "shapes", text)
 
 
+def long_functions(module: Module) -> Iterator[Finding]:
+    """Yield functions of more than `LONG_FUNCTION` lines of code."""
+    lines = code_lines(module.source, module.tree)
+    for node, length in function_lengths(module.tree, lines):
+        if length > LONG_FUNCTION:
+            text = (
+                f"{node.name} has {length} lines of code; {LONG_FUNCTION} are the limit, name a "
+                "part of it and make that a function"
+            )
+            yield Finding(module.path, node.lineno, "length", text)
+
+
 def check(modules: Sequence[Module]) -> list[Finding]:
     """Return the findings of all rules, by file and line."""
     aliases = array_aliases(modules)
@@ -711,6 +724,7 @@ def check(modules: Sequence[Module]) -> list[Finding]:
         found += fragments(module)
         found += undocumented_raises(module)
         found += dialect(module)
+        found += long_functions(module)
         found += missing_shapes(module, aliases)
     return sorted(found)
 
@@ -719,14 +733,13 @@ def check(modules: Sequence[Module]) -> list[Finding]:
 # Report
 
 COLUMNS = (
-    *("room", "modules", "median", "longest", f">{LONG_FUNCTION}"),
+    *("room", "modules", "median", "longest"),
     *RULES[:-1],
     *("shapes %", "Raises %", "comments %"),
 )
 """Heads of the report's table."""
 LEGEND = f"""\
 median, longest: lines of a module;
->{LONG_FUNCTION}: functions of more than {LONG_FUNCTION} lines of code;
 {", ".join(RULES[:-1])}: findings; shapes %: public functions of arrays that state a shape;
 Raises %: exceptions raised by name in public functions that their 'Raises' names;
 comments %: comments for 100 lines of code (no docstrings, comments, blank lines)"""
@@ -739,8 +752,6 @@ class RoomFigures:
 
     lengths: tuple[int, ...]
     """Lines of each module."""
-    long_functions: int
-    """Number of functions above `LONG_FUNCTION` lines of code."""
     shaped: tuple[int, int]
     """Public functions of arrays: with a shape, all."""
     raises: tuple[int, int]
@@ -760,7 +771,6 @@ def module_figures(module: Module, aliases: frozenset[str]) -> RoomFigures:
     )
     return RoomFigures(
         (len(module.source.splitlines()),),
-        sum(length > LONG_FUNCTION for length in function_lengths(module.tree, lines)),
         (sum(map(_states_shape, arrays)), len(arrays)),
         (needed - sum(1 for _ in undocumented_raises(module)), needed),
         comment_count(module.source),
@@ -773,7 +783,6 @@ def combined(figures: Iterable[RoomFigures]) -> RoomFigures:
     each = list(figures)
     return RoomFigures(
         tuple(length for one in each for length in one.lengths),
-        sum(one.long_functions for one in each),
         (sum(one.shaped[0] for one in each), sum(one.shaped[1] for one in each)),
         (sum(one.raises[0] for one in each), sum(one.raises[1] for one in each)),
         sum(one.comments for one in each),
@@ -805,7 +814,6 @@ def _row(room: str, figures: RoomFigures, counts: Counter[str]) -> tuple[str, ..
         str(len(figures.lengths)),
         f"{statistics.median(figures.lengths):.0f}",
         str(max(figures.lengths)),
-        str(figures.long_functions),
         *(str(counts[rule]) for rule in RULES[:-1]),
         _percent(*figures.shaped),
         _percent(*figures.raises),

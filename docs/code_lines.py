@@ -101,8 +101,8 @@ def comment_count(source: str) -> int:
     )
 
 
-def function_lengths(tree: ast.AST, lines: frozenset[int]) -> list[int]:
-    """Return the lines of code of every function, nested ones included.
+def function_lengths(tree: ast.AST, lines: frozenset[int]) -> list[tuple[Function, int]]:
+    """Return every function, nested ones included, and its lines of code.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def function_lengths(tree: ast.AST, lines: frozenset[int]) -> list[int]:
         Lines of code of the module, from `code_lines`.
     """
     return [
-        len(lines.intersection(range(node.lineno, (node.end_lineno or node.lineno) + 1)))
+        (node, len(lines.intersection(range(node.lineno, (node.end_lineno or node.lineno) + 1))))
         for node in ast.walk(tree)
         if isinstance(node, Function)
     ]

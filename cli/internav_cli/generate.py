@@ -60,35 +60,41 @@ workers gives the same bytes.""",
 @config_options
 @click.option(
     "--unseen-assets",
+    "episodes__unseen_assets",
     is_flag=True,
     default=None,
     help="Each split draws its obstacles from its own share of the assets.",
 )
 @click.option(
     "--keep-unsolvable",
+    "episodes__keep_unsolvable",
     is_flag=True,
     default=None,
     help="Keep episodes without an expert, marked by a null, rather than draw them again.",
 )
 @click.option(
     "--blind-expert",
+    "episodes__blind_expert",
     is_flag=True,
     default=None,
     help="Store the run of an expert that knows types' averages only, and learns by failing.",
 )
 @click.option(
     "--push-model",
+    "world__push_model",
     type=click.Choice(["force", "kick", "step"]),
     help="200 N up to 2 m/s; 2 m/s at once for every mass; or 200 N held at 0.5 m/s for 0.22 m.  "
     "[default: force]",
 )
 @click.option(
     "--attributes",
+    "catalog__attributes",
     type=click.Choice(["look", "hidden"]),
     help="Mass, friction and fixedness go by an object's look, or are hidden.  [default: look]",
 )
 @click.option(
     "--strength",
+    "catalog__strength",
     type=float,
     help="With hidden attributes: share that is independent of the look.  [default: 1]",
 )
@@ -106,34 +112,18 @@ def command(
     *,
     out: Path | None,
     scenes: int,
-    episodes_per_scene: int | None,
     workers: int | None,
     executor: str,
-    unseen_assets: bool | None,
-    keep_unsolvable: bool | None,
-    blind_expert: bool | None,
-    push_model: str | None,
-    attributes: str | None,
-    strength: float | None,
     retry_quarantined: bool,
     dry_run: bool,
     print_config: bool,
     scene: int | None,
     episode: int | None,
     as_json: bool,
-    **settings: Any,  # noqa: ANN401 - the options of config_from
+    **settings: Any,  # noqa: ANN401 - the options of config_from; __ for a dot
 ) -> int:
     """Make a dataset of houses and episodes in the folder --out."""
-    config = config_from(
-        **settings,
-        episodes_per_scene=episodes_per_scene,
-        episodes__unseen_assets=unseen_assets,
-        episodes__keep_unsolvable=keep_unsolvable,
-        episodes__blind_expert=blind_expert,
-        world__push_model=push_model,
-        catalog__attributes=attributes,
-        catalog__strength=strength,
-    )
+    config = config_from(**settings)
     if print_config:
         from internav_data.core.config import config_toml
 

@@ -34,6 +34,8 @@ from internav_data.records.agent import SPACING_M
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from internav_data.core.typing import Ints
+
 
 _SCALARS = (
     *("scene_id", "split", "room_count", "mode", "sealed", "rooms_on_path"),
@@ -233,10 +235,6 @@ def _stats(
     rooms = table.column("room_count").to_numpy()
     blocked = pc.equal(table.column("mode"), "blocked").to_numpy()
     sealed = table.column("sealed").to_numpy()
-    detours = pc.subtract(
-        table.column("obstructed_path_steps"), table.column("shortest_path_steps")
-    )
-    longer = detours.filter(pc.equal(table.column("mode"), "lengthened")).drop_null()
     push, pick = (kinds.column(name).to_numpy().astype(bool) for name in ("pushable", "pickable"))
     relevant = kinds.column("relevant").drop_null().to_numpy().astype(bool)
     walls, nodes = (
@@ -263,7 +261,7 @@ def _stats(
         relevant_share=mean(relevant) if len(relevant) else None,
         shortest_path_m=spread(table.column("shortest_path_m").to_numpy()),
         shortest_path_steps=spread(table.column("shortest_path_steps").to_numpy()),
-        detour_steps=spread(longer.to_numpy()),
+        detour_steps=spread(_detours(table)),
         facing_wall_share=mean(walls) if len(walls) else None,
         pocket_share=mean(nodes < POCKET_NODES) if len(nodes) else None,
         expert=expert_row(table, manifest),
@@ -273,6 +271,16 @@ def _stats(
         redraws=dict(manifest.redraws),
         quarantined=len(manifest.quarantined),
     )
+
+
+def _detours(table: pa.Table) -> Ints:
+    """Return the further steps (n,) of the lengthened paths."""
+    detours = pc.subtract(
+        table.column("obstructed_path_steps"), table.column("shortest_path_steps")
+    )
+    lengthened = detours.filter(pc.equal(table.column("mode"), "lengthened"))
+    found: Ints = lengthened.drop_null().to_numpy()
+    return found
 
 
 def _type_shares(

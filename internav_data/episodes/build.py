@@ -41,7 +41,7 @@ from internav_data.world.config import DEFAULT_WORLD
 from internav_data.world.world import AHEAD
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.random import Generator
 
@@ -130,13 +130,15 @@ def build_batch(
     attempt: int = 0,
     hidden: HiddenAttributes | None = None,
     beliefs: Mapping[str, TypeBelief] | None = None,
+    before_draw: Callable[[], None] = lambda: None,
 ) -> EpisodeBatch:
     """Build episodes and count the discarded draws.
 
-    Parameters and errors as in `build_episodes`.
+    Parameters and errors as in `build_episodes`. `before_draw` is called before each draw of a
+    start and goal; what it raises ends the batch.
     """
     config = config or EpisodeConfig()
-    settings = _WorldSettings(world_config, beliefs)
+    settings = _BatchSettings(world_config, beliefs, before_draw)
     site, weighed = SpawnSite.of(house, hidden), ObstaclePool.of(pool, config)
     redraws: Counter[Redraw] = Counter()
     episodes = []
@@ -147,12 +149,14 @@ def build_batch(
     return EpisodeBatch(tuple(episodes), dict(sorted(redraws.items())))
 
 
-class _WorldSettings(NamedTuple):
-    """Settings of all worlds of a batch."""
+class _BatchSettings(NamedTuple):
+    """Settings of all episodes of a batch."""
 
     world_config: WorldConfig
     beliefs: Mapping[str, TypeBelief] | None
     """Beliefs of the blind expert; None for no such expert."""
+    before_draw: Callable[[], None]
+    """Called before each draw."""
 
 
 def mode_of(scene: int, index: int) -> Mode:
@@ -168,13 +172,14 @@ def _build_episode(
     index: int,
     pool: ObstaclePool,
     config: EpisodeConfig,
-    settings: _WorldSettings,
+    settings: _BatchSettings,
     attempt: int,
 ) -> tuple[Episode, Counter[Redraw]]:
     """Draw until an episode is complete; return it and the reasons of the discarded draws."""
     house = site.house
     again: Counter[Redraw] = Counter()
     for draw in range(config.max_redraws):
+        settings.before_draw()
         drawn = _draw(site, index, pool, config, settings, (house.scene, attempt, index, draw))
         if isinstance(drawn, Episode):
             return drawn, again
@@ -192,7 +197,7 @@ def _draw(
     index: int,
     pool: ObstaclePool,
     config: EpisodeConfig,
-    settings: _WorldSettings,
+    settings: _BatchSettings,
     key: tuple[int, int, int, int],
 ) -> Episode | Redraw:
     """Draw a start, a goal and obstacles: return an episode, or the reason to draw again."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping  # noqa: TC003 - read at run time by the settings
+from collections.abc import Iterable, Mapping  # noqa: TC003 - read at run time by the settings
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from typing import Annotated, ClassVar, Literal, get_args
 
 from internav_data.core.config import Bounds, check_bounds
@@ -93,3 +94,21 @@ class EpisodeConfig:
         if room_count <= 2:  # noqa: PLR2004 - the classes of Table 2
             return few
         return some if room_count <= 5 else many  # noqa: PLR2004
+
+
+def check_types(weights: Mapping[str, float], types: Iterable[str]) -> None:
+    """Check that every type with a weight in `asset_weights` is one of obstacles.
+
+    Raises
+    ------
+    UsageError
+        A type is none of `types`.
+
+    """
+    known = sorted(set(types))
+    for kind in sorted(set(weights) - set(known)):
+        near = get_close_matches(kind, known, 2)
+        listed = (
+            "did you mean " + " or ".join(near) + "?" if near else f"expected {', '.join(known)}"
+        )
+        raise UsageError(f"episodes.asset_weights: no obstacle has the type {kind!r}; {listed}")

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +17,7 @@ from internav_data.episodes.balance import BALANCE_WEIGHTS
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from numpy.random import Generator
 
@@ -75,21 +74,3 @@ class ObstaclePool:
         for asset, share in zip(self.assets, each.tolist(), strict=True):
             shares[asset.type] += share
         return {kind: round(share, 6) for kind, share in sorted(shares.items())}
-
-
-def check_types(weights: Mapping[str, float], assets: Sequence[Asset]) -> None:
-    """Check that every type with a weight can be drawn.
-
-    Raises
-    ------
-    UsageError
-        No asset is of a type.
-
-    """
-    known = sorted({asset.type for asset in assets})
-    for kind in sorted(set(weights) - set(known)):
-        near = get_close_matches(kind, known, 2)
-        listed = (
-            "did you mean " + " or ".join(near) + "?" if near else f"expected {', '.join(known)}"
-        )
-        raise UsageError(f"episodes.asset_weights: no obstacle has the type {kind!r}; {listed}")

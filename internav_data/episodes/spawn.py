@@ -41,6 +41,8 @@ YAW_STEP_DEG = 15
 """Step of the headings at which obstacles stand, degrees."""
 NEAR_M = 0.5
 """Distance beyond which a settling object can touch nothing, metres."""
+APART_M = 1e-6
+"""Smallest gap asked for, metres: with 0, what overlaps would be no nearer than allowed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +157,7 @@ def _try_spot(draft: EpisodeDraft, pool: ObstaclePool, rng: Generator) -> None:
         return
     pose = Pose(round_m(spot[0]), round_m(spot[1]), 0.0, yaw_quaternion(yaw_deg))
     # Cheapest test first: upright footprint, entire hull, physics, then both at the rounded rest.
-    gap = draft.config.gap_m
+    gap = max(draft.config.gap_m, APART_M)
     standing = _standing(asset, yaw_deg)
     shifted = Polygons(standing.vertices + np.array([pose.x, pose.y]), standing.offsets)
     if _distance(draft, shifted, gap) < gap:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
+from internav_data.catalog.asset_types import OBSTACLES
 from internav_data.catalog.config import CatalogConfig
 from internav_data.core.config import (
     MAX_SEED,
@@ -19,7 +20,7 @@ from internav_data.core.config import (
     updated,
 )
 from internav_data.core.files import read_file
-from internav_data.episodes.config import EpisodeConfig
+from internav_data.episodes.config import EpisodeConfig, check_types
 from internav_data.houses.config import HouseConfig
 from internav_data.houses.plan_file import FLOOR_PLAN, load_floor_plan
 from internav_data.records.errors import UsageError
@@ -67,14 +68,19 @@ class GenerationConfig:
         Raises
         ------
         UsageError
-            A value is out of its bounds, a folder of meshes is missing, or a floor plan is wrong.
+            A value is out of its bounds, a weighed type is none of the catalogue's, a push model
+            without a force has one, a folder of meshes is missing, or a floor plan is wrong.
 
         """
         self.catalog.check()
         self.house.check()
         self.episodes.check()
         self.world.check()
+        self.world.check_force()
         check_bounds(self)
+        if not self.assets:
+            # A user's meshes may have types of their own: those are known once they are read.
+            check_types(self.episodes.asset_weights, [kind.type for kind in OBSTACLES])
         for folder in self.assets:
             if not Path(folder).is_dir():
                 raise UsageError(f"assets: '{folder}' is no folder; name a folder with meshes")

@@ -20,13 +20,18 @@ from internav_data.records.errors import QuarantineError
 from internav_data.records.splits import split_of_scene
 
 if TYPE_CHECKING:
-    from internav_data.catalog import Catalogue
+    from collections.abc import Callable
+
     from internav_data.generation.config import GenerationConfig
+    from internav_data.generation.scenes import Scene
     from internav_data.records import Episode, House
 
 SAMPLE_SCENES = 12
 """Scenes made for a forecast. The quota gives them the dataset's room counts within 5 %."""
 SAMPLE_EPISODES = 10
+SAMPLE_S = 60.0
+"""Seconds after which no further scene is begun, and one under way is given up: settings that
+discard most draws may take minutes for an episode."""
 MEGABYTE = 1_000_000
 
 
@@ -82,12 +87,14 @@ def forecast(
     UsageError
         A count or setting out of its bounds.
     QuarantineError
-        Not one scene of the sample could be made.
+        Not one scene of the sample could be made, or none within `SAMPLE_S`.
 
     """
     check_scenes(scenes)
     config.check()
-    (progress or GenerationProgress()).log(f"making up to {SAMPLE_SCENES} scenes to measure")
+    (progress or GenerationProgress()).log(
+        f"making up to {SAMPLE_SCENES} scenes to measure, for {SAMPLE_S:.0f} s at most"
+    )
     sample = _sample(config, range(min(scenes, SAMPLE_SCENES)))
     made, tried = len(sample.houses), len(sample.houses) + sample.failed
     share = made / tried
@@ -109,44 +116,58 @@ def forecast(
     )
 
 
+class _TimeUpError(Exception):
+    """End of the time for the sample."""
+
+
 def _sample(config: GenerationConfig, scenes: range) -> _Sample:
     from internav_data.catalog import catalogue  # noqa: PLC0415
 
     known = catalogue(asset_folders(config))
-    sample = _Sample([], [], 0.0, 0.0, 0)
-    count = min(config.episodes_per_scene, SAMPLE_EPISODES)
-    reason = ""
+    sample, reason = _Sample([], [], 0.0, 0.0, 0), ""
+    until = time.monotonic() + SAMPLE_S
+
+    def make(scene: int, episodes: int) -> Scene:
+        return build_scene(scene, config, known, episodes, before_draw=lambda: _check_time(until))
+
     for scene in scenes:
-        if not sample.houses:
-            # The first one compiles kernels and fills caches: made once unmeasured.
-            reason = _tried(scene, config, known, 1) or reason
-        began = time.process_time()
         try:
-            build_scene(scene, config, known, episodes=1)
-            between = time.process_time()
-            built = build_scene(scene, config, known, episodes=1 + count)
+            if not sample.houses:
+                # The first one compiles kernels and fills caches: made once unmeasured.
+                make(scene, 1)
+            _measure(sample, scene, make, min(config.episodes_per_scene, SAMPLE_EPISODES))
         except QuarantineError as error:
             sample.failed += 1
             reason = str(error)
-            continue
-        ended = time.process_time()
-        # The second has `count` episodes more than the first: what differs is their cost.
-        episodes_s = max(0.0, (ended - between) - (between - began))
-        sample.episode_s += episodes_s / count * len(built.episodes)
-        sample.house_s += max(0.0, (ended - between) - episodes_s / count * len(built.episodes))
-        sample.houses.append(built.house)
-        sample.episodes += built.episodes
+        except _TimeUpError:
+            reason = reason or f"the first was not finished after {SAMPLE_S:.0f} s"
+            sample.failed += not sample.houses and not sample.failed
+            break
     if not sample.houses:
-        raise QuarantineError(f"none of {sample.failed} scenes could be made: {reason}")
+        raise QuarantineError(
+            f"none of the first {sample.failed} scenes could be made: {reason}; settings that ask "
+            "less of an episode (episodes.min_interactions, min_detour_steps) discard fewer draws"
+        )
     return sample
 
 
-def _tried(scene: int, config: GenerationConfig, known: Catalogue, episodes: int) -> str:
-    try:
-        build_scene(scene, config, known, episodes=episodes)
-    except QuarantineError as error:
-        return str(error)
-    return ""
+def _check_time(until: float) -> None:
+    if time.monotonic() > until:
+        raise _TimeUpError
+
+
+def _measure(sample: _Sample, scene: int, make: Callable[[int, int], Scene], episodes: int) -> None:
+    """Make a scene twice, the second time with more episodes: what differs is their cost."""
+    began = time.process_time()
+    make(scene, 1)
+    between = time.process_time()
+    built = make(scene, 1 + episodes)
+    ended = time.process_time()
+    episodes_s = max(0.0, (ended - between) - (between - began))
+    sample.episode_s += episodes_s / episodes * len(built.episodes)
+    sample.house_s += max(0.0, (ended - between) - episodes_s / episodes * len(built.episodes))
+    sample.houses.append(built.house)
+    sample.episodes += built.episodes
 
 
 def _bytes(sample: _Sample, scenes: int, episodes: int) -> float:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from internav_data.episodes.config import check_types
 from internav_data.records.errors import QuarantineError
 
 if TYPE_CHECKING:
@@ -46,9 +47,16 @@ class ScenePayload:
 
 
 def build_scene(
-    scene: int, config: GenerationConfig, catalogue: Catalogue, episodes: int | None = None
+    scene: int,
+    config: GenerationConfig,
+    catalogue: Catalogue,
+    episodes: int | None = None,
+    *,
+    before_draw: Callable[[], None] = lambda: None,
 ) -> Scene:
     """Return a scene with its episodes: `episodes` of them, or as many as its split has.
+
+    `before_draw` is called before each draw of a start and goal; what it raises ends the scene.
 
     Raises
     ------
@@ -72,6 +80,7 @@ def build_scene(
                 attempt=attempt,
                 hidden=hidden,
                 beliefs=beliefs,
+                before_draw=before_draw,
             )
         except QuarantineError as error:
             reason = str(error)
@@ -90,9 +99,8 @@ def obstacle_pool(catalogue: Catalogue, config: GenerationConfig, split: Split) 
 
     """
     from internav_data.catalog import split_of_asset  # noqa: PLC0415 - needed with one option only
-    from internav_data.episodes.pool import check_types  # noqa: PLC0415 - numpy when used
 
-    check_types(config.episodes.asset_weights, catalogue.spawnable)
+    _check_weights(catalogue, config)
     if not config.episodes.unseen_assets:
         return catalogue.spawnable
     return tuple(asset for asset in catalogue.spawnable if split_of_asset(asset) == split)
@@ -107,10 +115,16 @@ def obstacle_shares(catalogue: Catalogue, config: GenerationConfig) -> dict[str,
         No obstacle has a type that the settings weigh, or all have weight 0.
 
     """
-    from internav_data.episodes.pool import ObstaclePool, check_types  # noqa: PLC0415 - as above
+    from internav_data.episodes.pool import ObstaclePool  # noqa: PLC0415 - numpy when used
 
-    check_types(config.episodes.asset_weights, catalogue.spawnable)
+    _check_weights(catalogue, config)
     return ObstaclePool.of(catalogue.spawnable, config.episodes).shares()
+
+
+def _check_weights(catalogue: Catalogue, config: GenerationConfig) -> None:
+    """Check weighed types again, with those of a user's meshes."""
+    types = {asset.type for asset in catalogue.spawnable}
+    check_types(config.episodes.asset_weights, types)
 
 
 def beliefs_for(catalogue: Catalogue, config: GenerationConfig) -> Mapping[str, TypeBelief] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Final, Literal, get_args
 
@@ -51,6 +52,24 @@ class WorldConfig:
                 raise UsageError(
                     f"{prefix}{key}: expected one of {', '.join(names)}, got {value!r}"
                 )
+
+    def check_force(self, prefix: str = "world.") -> None:
+        """Check that a push model without a force is given none.
+
+        No part of `check`: an environment may kick in a dataset whose own pushes have a force.
+
+        Raises
+        ------
+        UsageError
+            `force_n` is set and `push_model` has no force.
+
+        """
+        if math.isinf(PUSH_SPECS[self.push_model].force_n) and self.force_n != FORCE_N:
+            raise UsageError(
+                f"{prefix}force_n: {self.push_model!r} moves every mass at once and has no force, "
+                f"got {self.force_n:g} N; set it to {FORCE_N:g}, or {prefix}push_model to 'force' "
+                "or 'step'"
+            )
 
     @property
     def push_spec(self) -> PushSpec:

@@ -9,7 +9,8 @@ import pytest
 from internav_data.catalog import catalogue
 from internav_data.episodes import EpisodeConfig
 from internav_data.episodes.balance import BALANCE_WEIGHTS
-from internav_data.episodes.pool import ObstaclePool, check_types
+from internav_data.episodes.config import check_types
+from internav_data.episodes.pool import ObstaclePool
 from internav_data.records.errors import UsageError
 
 ASSETS = [
@@ -50,11 +51,12 @@ def test_balance_multiplies_the_weights():
 
 
 def test_unknown_types_and_weights_of_nothing_are_refused():
-    check_types({"Sofa": 2.0}, ASSETS)
+    types = [asset.type for asset in ASSETS]
+    check_types({"Sofa": 2.0}, types)
     with pytest.raises(UsageError, match="no obstacle has the type 'Sofas'; did you mean Sofa"):
-        check_types({"Sofas": 2.0}, ASSETS)
+        check_types({"Sofas": 2.0}, types)
     with pytest.raises(UsageError, match="the type 'Zebra'; expected Box, Pot, Sofa"):
-        check_types({"Zebra": 2.0}, ASSETS)
+        check_types({"Zebra": 2.0}, types)
     nothing = EpisodeConfig(asset_weights={"Box": 0.0, "Pot": 0.0, "Sofa": 0.0})
     with pytest.raises(UsageError, match="a weight above 0 for one type at least, got 0 for all"):
         ObstaclePool.of(ASSETS, nothing)

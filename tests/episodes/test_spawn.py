@@ -9,13 +9,16 @@ from builders import crate, scene_object, screen
 
 from internav_data.catalog import catalogue
 from internav_data.episodes import EpisodeConfig, build_episodes
+from internav_data.episodes import spawn as module
 from internav_data.episodes.build import _draw_endpoints
 from internav_data.episodes.pool import ObstaclePool
 from internav_data.episodes.site import SpawnSite
-from internav_data.episodes.spawn import spawn
+from internav_data.episodes.spawn import _solids, settled_at, spawn
 from internav_data.geometry import clearance, footprint
 from internav_data.houses import HouseConfig, build_house
 from internav_data.physics import wall_body
+from internav_data.physics.fall_clearance import touches
+from internav_data.physics.narrow_phase import prisms_of
 from internav_data.records import Pose
 from internav_data.verification.checked_layout import CheckedLayout
 from internav_data.verification.overlaps import Solids, intrusions
@@ -68,6 +71,26 @@ def test_their_footprints_alone_would_let_them_in():
     shapes = Shapes(ASSETS)
     own = Solids.of([(0, shapes.slabs("Screen_0", spot))])
     assert intrusions(own, CheckedLayout(HOUSE, shapes).solids) == [(0, -1)]
+
+
+def test_without_a_gap_nothing_falls_into_something(monkeypatch):
+    """Physics would spend minutes on pushing apart what overlaps."""
+    fell = []
+
+    def settled_apart(draft, body):
+        own = prisms_of(body.asset, body.pose)
+        fell.append(not any(touches(own, solid) for solid in _solids(draft)))
+        return settled_at(draft, body)
+
+    monkeypatch.setattr(module, "settled_at", settled_apart)
+    site = SpawnSite.of(HOUSE)
+    config = EpisodeConfig(max_obstacles=(6, 6, 6), gap_m=0.0, lateral_std_m=1.0)
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        draft = _draw_endpoints(site, "blocked", config, rng)
+        spawn(draft, ObstaclePool((screen(), LEGGED), None), rng)
+    assert len(fell) > 10
+    assert all(fell)
 
 
 @pytest.mark.slow

@@ -189,9 +189,18 @@ def test_bad_values_of_episodes_are_refused_in_a_line(override, words):
 def test_an_unknown_type_is_refused_before_a_run():
     config = load_config(overrides=["episodes.asset_weights={Soffa = 2}"])
     with pytest.raises(UsageError, match="'Soffa'; did you mean Sofa"):
+        config.check()
+    with pytest.raises(UsageError, match="'Soffa'; did you mean Sofa"):
         obstacle_shares(catalogue(), config)
     with pytest.raises(UsageError, match="'Soffa'; did you mean Sofa"):
         obstacle_pool(catalogue(), config, "train")
+
+
+def test_types_of_ones_own_meshes_may_be_weighed(tmp_path):
+    overrides = [f"assets=['{tmp_path}']", "episodes.asset_weights={Lamp = 2}"]
+    load_config(overrides=overrides).check()  # what the folder holds is read later
+    with pytest.raises(UsageError, match="no obstacle has the type 'Lamp'"):
+        load_config(overrides=overrides[1:]).check()
 
 
 def test_one_set_is_one_setting():

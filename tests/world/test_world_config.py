@@ -47,6 +47,18 @@ def test_an_unknown_push_model_is_refused_in_python():
         GenerationConfig(world=WorldConfig(hands="three")).check()  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("preset", ["dense", "long"])
+def test_a_kick_is_given_no_force(preset):
+    words = r"^world.force_n: 'kick' moves every mass at once and has no force, got {} N; set it"
+    with pytest.raises(UsageError, match=words.format(90)):
+        load_config(overrides=["world.push_model=kick", "world.force_n=90"]).check()
+    kicked = {"world.push_model": "kick"}
+    with pytest.raises(UsageError, match=words.format(800)):
+        load_config(options=kicked, episode_preset=preset).check()
+    load_config(overrides=["world.force_n=200"], options=kicked, episode_preset=preset).check()
+    WorldConfig("kick", 800.0).check()  # an environment may kick where a dataset pushes
+
+
 def test_specs_of_pushes():
     assert WorldConfig().push_spec == PUSH_SPECS["force"]
     assert WorldConfig(force_n=90.0).push_spec == replace(PUSH_SPECS["force"], force_n=90.0)
