@@ -15,6 +15,7 @@ PYTHON ?=
 # More for pytest, as in `make test ARGS='-k lattice -x'`.
 ARGS ?=
 DEMO ?= demo
+MINI := internav_data/dataset/mini
 
 .PHONY: help
 help: ## list the targets
@@ -65,21 +66,13 @@ setup: $(STAMP) ## only set up .venv
 
 .PHONY: demo
 demo: $(STAMP) ## make a small dataset, prove it right, draw it: about three minutes
-	$(BIN)/internav-gen generate --out $(DEMO)/dataset --scenes 24 --episodes-per-scene 5
-	$(BIN)/internav-gen validate $(DEMO)/dataset --level physics
-	$(BIN)/internav-gen stats $(DEMO)/dataset
-	$(BIN)/internav-gen show $(DEMO)/dataset --scene 6 --out $(DEMO)/house.png
-	$(BIN)/internav-gen show $(DEMO)/dataset --scene 6 --episode 0 --out $(DEMO)/blocked.png
-	$(BIN)/internav-gen show $(DEMO)/dataset --scene 6 --episode 1 --out $(DEMO)/lengthened.png
-	$(BIN)/python examples/contact_sheet.py $(DEMO)/dataset $(DEMO)/houses.png
-	$(BIN)/internav-gen replay $(DEMO)/dataset 9/1 --force \
-	  --out $(DEMO)/replay.mp4 --out $(DEMO)/replay.gif
-	@echo
-	@echo "Look at   $(DEMO)/house.png  $(DEMO)/blocked.png  $(DEMO)/lengthened.png  $(DEMO)/houses.png"
-	@echo "Watch     $(DEMO)/replay.gif in a browser, $(DEMO)/replay.mp4 in a player: things moved out of the way"
-	@echo "The data  $(DEMO)/dataset (begin with its README.md)"
-	@echo "Load it   $(BIN)/python examples/stream_episodes.py $(DEMO)/dataset"
-	@echo "Make more $(BIN)/internav-gen generate --help"
+	$(BIN)/internav-data demo --out $(DEMO)
+
+.PHONY: mini
+mini: $(STAMP) ## make the small dataset that ships with the package again
+	rm -rf $(MINI)
+	$(BIN)/internav-gen generate --out $(MINI) --scenes 40 --episodes-per-scene 10
+	$(BIN)/internav-gen validate $(MINI) --level physics
 
 DEMO_TRAIN := --device cpu --preset small --pretrain bc --steps 32768 \
   --set cloning.frames=80000 --set cloning.epochs=1 --set ppo.critic_warmup_rollouts=4 \
@@ -144,6 +137,12 @@ test-lowest: ## run a part of every room's tests with the lowest versions that p
 	  --constraint constraints-lowest.txt --editable '.[all]' \
 	  hypothesis jsonschema psutil pytest pytest-xdist
 	$(LOWEST)/bin/python -m pytest $(TESTS) -k 'not (pandas or duckdb or polars)' $(LOWEST_TESTS) $(ARGS)
+
+.PHONY: wheel-test
+wheel-test: $(STAMP) ## build wheel and sdist, try the wheel in an environment of its own; ARGS=quick
+	rm -rf dist
+	$(BIN)/python -m build --outdir dist .
+	.ci/try-wheel $(BIN)/python dist/*.whl $(ARGS)
 
 .PHONY: bench
 bench: $(STAMP) ## run the benchmarks: JSON into bench-results/

@@ -107,11 +107,12 @@ def dataset_to_read(given: Path | None) -> Path:
         There is no dataset in the default folder.
 
     """
-    from internav_data.dataset import dataset_folder, has_manifest, read_manifest
+    from internav_data.dataset import has_manifest, read_manifest
+    from internav_data.dataset.location import MINI_FOLDER, folder_to_read
 
-    folder = dataset_folder(given)
+    folder = folder_to_read(given)
     if has_manifest(folder):
-        name_dataset(given)
+        name_dataset(folder if folder == MINI_FOLDER else given)
     elif given is None:
         read_manifest(folder)  # raises: nothing is there, or nothing finished
     return folder

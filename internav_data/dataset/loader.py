@@ -13,7 +13,7 @@ from internav_data.core.extras import require
 from internav_data.core.lru import LRUCache
 from internav_data.core.storage import Store, StoreLike, store_of
 from internav_data.dataset.decode import from_table
-from internav_data.dataset.location import dataset_folder
+from internav_data.dataset.location import folder_to_read
 from internav_data.dataset.manifest import Manifest, check_file
 from internav_data.dataset.row_group_cache import RowGroupCache
 from internav_data.dataset.select import Filters, check_columns, joined, matching_rows, read_columns
@@ -50,6 +50,7 @@ def load_dataset(
     path : str, Path or Store, optional
         Folder that `internav-gen generate` wrote; not given: the folder that the environment
         variable INTERNAV_DATASET names, else `internav-dataset` in the current directory.
+        "mini" is a small dataset that ships with the package.
     split : str, optional
         train, val or test; all of them if not given. The files of other splits need not be there,
         nor the assets until a house is asked for.
@@ -67,8 +68,13 @@ def load_dataset(
     UsageError
         An unknown split, column or operator.
 
+    Examples
+    --------
+    >>> load_dataset("mini", split="val")[0].episode_id
+    'scene-000000/0000'
+
     """
-    store = path if isinstance(path, Store) else dataset_folder(path)
+    store = path if isinstance(path, Store) else folder_to_read(path)
     return Dataset(store, split, filters, columns)
 
 

@@ -1,4 +1,4 @@
-"""Folder of the dataset that commands and `load_dataset` take when none is named."""
+"""Folders of datasets by name: the default one, and the small one that ships with the package."""
 
 from __future__ import annotations
 
@@ -10,6 +10,10 @@ DEFAULT_FOLDER = "internav-dataset"
 """Default folder, in the current directory."""
 FOLDER_VARIABLE = "INTERNAV_DATASET"
 """Environment variable that names another default folder; empty counts as unset."""
+MINI = "mini"
+"""Name of the dataset that ships with the package: 40 scenes x 10 episodes of the defaults."""
+MINI_FOLDER = Path(__file__).with_name(MINI)
+"""Folder of the dataset `MINI`; nothing writes there but `make mini`."""
 
 
 def dataset_folder(given: str | Path | None = None) -> Path:
@@ -19,8 +23,19 @@ def dataset_folder(given: str | Path | None = None) -> Path:
     return Path(os.environ.get(FOLDER_VARIABLE) or DEFAULT_FOLDER)
 
 
+def folder_to_read(given: str | Path | None = None) -> Path:
+    """Return the folder that a reader opens: `dataset_folder`, or `MINI_FOLDER` for `MINI`.
+
+    A folder of one's own that is called `mini` comes first.
+    """
+    folder = dataset_folder(given)
+    return MINI_FOLDER if str(folder) == MINI and not folder.exists() else folder
+
+
 def origin(given: str | Path | None) -> str:
-    """Return the reason for which `dataset_folder` took its folder; empty if it was named."""
+    """Return the reason for which a command took its folder; empty if it was named."""
+    if given == MINI_FOLDER:
+        return "ships with internav-data"
     if given is not None:
         return ""
     if os.environ.get(FOLDER_VARIABLE):

@@ -7,6 +7,8 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from internav_data.dataset.location import folder_to_read
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -19,7 +21,9 @@ if TYPE_CHECKING:
 
 def with_absolute_path(dataset: str | Path | Dataset[Episode]) -> str | Dataset[Episode]:
     """Return a dataset's path, found from any directory; a loaded dataset as it is."""
-    return os.path.abspath(dataset) if isinstance(dataset, str | Path) else dataset  # noqa: PTH100
+    if not isinstance(dataset, str | Path):
+        return dataset
+    return os.path.abspath(folder_to_read(dataset))  # noqa: PTH100 - links stay what they are
 
 
 def plain_spec(spec: EnvSpec | None) -> EnvSpec | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from internav_data.dataset.location import MINI
 from internav_data.envs.tasks import TaskConfig
 from internav_data.envs.vector import InterNavVectorEnv
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 def make_vector(
     num_envs: int,
-    dataset: str | Path | Dataset[Episode],
+    dataset: str | Path | Dataset[Episode] = MINI,
     workers: int = 0,
     max_episode_steps: int | None = None,
     **arguments: Any,  # noqa: ANN401 - those of `InterNavVectorEnv`
@@ -28,7 +29,7 @@ def make_vector(
     Parameters
     ----------
     num_envs, dataset, **arguments
-        Arguments of `InterNavVectorEnv`.
+        Arguments of `InterNavVectorEnv`; without a dataset, the one that ships with the package.
     workers
         Number of processes.
     max_episode_steps

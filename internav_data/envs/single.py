@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import gymnasium
 import numpy as np
 
+from internav_data.dataset.location import MINI
 from internav_data.envs.copies import Rebuilt, with_absolute_path
 from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.envs.slot import (
@@ -42,7 +43,8 @@ class InterNavEnv(Rebuilt, gymnasium.Env[dict[str, Any], np.int64]):
     Parameters
     ----------
     dataset : str, Path or Dataset
-        Directory of a dataset, or a loaded dataset.
+        Directory of a dataset, or a loaded dataset; the one that ships with the package if not
+        given.
     image_size
         Size of the pictures, pixels a side.
     render_mode
@@ -64,7 +66,7 @@ class InterNavEnv(Rebuilt, gymnasium.Env[dict[str, Any], np.int64]):
 
     def __init__(
         self,
-        dataset: str | Path | Dataset[Episode],
+        dataset: str | Path | Dataset[Episode] = MINI,
         image_size: int = 64,
         render_mode: str | None = None,
         *,

@@ -18,6 +18,7 @@ import numpy as np
 from internav_data.core.files import read_file
 from internav_data.core.lru import LRUCache
 from internav_data.dataset import load_dataset
+from internav_data.dataset.location import folder_to_read
 from internav_data.dataset.manifest import MANIFEST, MANIFEST_LIMITS
 from internav_data.envs.auxiliary import auxiliary_starts
 from internav_data.envs.order import EpisodeOrder, scene_bounds
@@ -210,7 +211,7 @@ def open_source(
                 "episodes: load it without columns"
             )
         return Source(dataset.select(split, filters))
-    path = Path(dataset)
+    path = folder_to_read(dataset)
     if not (path / MANIFEST).exists():
         load_dataset(path)  # raises with what is wrong there
     digest = hashlib.sha256(read_file(path / MANIFEST, MANIFEST_LIMITS)).hexdigest()

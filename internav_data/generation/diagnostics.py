@@ -16,6 +16,7 @@ from typing import Literal
 from internav_data.core import compile_cache
 from internav_data.core.extras import DISTRIBUTIONS, EXTRAS, install_command
 from internav_data.core.machine import available_cores, memory_gib
+from internav_data.records.version import __version__
 
 CheckState = Literal["good", "warning", "bad"]
 """Result of a check."""
@@ -41,9 +42,11 @@ class Check:
 def examine(out: Path) -> list[Check]:
     """Run all checks, for a dataset in the folder `out`, in a fixed order."""
     return [
+        Check("internav-data", "good", __version__, ""),
         _python(),
         _platform(),
         *(_package(module, extra) for module, extra in EXTRAS.items()),
+        *_engines(),
         _cores(),
         _memory(),
         _disk(out),
@@ -95,6 +98,21 @@ def _package(module: str, extra: str) -> Check:
     if wanted and _numbers(found) < _numbers(wanted):
         return Check(name, "bad", f"{found}, older than {wanted}", f"{install} --upgrade")
     return Check(name, "good", found, "")
+
+
+def _engines() -> list[Check]:
+    """Check that each physics engine loads; one whose packages are missing has been told of."""
+    from internav_data.physics.engines import DEFAULT_ENGINE, ENGINES  # noqa: PLC0415 - heavier
+
+    checks = []
+    for name, load in ENGINES.items():
+        try:
+            found = load().build
+        except ImportError as error:
+            found = f"not installed: {install_command(error.name or name)}"
+        own = " (the default)" if name == DEFAULT_ENGINE else ""
+        checks.append(Check(f"engine {name}{own}", "good", found, ""))
+    return checks
 
 
 def _wanted(name: str) -> str:

@@ -74,6 +74,19 @@ def trajectory(env, seed, count=120):
     return out
 
 
+def test_without_arguments_it_is_over_the_dataset_that_ships(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    env = gymnasium.make("InterNav-v0")
+    _, info = env.reset(seed=3)
+    shipped = load_dataset("mini")
+    assert info["episode_id"] in {episode.episode_id for episode in shipped}
+    many = gymnasium.make_vec("InterNav-v0", num_envs=2)
+    assert many.reset(seed=3)[1]["episode_id"][0] == info["episode_id"]
+    monkeypatch.chdir("/")  # found from anywhere
+    _, info = gymnasium.make(env.spec, split="val").reset(seed=0)
+    assert info["episode_id"].startswith("scene-000000/")
+
+
 def test_gymnasium_finds_nothing_wrong(small):
     env = make(small, render_mode="rgb_array")
     with warnings.catch_warnings():
