@@ -101,17 +101,19 @@ def _package(module: str, extra: str) -> Check:
 
 
 def _engines() -> list[Check]:
-    """Check that each physics engine loads; one whose packages are missing has been told of."""
+    """Check that each physics engine loads."""
     from internav_data.physics.engines import DEFAULT_ENGINE, ENGINES  # noqa: PLC0415 - heavier
 
     checks = []
     for name, load in ENGINES.items():
+        default = name == DEFAULT_ENGINE
+        label = f"engine {name}" + (" (the default)" if default else "")
         try:
-            found = load().build
+            checks.append(Check(label, "good", load().build, ""))
         except ImportError as error:
-            found = f"not installed: {install_command(error.name or name)}"
-        own = " (the default)" if name == DEFAULT_ENGINE else ""
-        checks.append(Check(f"engine {name}{own}", "good", found, ""))
+            state: CheckState = "bad" if default else "warning"
+            remedy = install_command((error.name or name).partition(".")[0])
+            checks.append(Check(label, state, "not installed", remedy))
     return checks
 
 
