@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 from statistics import median
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
@@ -18,7 +19,6 @@ from internav_data.records import Dynamics, type_affordances
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from internav_data.catalog.collection import Catalogue
     from internav_data.catalog.config import CatalogConfig
     from internav_data.records import Affordance, Asset
 
@@ -43,6 +43,12 @@ class TypeAttributes:
     masses_kg: tuple[float, ...]
     frictions: tuple[float, ...]
 
+    def dynamics(self, mass_kg: float, friction: float, *, free: bool) -> Dynamics:
+        """Return the dynamics of an object that is free or fixed."""
+        # An asset of the type's minority, as the only apple that is pushed, follows the others.
+        push = self.affordance == "push"
+        return Dynamics(mass_kg, friction, pushable=free and push, pickable=free and not push)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HiddenAttributes:
@@ -55,7 +61,7 @@ class HiddenAttributes:
 
     def affordance(self, asset: Asset) -> Affordance | None:
         """Return the interaction of which objects of an asset can be the target; None for none."""
-        known = self.types.get(asset.type) if asset.spawnable else None
+        known = self._known(asset)
         return None if known is None else known.affordance
 
     def dynamics(self, asset: Asset, draws: Sequence[float]) -> Dynamics:
@@ -68,30 +74,41 @@ class HiddenAttributes:
         draws
             `DRAWS` numbers, uniform in [0, 1).
         """
-        known = self.types.get(asset.type) if asset.spawnable else None
+        known = self._known(asset)
         if known is None:
             return asset.dynamics
         independent, fixed, mass, friction = draws
-        drawn = independent < self.strength
-        free = fixed >= FIXED_SHARES[known.affordance] if drawn else not asset.dynamics.fixed
-        # An asset of the type's minority, as the only apple that is pushed, follows the others.
-        pushable = free and known.affordance == "push"
-        pickable = free and known.affordance == "pick"
-        if not drawn:
-            return Dynamics(asset.mass_kg, asset.friction, pushable, pickable)
-        return Dynamics(
+        if independent >= self.strength:
+            return known.dynamics(asset.mass_kg, asset.friction, free=not asset.dynamics.fixed)
+        return known.dynamics(
             known.masses_kg[int(mass * len(known.masses_kg))],
             known.frictions[int(friction * len(known.frictions))],
-            pushable,
-            pickable,
+            free=fixed >= FIXED_SHARES[known.affordance],
         )
+
+    def possible(self, asset: Asset) -> tuple[tuple[float, Dynamics], ...]:
+        """Return the dynamics that an asset's objects can have, each after its probability."""
+        known = self._known(asset)
+        if known is None:
+            return ((1.0, asset.dynamics),)
+        fixed = FIXED_SHARES[known.affordance]
+        levels = tuple(product(known.masses_kg, known.frictions))
+        each = self.strength / len(levels)
+        own = known.dynamics(asset.mass_kg, asset.friction, free=not asset.dynamics.fixed)
+        found = [(1.0 - self.strength, own)]
+        for free, share in ((True, 1.0 - fixed), (False, fixed)):
+            found += [(each * share, known.dynamics(*level, free=free)) for level in levels]
+        return tuple(pair for pair in found if pair[0] > 0.0)
+
+    def _known(self, asset: Asset) -> TypeAttributes | None:
+        return self.types.get(asset.type) if asset.spawnable else None
 
 
 @lru_cache(maxsize=4)
-def _types_of(catalogue: Catalogue) -> Mapping[str, TypeAttributes]:
+def _types_of(spawnable: tuple[Asset, ...]) -> Mapping[str, TypeAttributes]:
     out = {}
-    for type_, affordance in type_affordances(catalogue.spawnable).items():
-        assets = [asset for asset in catalogue.of_type(type_) if asset.spawnable]
+    for type_, affordance in type_affordances(spawnable).items():
+        assets = [asset for asset in spawnable if asset.type == type_]
         middle = median(asset.mass_kg for asset in assets)
         frictions = sorted(asset.friction for asset in assets)
         out[type_] = TypeAttributes(
@@ -102,8 +119,19 @@ def _types_of(catalogue: Catalogue) -> Mapping[str, TypeAttributes]:
     return out
 
 
-def hidden_attributes(config: CatalogConfig, catalogue: Catalogue) -> HiddenAttributes | None:
-    """Return the distribution of attributes of a config; None where the look tells them."""
+def hidden_attributes(
+    config: CatalogConfig, spawnable: tuple[Asset, ...]
+) -> HiddenAttributes | None:
+    """Return the distribution of attributes of a config; None where the look tells them.
+
+    Parameters
+    ----------
+    config
+        Settings of the attributes.
+    spawnable
+        All assets of the catalogue that episodes may spawn.
+
+    """
     if config.attributes == "look":
         return None
-    return HiddenAttributes(config.strength, _types_of(catalogue))
+    return HiddenAttributes(config.strength, _types_of(spawnable))

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from internav_data.core.field_docs import descriptions
 from internav_data.core.files import FileLimits, parse_toml, read_toml
-from internav_data.records.errors import UsageError
+from internav_data.records.errors import CorruptDataError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -30,7 +30,15 @@ if TYPE_CHECKING:
 
     from _typeshed import DataclassInstance
 
+    class Section(DataclassInstance, typing.Protocol):
+        """A config that is a section of a dataset's."""
+
+        def check(self) -> None:
+            """Raise UsageError if a value is out of its bounds."""
+
+
 C = TypeVar("C", bound="DataclassInstance")
+S = TypeVar("S", bound="Section")
 
 NOTHING = "none"
 """Word for an absent number; TOML has none of its own."""
@@ -211,6 +219,35 @@ def from_mapping(
                 value = {**current, **value}  # noqa: PLW2901 - names of other layers stay
             changes[name] = _typed(value, hints[name], f"{where}: {key}")
     return dataclasses.replace(config, **changes)
+
+
+def of_dataset(default: S, config: Mapping[str, Any], section: str) -> S:
+    """Return a section of a dataset's config; keys of other releases are left out.
+
+    Parameters
+    ----------
+    default
+        Section with the values of keys that the dataset does not have.
+    config
+        Config of the dataset's manifest.
+    section
+        Name of the section, as in `world`.
+
+    Raises
+    ------
+    CorruptDataError
+        A value that no generator writes.
+
+    """
+    given, names = config.get(section), {field.name for field in dataclasses.fields(default)}
+    values = given if isinstance(given, dict) else {}
+    known = {name: value for name, value in values.items() if name in names}
+    try:
+        made = from_mapping(default, known, "manifest.json", prefix=f"{section}.")
+        made.check()
+    except UsageError as error:
+        raise CorruptDataError(f"config: {error}; generate the dataset again") from error
+    return made
 
 
 def updated(config: C, assignment: str, elsewhere: Sequence[str] = ()) -> C:

@@ -133,9 +133,13 @@ def expert_actions(episode: Episode) -> Sequence[int]:
 def blind_planner(dataset: Dataset[Episode]) -> ActionPlanner:
     """Return a planner that knows types' averages and learns by failing (`planner.blind`).
 
+    The averages are those of the dataset's settings: with hidden attributes those of their draws.
+
     A run that is stored in the dataset is played again. Where the goal cannot be reached, it walks
     to the node in reach that is nearest to it.
     """
+    from internav_data.catalog.attributes import hidden_attributes  # noqa: PLC0415
+    from internav_data.catalog.config import CatalogConfig  # noqa: PLC0415
     from internav_data.envs.source import open_source  # noqa: PLC0415 - the camera's kernels
     from internav_data.planner.beliefs import type_beliefs  # noqa: PLC0415
     from internav_data.planner.blind import run_blind  # noqa: PLC0415
@@ -143,7 +147,10 @@ def blind_planner(dataset: Dataset[Episode]) -> ActionPlanner:
 
     source = open_source(dataset)
     config = source.world_config
-    beliefs = type_beliefs(dataset.assets.values(), config.push_spec)
+    assets = dataset.assets.values()
+    spawnable = tuple(asset for asset in assets if asset.spawnable)
+    hidden = hidden_attributes(CatalogConfig.of_dataset(dataset.manifest.config), spawnable)
+    beliefs = type_beliefs(assets, config.push_spec, hidden)
 
     def plan(episode: Episode) -> Sequence[int]:
         if episode.blind_expert is not None:

@@ -68,7 +68,7 @@ def build_scene(
     from internav_data.episodes import build_batch  # noqa: PLC0415 - numba, pybullet when used
     from internav_data.houses import build_house  # noqa: PLC0415 - as above
 
-    reason, hidden = "", hidden_attributes(config.catalog, catalogue)
+    reason, hidden = "", hidden_attributes(config.catalog, catalogue.spawnable)
     beliefs = beliefs_for(catalogue, config)
     for attempt in range(ATTEMPTS):
         try:
@@ -129,11 +129,13 @@ def _check_weights(catalogue: Catalogue, config: GenerationConfig) -> None:
 
 def beliefs_for(catalogue: Catalogue, config: GenerationConfig) -> Mapping[str, TypeBelief] | None:
     """Return what a blind expert believes about the catalogue's types; None if none is stored."""
+    from internav_data.catalog.attributes import hidden_attributes  # noqa: PLC0415 - as below
     from internav_data.planner.beliefs import type_beliefs  # noqa: PLC0415 - one option only
 
     if not config.episodes.blind_expert:
         return None
-    return type_beliefs(catalogue.assets.values(), config.world.push_spec)
+    hidden = hidden_attributes(config.catalog, catalogue.spawnable)
+    return type_beliefs(catalogue.assets.values(), config.world.push_spec, hidden)
 
 
 def scene_maker(payload: ScenePayload) -> Callable[[int], int]:

@@ -48,7 +48,7 @@ def generate_house(seed: int = 0, scene: int = 0, config: GenerationConfig | Non
     if scene < 0 or seed < 0:
         raise UsageError(f"seed is {seed} and scene is {scene}: both are 0 or more")
     assets, reason = catalogue(asset_folders(config)), ""
-    hidden = hidden_attributes(config.catalog, assets)
+    hidden = hidden_attributes(config.catalog, assets.spawnable)
     for attempt in range(ATTEMPTS):
         try:
             return build_house(seed, scene, config.house, assets, attempt, hidden=hidden)
@@ -90,7 +90,7 @@ def generate_episodes(
         raise UsageError(f"count is {count} and first is {first}: ask for 1 or more from 0 or more")
     assets, reason = catalogue(asset_folders(config)), ""
     pool = obstacle_pool(assets, config, house.split)
-    hidden = hidden_attributes(config.catalog, assets)
+    hidden = hidden_attributes(config.catalog, assets.spawnable)
     for attempt in range(ATTEMPTS):
         try:
             return build_episodes(

@@ -17,13 +17,14 @@ from internav_data.records import Dynamics
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    from internav_data.catalog.attributes import HiddenAttributes
     from internav_data.records import Asset, PushSpec
     from internav_data.world import MovableObject, World
 
 UNKNOWN: Final = Dynamics(mass_kg=1000.0, friction=1.0, pushable=False, pickable=False)
 """Belief about an object of an unknown type: that it is fixed."""
 PRIOR_WEIGHT: Final = 2.0
-"""Weight of a type's share of movable assets, in objects tried."""
+"""Weight of a type's share of movable objects, in objects tried."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,13 +32,15 @@ class TypeBelief:
     """Belief about all objects of a type before any of them was touched."""
 
     dynamics: Dynamics
-    """Mean mass and friction of the assets that can be moved, and what most of these allow."""
+    """Mean mass and friction of the objects that can be moved, and what most of these allow."""
     movable_share: float
-    """Share of the type's assets that the agent can push or pick up."""
+    """Share of the type's objects that the agent can push or pick up."""
 
 
-def type_beliefs(assets: Iterable[Asset], spec: PushSpec) -> Mapping[str, TypeBelief]:
-    """Return the belief about each type, from the assets of a catalogue.
+def type_beliefs(
+    assets: Iterable[Asset], spec: PushSpec, hidden: HiddenAttributes | None = None
+) -> Mapping[str, TypeBelief]:
+    """Return the belief about each type: averages over its assets, under a dataset's settings.
 
     Parameters
     ----------
@@ -45,26 +48,30 @@ def type_beliefs(assets: Iterable[Asset], spec: PushSpec) -> Mapping[str, TypeBe
         Assets of a catalogue.
     spec
         Parameters of a push, whose force decides what is too heavy.
+    hidden
+        Distribution of the objects' attributes; None where they are those of their asset.
 
     """
-    by_type: dict[str, list[Asset]] = defaultdict(list)
+    by_type: dict[str, list[tuple[float, Dynamics]]] = defaultdict(list)
     for asset in sorted(assets, key=lambda asset: asset.asset_id):
-        by_type[asset.type].append(asset)
+        possible = ((1.0, asset.dynamics),) if hidden is None else hidden.possible(asset)
+        by_type[asset.type] += possible
     return {kind: _belief(group, spec) for kind, group in by_type.items()}
 
 
-def _belief(group: Sequence[Asset], spec: PushSpec) -> TypeBelief:
-    own = [asset.dynamics for asset in group]
-    able = [d for d in own if d.pickable or (d.pushable and _yields(d, spec))]
-    counted = able or own
-    picked, pushed = sum(d.pickable for d in able), sum(d.pushable for d in able)
+def _belief(group: Sequence[tuple[float, Dynamics]], spec: PushSpec) -> TypeBelief:
+    """Return the belief about objects from the dynamics they can have, with their weights."""
+    able = [(w, d) for w, d in group if d.pickable or (d.pushable and _yields(d, spec))]
+    counted = able or group
+    weight = fsum(w for w, _ in counted)
+    picked, pushed = fsum(w * d.pickable for w, d in able), fsum(w * d.pushable for w, d in able)
     dynamics = Dynamics(
-        mass_kg=fsum(d.mass_kg for d in counted) / len(counted),
-        friction=fsum(d.friction for d in counted) / len(counted),
+        mass_kg=fsum(w * d.mass_kg for w, d in counted) / weight,
+        friction=fsum(w * d.friction for w, d in counted) / weight,
         pushable=pushed > picked,
         pickable=0 < picked >= pushed,
     )
-    return TypeBelief(dynamics, len(able) / len(group))
+    return TypeBelief(dynamics, fsum(w for w, _ in able) / fsum(w for w, _ in group))
 
 
 def _yields(dynamics: Dynamics, spec: PushSpec) -> bool:

@@ -63,8 +63,8 @@ def has_room(world: World, index: int, position: Vec2, quarters: float) -> bool:
     near = world.near(dop8_of_square(x, y, _reach_m(asset)), index)
     top = CARRY_LOW_M + asset.size[2]
     for _, body in near:
-        extent = extent_of(body.asset, body.pose)
-        if extent.high_m <= CARRY_LOW_M or extent.low_m >= top:
+        low_m, high_m = _heights_m(body.asset, body.pose)
+        if high_m <= CARRY_LOW_M or low_m >= top:
             continue
         if clearance(held, _footprint(body.asset, body.pose), 1.0) <= 0.0:
             return False
@@ -111,6 +111,13 @@ def _plan(asset: Asset, quarters: float) -> Polygons:
 def _reach_m(asset: Asset) -> float:
     """Return a bound of a held object's distance from the agent's axis, metres."""
     return AGENT.radius_m + CARRY_GAP_M + 2.0 * math.hypot(asset.size[0], asset.size[1])
+
+
+@lru_cache(maxsize=4096)
+def _heights_m(asset: Asset, pose: Pose) -> tuple[float, float]:
+    """Return the heights of an object's lowest and highest point, metres."""
+    extent = extent_of(asset, pose)
+    return extent.low_m, extent.high_m
 
 
 @lru_cache(maxsize=4096)

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Final, Literal, get_args
 
-from internav_data.core.config import Bounds, check_bounds, from_mapping
-from internav_data.records.errors import CorruptDataError, UsageError
+from internav_data.core.config import Bounds, check_bounds, of_dataset
+from internav_data.records.errors import UsageError
 from internav_data.records.physics import FORCE_N, PUSH_SPECS, PushModel, push_spec
 
 if TYPE_CHECKING:
@@ -91,15 +91,7 @@ class WorldConfig:
             A value that no generator writes.
 
         """
-        given, names = config.get("world"), WorldConfig.__dataclass_fields__
-        values = given if isinstance(given, dict) else {}
-        known = {name: value for name, value in values.items() if name in names}
-        try:
-            made = from_mapping(DEFAULT_WORLD, known, "manifest.json", prefix="world.")
-            made.check()
-        except UsageError as error:
-            raise CorruptDataError(f"config: {error}; generate the dataset again") from error
-        return made
+        return of_dataset(DEFAULT_WORLD, config, "world")
 
 
 DEFAULT_WORLD: Final = WorldConfig()

@@ -23,13 +23,13 @@ from internav_data.records.errors import UsageError
 
 
 def hidden(strength=1.0):
-    found = hidden_attributes(CatalogConfig("hidden", strength), catalogue())
+    found = hidden_attributes(CatalogConfig("hidden", strength), catalogue().spawnable)
     assert isinstance(found, HiddenAttributes)
     return found
 
 
 def test_the_look_tells_all_unless_attributes_are_hidden():
-    assert hidden_attributes(CatalogConfig(), catalogue()) is None
+    assert hidden_attributes(CatalogConfig(), catalogue().spawnable) is None
 
 
 def test_levels_lie_within_a_factor_of_two_of_the_types_mass():

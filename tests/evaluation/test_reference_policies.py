@@ -1,12 +1,15 @@
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
+from types import SimpleNamespace
 
 import networkx as nx
 import numpy as np
 import pytest
 from scipy import stats
 
+from internav_data.catalog import catalogue
 from internav_data.evaluation.evaluator import EvaluationConfig, evaluate
 from internav_data.evaluation.metrics import summary
 from internav_data.evaluation.reference_policies import (
@@ -15,6 +18,8 @@ from internav_data.evaluation.reference_policies import (
     shortest,
     shortest_path_planner,
 )
+from internav_data.generation import load_config
+from internav_data.generation.scenes import beliefs_for
 from internav_data.navigation import Lattice
 from internav_data.records.errors import UsageError
 from internav_data.world import Action, HouseModel, World
@@ -53,6 +58,24 @@ def test_a_stored_run_of_the_blind_expert_is_played_again(played_data):
     episode = played_data[0]
     stored = replace(episode, blind_expert=replace(episode.expert, actions=(1, 11)))
     assert tuple(blind_planner(played_data)(stored)) == (1, 11)
+
+
+def test_the_blind_policy_believes_what_the_blind_expert_of_the_generator_does(
+    played_data, monkeypatch
+):
+    """With hidden attributes the averages are those of their draws, not of the assets."""
+    from internav_data.evaluation.reference_policies import blind_planner
+    from internav_data.planner import blind
+
+    config = {**played_data.manifest.config, "catalog": {"attributes": "hidden"}}
+    data, believed = copy.copy(played_data), []
+    monkeypatch.setattr(data, "manifest", replace(data.manifest, config=config))
+    nowhere = SimpleNamespace(reached=True, actions=())
+    monkeypatch.setattr(blind, "run_blind", lambda *args: believed.append(args[1]) or nowhere)
+    blind_planner(data)(data[0])
+    made = load_config(overrides=["catalog.attributes=hidden", "episodes.blind_expert=true"])
+    assert believed == [beliefs_for(catalogue(), made)]
+    assert believed[0]["Chair"].movable_share == 0.5
 
 
 def test_the_shortest_path_policy_touches_nothing_and_walks_the_shortest_way(played_data, rows):
@@ -172,8 +195,6 @@ def test_unknown_reference_policies_and_missing_experts(played_data, monkeypatch
 
 
 def test_an_episode_without_expert_is_a_failure_not_a_gap(played_data):
-    from dataclasses import replace
-
     from internav_data.evaluation.reference_policies import expert_actions
 
     assert expert_actions(replace(played_data[0], expert=None)) == (Action.DONE,)

@@ -72,6 +72,22 @@ def test_a_step_is_held_until_its_distance_and_slides_as_far_as_coulomb_says(mas
     assert not stepped.toppled
 
 
+@pytest.mark.parametrize("model", ["force", "step"])
+@pytest.mark.parametrize("depth_m", [0.24, 0.36])
+@pytest.mark.parametrize("friction", [0.4, 0.6])
+def test_what_is_pushed_topples_where_friction_exceeds_half_its_depth_over_its_middles_height(
+    model, depth_m, friction
+):
+    """About the middle, where the push acts, friction turns by its height, the floor by half the
+    depth at most. Neither the push's size nor its speed counts."""
+    tips_at_m = depth_m / friction
+    for height_m in (0.88 * tips_at_m, 1.12 * tips_at_m):
+        box = crate("Crate_0", (depth_m, 0.5, height_m), mass_kg=6.0, friction=friction)
+        pushed = push(Body.of(box, STANDING), 0, alone, PUSH_SPECS[model])
+        assert pushed.success
+        assert pushed.toppled == (height_m > tips_at_m)
+
+
 def test_a_step_moves_the_heaviest_as_far_as_its_time_allows():
     friction, spec = 0.5, PUSH_SPECS["step"]
     heavy = low_box(round(200.0 / (friction * GRAVITY + 0.2), 2), friction)  # gains 0.2 m/s²

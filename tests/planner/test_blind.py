@@ -2,10 +2,13 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from builders import UPRIGHT, crate, one_room
 
 from internav_data.catalog import catalogue
+from internav_data.catalog.attributes import DRAWS, hidden_attributes
+from internav_data.catalog.config import CatalogConfig
 from internav_data.episodes import build_episodes
 from internav_data.generation import generate_episodes, load_config
 from internav_data.houses import HouseConfig, build_house
@@ -95,6 +98,30 @@ def test_beliefs_of_a_type_are_averages_of_the_movable_ones():
     assert (belief.dynamics.pushable, belief.dynamics.pickable) == (True, False)
     none = type_beliefs([safe], FORCE)["Bin"]
     assert (none.movable_share, none.dynamics.pushable) == (0.0, False)
+
+
+def test_beliefs_where_attributes_are_hidden_are_averages_of_what_may_be_drawn():
+    """Half of what is pushed is bolted, whatever its asset; averages of 4,000 objects agree."""
+    spawnable = tuple(catalogue().spawnable)
+    for strength in (0.0, 0.4, 1.0):
+        hidden = hidden_attributes(CatalogConfig("hidden", strength), spawnable)
+        beliefs = type_beliefs(spawnable, FORCE, hidden)
+        for kind in ("Chair", "Apple", "SideTable"):
+            assets = catalogue().of_type(kind)
+            rows = np.random.default_rng(3).random((4_000, DRAWS)).tolist()
+            drawn = [hidden.dynamics(assets[k % len(assets)], row) for k, row in enumerate(rows)]
+            able = [
+                d
+                for d in drawn
+                if d.pickable or (d.pushable and d.friction * d.mass_kg < 200 / 9.81)
+            ]
+            belief = beliefs[kind]
+            assert belief.movable_share == pytest.approx(len(able) / len(drawn), abs=0.03)
+            mean_kg = sum(d.mass_kg for d in able) / len(able)
+            assert belief.dynamics.mass_kg == pytest.approx(mean_kg, rel=0.05)
+            assert belief.dynamics.pickable == able[0].pickable
+    assert type_beliefs(spawnable, FORCE)["Stool"].movable_share > 0.9
+    assert beliefs["Stool"].movable_share <= 0.5
 
 
 def test_a_failure_speaks_against_the_type_and_a_success_for_it():

@@ -26,7 +26,7 @@ def test_tables_are_those_of_the_catalogue():
     assert dict(attributes.FIXED_SHARES) == checked.FIXED
     assert attributes.MASS_FACTORS == checked.MASSES
     assert attributes.FRICTION_SIXTHS == checked.SIXTHS
-    hidden = hidden_attributes(CatalogConfig("hidden"), catalogue())
+    hidden = hidden_attributes(CatalogConfig("hidden"), catalogue().spawnable)
     assert hidden is not None
     derived = levels_by_type(catalogue().assets.values())
     assert set(derived) == set(hidden.types)
@@ -39,7 +39,7 @@ def test_tables_are_those_of_the_catalogue():
 
 def furniture(strength, count=600, wrong=None):
     """Chairs and tables whose attributes are drawn as the generator does, `wrong` changed."""
-    hidden = hidden_attributes(CatalogConfig("hidden", strength), catalogue())
+    hidden = hidden_attributes(CatalogConfig("hidden", strength), catalogue().spawnable)
     assets = catalogue().of_type("Chair") + catalogue().of_type("Sofa")
     rows = np.random.default_rng(4).random((count, attributes.DRAWS)).tolist()
     objects = []
