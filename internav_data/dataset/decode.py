@@ -7,8 +7,10 @@ of microseconds, and each row of a table no more.
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
@@ -94,10 +96,8 @@ def schema_difference(got: pa.Schema, expected: pa.Schema) -> str:
     return f"of another type: {changed}" if changed else "in another order"
 
 
-FEW = 5
-"""Number of records from which on fields are set column by column."""
-Maker = Callable[[Sequence[Sequence[Any]], int], list[Any]]
-"""Function from columns, and the number of their rows, to records."""
+Maker = Callable[[Sequence[Sequence[Any]]], list[Any]]
+"""Function from columns, one at least, to records."""
 
 
 def _maker(cls: type[Any], extra: Mapping[str, Any]) -> Maker:
@@ -105,21 +105,27 @@ def _maker(cls: type[Any], extra: Mapping[str, Any]) -> Maker:
 
     `extra` gives the fields that are not stored, the same for every record.
     """
-    stored = [field.name for field in record_node(cls).fields]
-    setters = [cls.__dict__[name].__set__ for name in (*stored, *extra)]
+    names = (*(field.name for field in record_node(cls).fields), *extra)
+    twin = _twin(cls, names)  # type: ignore[arg-type] # any class can be hashed
     repeated = [itertools.repeat(value) for value in extra.values()]
 
-    def made(columns: Sequence[Sequence[Any]], count: int) -> list[Any]:
-        if count < FEW:
-            return [cls(*row, **extra) for row in zip(*columns, strict=True)]
-        # The constructor of a frozen dataclass calls object.__setattr__ for each field, which takes
-        # twice as long as the slots themselves. A setter returns None, so that any() runs through.
-        records = [object.__new__(cls) for _ in range(count)]
-        for setter, column in zip(setters, (*columns, *repeated), strict=True):
-            any(map(setter, records, column))
+    def made(columns: Sequence[Sequence[Any]]) -> list[Any]:
+        records: list[Any] = list(map(twin, *columns, *repeated))
+        for record in records:
+            record.__class__ = cls
         return records
 
     return made
+
+
+@cache
+def _twin(cls: type[Any], names: tuple[str, ...]) -> type[Any]:
+    """Return a class with the slots of a frozen dataclass, whose instances can become records.
+
+    Its constructor takes the fields in the order of `names`.
+    """
+    # That of a frozen dataclass calls object.__setattr__ for each field: ten times an assignment.
+    return dataclasses.make_dataclass(cls.__name__, names, slots=True)
 
 
 class _NumberCursor:
@@ -181,7 +187,7 @@ class _RecordCursor:
                 columns[place] = values
         for place, reader in self._others:
             columns[place] = reader.take(start, stop)
-        return self._make(columns, stop - start)
+        return self._make(columns)
 
 
 class _ListCursor:

@@ -61,7 +61,8 @@ class InflatedPolygons:
     ) -> None:
         array = np.array(polygons, dtype=object)
         outer: Geometry = shapely.union_all(shapely.buffer(array, radius_m, quad_segs=chords))
-        self.core = shapely.union_all(shapely.buffer(array, radius_m - SKIN_M, quad_segs=chords))
+        # A union takes forty times as long as the rim of one.
+        self.core = shapely.buffer(outer, -SKIN_M, quad_segs=chords)
         shapely.prepare(self.core)
         if interior is not None:
             outer = _enclosed(outer, *interior)
@@ -235,11 +236,12 @@ class _AStar:
         self, batch: Ints, best: Floats, max_length: float
     ) -> tuple[Ints, Ints, Floats]:
         """Pairs (of the batch, of all points) that may shorten a path, and its length."""
-        rays = self.points[None, :, :] - self.points[batch][:, None, :]
-        ahead = best[batch][:, None] + np.sqrt(rays[..., 0] ** 2 + rays[..., 1] ** 2)
-        useful = (ahead < best - EPSILON_M2) & (ahead + self.heuristic <= max_length)
-        k, second = np.nonzero(useful)
-        rays = rays[k, second]
+        x, y = self.points.T
+        dx, dy = x - x[batch, None], y - y[batch, None]
+        ahead = best[batch, None] + np.sqrt(dx * dx + dy * dy)
+        limit = np.minimum(best - EPSILON_M2, max_length - self.heuristic)
+        k, second = np.nonzero(ahead < limit)
+        rays = np.column_stack([dx[k, second], dy[k, second]])
         touch = np.ones(len(k), dtype=np.bool_)
         for corner in (second, batch[k]):
             # A path touches a corner without cutting in: its neighbours lie on one side.
