@@ -9,8 +9,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.set-up
 BARE := .venv-bare
+OTHER := .venv-other
 LOWEST := .venv-lowest
-# The interpreter to use; empty: the first CPython 3.11 found.
+# The interpreter to use; empty: CPython 3.11 if there is one, else the newest of 3.12 to 3.14.
 PYTHON ?=
 # More for pytest, as in `make test ARGS='-k lattice -x'`.
 ARGS ?=
@@ -22,23 +23,23 @@ help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
 
 define NO_PYTHON
-No CPython 3.11 was found (looked for python3.11, python3 and python on PATH).
+No CPython 3.11 to 3.14 that can make virtual environments was found (looked for python3.11,
+python3.14, python3.13, python3.12, python3 and python on PATH).
 
-The physics engine, pybullet, has ready-made wheels for CPython 3.11 and older only. Either
-  install 3.11     apt install python3.11 python3.11-venv | brew install python@3.11 |
-                   pyenv install 3.11 | uv python install 3.11 | conda create -n py311 python=3.11
-                   and run make again, or make PYTHON=/path/to/python3.11
-  or use a newer one, with a C++ compiler: make PYTHON=python3.12
-                   (pip then compiles pybullet, which takes 5 to 9 minutes once)
+Install one      apt install python3-venv | brew install python | pyenv install 3.13 |
+                 uv python install 3.13 | conda create -n internav python=3.13
+and run make again, or name one: make PYTHON=/path/to/python3.13
 endef
 export NO_PYTHON
 
 # Finds $python, makes the virtual environment $(1) with it unless there is a working one.
+# 3.11 comes first, as both physics engines have wheels for it; then the newest.
 define VIRTUAL_ENVIRONMENT
 python="$(PYTHON)"; \
-for candidate in python3.11 python3 python; do \
+for candidate in python3.11 python3.14 python3.13 python3.12 python3 python; do \
   if [ -z "$$python" ] && "$$candidate" -c \
-    'import sys; sys.exit(sys.version_info[:2] != (3, 11))' >/dev/null 2>&1; then \
+    'import ensurepip, sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' \
+    >/dev/null 2>&1; then \
     python=$$candidate; \
   fi; \
 done; \
@@ -54,9 +55,6 @@ endef
 $(STAMP): pyproject.toml constraints.txt
 	@$(call VIRTUAL_ENVIRONMENT,$(VENV)); \
 	echo "Setting up $(VENV) with $$($(BIN)/python --version); about a minute, once ..." >&2; \
-	if ! $(BIN)/python -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))'; then \
-	  echo "pybullet has no wheel for this version: compiling it takes 5 to 9 minutes." >&2; \
-	fi; \
 	$(BIN)/python -m pip install -qq --disable-pip-version-check --no-input \
 	  --constraint constraints.txt --editable '.[dev]'; \
 	touch $(STAMP)
@@ -126,6 +124,16 @@ test-bare: ## run the loader's tests with nothing but numpy and pyarrow installe
 	$(BARE)/bin/python -m pytest -q $(ARGS) tests/test_import.py tests/dataset \
 	  --ignore tests/dataset/test_json_schemas.py -k 'not (pandas or duckdb or polars)'
 
+OTHER_TESTS := tests/physics tests/generation tests/dataset tests/core tests/test_import.py
+
+.PHONY: test-other
+test-other: ## run tests of physics, generation and the loader with PYTHON=another, without torch
+	@$(call VIRTUAL_ENVIRONMENT,$(OTHER)); \
+	$(OTHER)/bin/python -m pip install -qq --disable-pip-version-check --no-input \
+	  --constraint constraints.txt --editable '.[generate,meshes]' \
+	  gymnasium hypothesis jsonschema psutil pytest pytest-xdist
+	$(OTHER)/bin/python -m pytest $(TESTS) -k 'not (pandas or duckdb or polars)' $(ARGS) $(OTHER_TESTS)
+
 LOWEST_TESTS := tests/dataset/test_loader.py tests/dataset/test_stream.py tests/core \
   tests/geometry tests/catalog tests/evaluation/test_statistics.py tests/verification/test_mutations.py \
   tests/cli/test_commands.py tests/envs/test_copies.py tests/camp/test_networks.py tests/camp/test_stages.py
@@ -137,6 +145,10 @@ test-lowest: ## run a part of every room's tests with the lowest versions that p
 	  --constraint constraints-lowest.txt --editable '.[all]' \
 	  hypothesis jsonschema psutil pytest pytest-xdist
 	$(LOWEST)/bin/python -m pytest $(TESTS) -k 'not (pandas or duckdb or polars)' $(LOWEST_TESTS) $(ARGS)
+
+.PHONY: wheels
+wheels: $(STAMP) ## ask the package index for wheels, each platform and Python; downloads 5 GB
+	$(BIN)/python -m pytest -q -m slow $(ARGS) tests/test_wheels.py
 
 .PHONY: wheel-test
 wheel-test: $(STAMP) ## build wheel and sdist, try the wheel in an environment of its own; ARGS=quick
