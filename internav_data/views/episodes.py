@@ -10,7 +10,7 @@ import numpy as np
 from internav_data.records.agent import AGENT
 from internav_data.records.errors import UsageError
 from internav_data.views.captions import with_caption
-from internav_data.views.plan import INK, PAPER, TINT, house_canvas, paint_house, paint_labels
+from internav_data.views.plan import INK, PAPER, house_canvas, paint_house, paint_labels
 from internav_data.views.silhouettes import Silhouette, paint, shaded, silhouettes
 
 if TYPE_CHECKING:
@@ -31,6 +31,8 @@ _RIM: RGB = (48, 36, 8)
 START: RGB = (40, 148, 84)
 GOAL: RGB = (36, 104, 214)
 _PATH: RGB = (150, 70, 150)
+_ROOM_PATH: RGB = (164, 195, 246)
+"""Swatch of the tinted rooms: pale as they are, not to be taken for the goal."""
 _SHORTEST_PATH: RGB = (36, 104, 214)
 _RADIUS_M = AGENT.radius_m
 _SMALL_M = 0.3
@@ -137,7 +139,8 @@ def obstacle_kind(obstacle: Obstacle) -> ObstacleKind:
 
 def _legend(episode: Episode) -> list[tuple[RGB, str]]:
     kinds = {obstacle_kind(o) for o in episode.obstacles}
-    entries = [(START, "start"), (GOAL, "goal"), (TINT, "shortest room path"), (_PATH, "node path")]
+    entries = [(START, "start"), (GOAL, "goal"), (_ROOM_PATH, "shortest room path")]
+    entries.append((_PATH, "node path, straight from door to door"))
     return entries + [(COLOURS[k], f"{NAMES[k]} obstacle") for k in NAMES if k in kinds]
 
 

@@ -34,6 +34,8 @@ _LABEL: RGB = (70, 66, 62)
 _MARGIN_M = 0.75
 _WALL_M = 0.12
 _RUG_M = 0.05
+_SCALE_HIGH_M, _SCALE_TEXT_M = 0.09, 2.12
+_BESIDE_M = 0.1
 _OVERHEAD_M = 1.95
 """Height above which a hanging object is left out: it would hide those below."""
 
@@ -88,7 +90,7 @@ def paint_house(
     """Paint floors, shadows, objects, walls, windows and doors, in this order; then a scale.
 
     With `on_path`, these rooms are tinted and the other rooms' floors pale. The scale's lower left
-    corner is below the house's, or at `scale_at`.
+    corner is outside the house, clear of the entrance's arrow, or at `scale_at`.
     """
     for room in house.rooms:
         paint_floor(canvas, house, room)
@@ -115,8 +117,7 @@ def paint_house(
         _paint_door(canvas, house, door)
     for window in house.windows:
         _paint_window(canvas, window)
-    below = (min(p[0] for p in house.outline), min(p[1] for p in house.outline) - 0.45)
-    _paint_scale(canvas, scale_at or below)
+    _paint_scale(canvas, scale_at or _scale_place(canvas, house))
 
 
 def _rectangle(wall: Wall) -> list[Vec2]:
@@ -168,13 +169,9 @@ def _paint_door(canvas: Canvas, house: House, door: Door) -> None:
         return
     canvas.fill(_band(frame, door.width_m, _WALL_M * 0.9), (150, 104, 70))
     canvas.line(_band(frame, door.width_m, _WALL_M), _ENTRANCE, 1.4, closed=True)
-    inward = 1.0 if _in_some_room(house, at + across * 0.3) else -1.0
-    inwards, aside = across * inward, along * 0.16
-    tip = at - inwards * 0.14
-    canvas.fill(
-        np.array([tip, tip - inwards * 0.24 + aside, tip - inwards * 0.24 - aside]), _ENTRANCE
-    )
-    canvas.line(np.array([tip - inwards * 0.44, tip - inwards * 0.2]), _ENTRANCE, 2.0)
+    head, shaft = _arrow(house, door)
+    canvas.fill(head, _ENTRANCE)
+    canvas.line(shaft, _ENTRANCE, 2.0)
 
 
 def _in_some_room(house: House, point: Floats) -> bool:
@@ -190,13 +187,51 @@ def _paint_window(canvas: Canvas, window: Window) -> None:
     canvas.line(_band(frame, window.width_m, _WALL_M), _WALL, 0.8, closed=True)
 
 
+def _arrow(house: House, door: Door) -> tuple[Floats, Floats]:
+    """Head (3, 2) and shaft (2, 2) of the arrow outside a closed door, towards it."""
+    along, across, at = _frame(door.x, door.y, door.yaw_deg)
+    inwards = across * (1.0 if _in_some_room(house, at + across * 0.3) else -1.0)
+    aside, tip = along * 0.16, at - inwards * 0.14
+    head = np.array([tip, tip - inwards * 0.24 + aside, tip - inwards * 0.24 - aside])
+    return head, np.array([tip - inwards * 0.44, tip - inwards * 0.2])
+
+
+def _scale_place(canvas: Canvas, house: House) -> Vec2:
+    """Return the lower left corner of the scale: below the house, else above it.
+
+    At either end of the side, whichever no arrow of an entrance lies across.
+    """
+    xs, ys = [p[0] for p in house.outline], [p[1] for p in house.outline]
+    right = max(xs) - _scale_width(canvas)
+    places = [(x, y) for y in (min(ys) - 0.45, max(ys) + 0.36) for x in (min(xs), right)]
+    arrows = [np.vstack(_arrow(house, door)) for door in house.doors if not door.open]
+    return next((p for p in places if not any(_on_scale(canvas, p, a) for a in arrows)), places[0])
+
+
+def _on_scale(canvas: Canvas, at: Vec2, points: Floats) -> bool:
+    """Return whether the box of some points (n, 2) comes near a scale."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    return bool(
+        at[0] - _BESIDE_M < high[0]
+        and low[0] < at[0] + _scale_width(canvas) + _BESIDE_M
+        and at[1] - _BESIDE_M < high[1]
+        and low[1] < at[1] + _SCALE_HIGH_M + _BESIDE_M
+    )
+
+
+def _scale_width(canvas: Canvas) -> float:
+    return _SCALE_TEXT_M + canvas.text_width("2 m", 8.0)
+
+
 def _paint_scale(canvas: Canvas, at: Vec2) -> None:
     """Draw a bar of two metres."""
     x, y = at
     for k, colour in ((0, INK), (1, PAPER)):
-        canvas.fill([(x + k, y), (x + k + 1, y), (x + k + 1, y + 0.09), (x + k, y + 0.09)], colour)
-    canvas.line([(x, y), (x + 2, y), (x + 2, y + 0.09), (x, y + 0.09)], INK, 1.0, closed=True)
-    canvas.text((x + 2.12, y + 0.045), "2 m", 8.0, INK, anchor="left", halo=PAPER)
+        left, high = x + k, y + _SCALE_HIGH_M
+        canvas.fill([(left, y), (left + 1, y), (left + 1, high), (left, high)], colour)
+    top = y + _SCALE_HIGH_M
+    canvas.line([(x, y), (x + 2, y), (x + 2, top), (x, top)], INK, 1.0, closed=True)
+    canvas.text((x + _SCALE_TEXT_M, y + _SCALE_HIGH_M / 2.0), "2 m", 8.0, INK, anchor="left", halo=PAPER)
 
 
 def paint_labels(canvas: Canvas, house: House, taken: Sequence[Floats]) -> None:

@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 
 from internav_data.records.errors import UsageError
 from internav_data.views import draw_episode, draw_house, episode_lines
-from internav_data.views.plan import house_canvas
+from internav_data.views.episodes import _legend
+from internav_data.views.plan import _arrow, _scale_place, _scale_width, house_canvas
 
 MARGIN = 0.75
 PIXELS = 900
@@ -145,3 +147,34 @@ def test_a_fixed_obstacle_is_hatched(hand_house, hand_episode):
 def test_the_canvas_leaves_a_margin_around_the_outline(hand_house):
     canvas = house_canvas(hand_house, PIXELS)
     assert canvas.scale == pytest.approx(SCALE)
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "yaw_deg", "place"),
+    [
+        (4.0, 0.0, 0.0, "left"),
+        (1.0, 0.0, 0.0, "right"),
+        (8.0, 0.0, 0.0, "left"),
+        (4.0, 4.0, 0.0, "left"),
+        (9.0, 0.6, 90.0, "left"),
+    ],
+)
+def test_the_scale_keeps_clear_of_the_entrances_arrow(hand_house, x, y, yaw_deg, place):
+    entrance = next(door for door in hand_house.doors if not door.open)
+    moved = replace(entrance, x=x, y=y, yaw_deg=yaw_deg)
+    rest = tuple(door for door in hand_house.doors if door.open)
+    house = replace(hand_house, doors=(*rest, moved))
+    canvas = house_canvas(house, PIXELS)
+    width = _scale_width(canvas)
+    found = _scale_place(canvas, house)
+    assert found == ((0.0 if place == "left" else 9.0 - width), pytest.approx(-0.45))
+    arrow = np.vstack(_arrow(house, moved))
+    bar = shapely.box(*found, found[0] + width, found[1] + 0.09)
+    assert shapely.distance(bar, shapely.MultiPoint(arrow).convex_hull) > 0.05
+
+
+def test_the_legends_colours_differ(hand_episode):
+    entries = [np.array(colour, float) for colour, _ in _legend(hand_episode)]
+    for k, one in enumerate(entries):
+        for other in entries[k + 1 :]:
+            assert np.linalg.norm(one - other) > 40.0
