@@ -231,7 +231,9 @@ def _paint_scale(canvas: Canvas, at: Vec2) -> None:
         canvas.fill([(left, y), (left + 1, y), (left + 1, high), (left, high)], colour)
     top = y + _SCALE_HIGH_M
     canvas.line([(x, y), (x + 2, y), (x + 2, top), (x, top)], INK, 1.0, closed=True)
-    canvas.text((x + _SCALE_TEXT_M, y + _SCALE_HIGH_M / 2.0), "2 m", 8.0, INK, anchor="left", halo=PAPER)
+    canvas.text(
+        (x + _SCALE_TEXT_M, y + _SCALE_HIGH_M / 2.0), "2 m", 8.0, INK, anchor="left", halo=PAPER
+    )
 
 
 def paint_labels(canvas: Canvas, house: House, taken: Sequence[Floats]) -> None:
