@@ -11,6 +11,7 @@ STAMP := $(VENV)/.set-up
 BARE := .venv-bare
 OTHER := .venv-other
 LOWEST := .venv-lowest
+INTEROP := .venv-interop
 # The interpreter to use; empty: CPython 3.11 if there is one, else the newest of 3.12 to 3.14.
 PYTHON ?=
 # More for pytest, as in `make test ARGS='-k lattice -x'`.
@@ -133,6 +134,13 @@ test-other: ## run tests of physics, generation and the loader with PYTHON=anoth
 	  --constraint constraints.txt --editable '.[generate,meshes]' \
 	  gymnasium hypothesis jsonschema psutil pytest pytest-xdist
 	$(OTHER)/bin/python -m pytest $(TESTS) -k 'not (pandas or duckdb or polars)' $(ARGS) $(OTHER_TESTS)
+
+.PHONY: test-interop
+test-interop: ## read datasets with the newest datasets and mlcroissant, upload with huggingface_hub
+	@$(call VIRTUAL_ENVIRONMENT,$(INTEROP)); \
+	$(INTEROP)/bin/python -m pip install -qq --disable-pip-version-check --no-input --upgrade \
+	  --editable . click pytest hypothesis datasets huggingface_hub mlcroissant pyyaml
+	$(INTEROP)/bin/python -m pytest -q $(ARGS) tests/interop tests/dataset/test_hugging_face.py
 
 LOWEST_TESTS := tests/dataset/test_loader.py tests/dataset/test_stream.py tests/core \
   tests/geometry tests/catalog tests/evaluation/test_statistics.py tests/verification/test_mutations.py \

@@ -27,6 +27,7 @@ COMMANDS = {
     "stats": "Print statistics of a dataset, beside the paper's Table 2.",
     "show": "Draw a house or an episode from above as a PNG.",
     "replay": "Record a video of an episode: the agent's camera beside the map.",
+    "upload": "Upload a dataset to the Hugging Face hub; print the plan first.",
     "schema": "Print the JSON Schemas of every row and file.",
     "assets": "List the assets: obstacles and furniture.",
     "doctor": "Check that this machine can generate datasets.",

@@ -24,6 +24,7 @@ EXTRAS: Final = {
     "safetensors": "train",
     "torch": "train",
     "tensorboard": "tensorboard",
+    "huggingface_hub": "hub",
 }
 """Extra that installs each module on every machine; none for what every installation has."""
 DISTRIBUTIONS: Final = {"cv2": "opencv-python-headless", "mujoco": "mujoco-core"}

@@ -6,6 +6,7 @@ import json
 from typing import TYPE_CHECKING
 
 from internav_data.core.field_docs import descriptions
+from internav_data.dataset.croissant import LICENCE, citation
 from internav_data.dataset.nodes import Coordinates, Field, Keyed, Leaf, Node, Record
 from internav_data.dataset.tables import EPISODES, SCENES, TableSpec
 
@@ -29,6 +30,7 @@ def card_text(manifest: Manifest, stats: Stats) -> str:
         _table2(stats),
         _interactions(stats),
         _use(),
+        _limits(manifest),
         "## Columns of an episode\n\n" + _columns(EPISODES),
         "## Columns of a scene\n\n" + _columns(SCENES),
         _origin(manifest),
@@ -42,6 +44,7 @@ def _front_matter(manifest: Manifest) -> str:
     lines = [
         "---",
         "pretty_name: Interactive navigation episodes",
+        f"license: {LICENCE.lower()}",
         f"size_categories: [{json.dumps(size)}]",
         "task_categories: [robotics, reinforcement-learning]",
         "tags: [embodied-ai, interactive-navigation, indoor-scenes, procedural-generation]",
@@ -75,8 +78,13 @@ blocked ones {share} let nothing through off the 0.25 m lattice either (`sealed`
 
 Metres, kilograms, seconds, degrees; right-handed, z up, yaw 0 along +x, counter-clockwise;
 quaternions are (x, y, z, w). `schemas/` holds a JSON Schema of each row, `stats.json` more figures,
-`manifest.json` every file with its sha256.
+`manifest.json` every file with its sha256, `croissant.json` the same for machines, `eval.yaml` the
+tasks of evaluation results. The data take {_megabytes(manifest)} MB in {len(manifest.files)} files.
 """
+
+
+def _megabytes(manifest: Manifest) -> str:
+    return f"{sum(file.bytes for file in manifest.files) / 1e6:.1f}"
 
 
 def _table2(stats: Stats) -> str:
@@ -131,9 +139,16 @@ episode = ds[0]
 house = ds.scene(episode.scene_id)
 ```
 
-It is plain Parquet: `datasets.load_dataset("path/to/this/folder", "episodes")` of Hugging Face
-reads the files that are listed above, and pandas, Polars and DuckDB those that `manifest.json`
-names:
+The folder is a dataset repository of Hugging Face, on the hub or on disk. Configurations are
+`episodes`, `scenes` and `assets`; splits are those of the table above.
+
+```python
+import datasets
+
+episodes = datasets.load_dataset("path/to/this/folder", "episodes", split="train", streaming=True)
+```
+
+It is plain Parquet: pandas, Polars, DuckDB and pyarrow read the files that `manifest.json` names:
 
 ```python
 import json
@@ -141,6 +156,30 @@ import polars
 
 files = json.load(open("manifest.json"))["files"]
 episodes = polars.read_parquet([f["path"] for f in files if f["table"] == "episodes"])
+```
+"""
+
+
+def _limits(manifest: Manifest) -> str:
+    return f"""
+## Limits
+
+- Everything is generated: houses, furniture of convex parts in plain materials, rigid bodies. No
+  scan, no photograph, no person: nothing here is personal data, and looks are no measure of homes.
+- Physics is an engine's, in contacts and friction too. Outcomes say what one push or pickup does
+  with all else as the episode starts, not what a later one does.
+- `outcomes`, `mass_kg`, `friction`, `pushable` and the experts are privileged: an agent that is to
+  act on what it sees must not be given them.
+- Distances on the lattice are about a quarter longer than Euclidean ones; SPL counts the latter.
+- Draws for which the expert found no plan were drawn again: the rest is solvable by its means.
+- All episodes of a scene share its house: splits are by scene; never divide them by episode.
+
+## Licence and citation
+
+{LICENCE}, as the generator. Meshes that you had it add keep their own licence: say so here.
+
+```bibtex
+{citation(manifest)}
 ```
 """
 

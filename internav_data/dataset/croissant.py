@@ -1,4 +1,4 @@
-"""croissant.json: the dataset in the vocabulary of ML Commons' Croissant 1.0."""
+"""croissant.json: the dataset in the vocabulary of ML Commons' Croissant 1.1."""
 
 from __future__ import annotations
 
@@ -19,11 +19,14 @@ _CONTEXT: dict[str, Any] = {
     "cr": "http://mlcommons.org/croissant/",
     "rai": "http://mlcommons.org/croissant/RAI/",
     "dct": "http://purl.org/dc/terms/",
+    "arrayShape": "cr:arrayShape",
     "citeAs": "cr:citeAs",
     "column": "cr:column",
     "conformsTo": "dct:conformsTo",
+    "containedIn": "cr:containedIn",
     "data": {"@id": "cr:data", "@type": "@json"},
     "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
+    "description": {"@container": "@language"},
     "equivalentProperty": "cr:equivalentProperty",
     "examples": {"@id": "cr:examples", "@type": "@json"},
     "extract": "cr:extract",
@@ -33,10 +36,12 @@ _CONTEXT: dict[str, Any] = {
     "fileSet": "cr:fileSet",
     "format": "cr:format",
     "includes": "cr:includes",
+    "isArray": "cr:isArray",
     "isLiveDataset": "cr:isLiveDataset",
     "jsonPath": "cr:jsonPath",
     "key": "cr:key",
     "md5": "cr:md5",
+    "name": {"@container": "@language"},
     "parentField": "cr:parentField",
     "path": "cr:path",
     "recordSet": "cr:recordSet",
@@ -50,6 +55,8 @@ _CONTEXT: dict[str, Any] = {
     "subField": "cr:subField",
     "transform": "cr:transform",
 }
+LICENCE = "Apache-2.0"
+"""SPDX identifier of the licence of what is generated; meshes of a user's own keep theirs."""
 _TYPES = {"string": "sc:Text", "bool": "sc:Boolean", "float64": "sc:Float"}
 
 
@@ -62,12 +69,24 @@ def croissant(manifest: Manifest) -> dict[str, Any]:
         "name": "interactive-navigation-episodes",
         "description": "Interactive-navigation episodes in generated houses: obstacles, settled "
         "by physics, block or lengthen an agent's path to its goal.",
-        "conformsTo": "http://mlcommons.org/croissant/1.0",
+        "conformsTo": "http://mlcommons.org/croissant/1.1",
+        "license": f"https://spdx.org/licenses/{LICENCE}.html",
+        "citeAs": citation(manifest),
+        "isLiveDataset": False,
         "version": f"{FORMAT_VERSION}.0.0",
         "distribution": [_file(f) for f in manifest.files]
         + [_file_set(spec, manifest) for spec in tables],
         "recordSet": [_record_set(spec) for spec in tables],
     }
+
+
+def citation(manifest: Manifest) -> str:
+    """Return a BibTeX entry of a dataset, without a date: the same seed gives the same bytes."""
+    return (
+        "@misc{internav_data, author = {The internav authors}, "
+        f"title = {{internav-data {manifest.generator_version}: interactive-navigation episodes, "
+        f"seed {manifest.seed}}}}}"
+    )
 
 
 def _file(file: DataFile) -> dict[str, Any]:

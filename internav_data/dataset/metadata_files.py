@@ -1,4 +1,4 @@
-"""Metadata files beside the data: dataset card, croissant, statistics and schemas."""
+"""Metadata files beside the data: card, croissant, evaluation tasks, statistics and schemas."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from internav_data.dataset.card import card_text
 from internav_data.dataset.croissant import croissant
+from internav_data.dataset.eval_yaml import eval_text
 from internav_data.dataset.jsonschemas import schema_text, schemas
 from internav_data.dataset.manifest import MetadataFile
 from internav_data.dataset.stats import stats_of
@@ -23,6 +24,7 @@ METADATA = frozenset(
     (
         "README.md",
         "croissant.json",
+        "eval.yaml",
         "stats.json",
         *(
             f"schemas/{name}.schema.json"
@@ -34,12 +36,13 @@ METADATA = frozenset(
 
 
 def metadata_blobs(store: Store, manifest: Manifest) -> dict[str, bytes]:
-    """Return README.md, croissant.json, stats.json and schemas/ by name, for files in place."""
+    """Return all files of `METADATA` by name, for data in place."""
     stats = stats_of(store, manifest)
     description = json.dumps(croissant(manifest), indent=1, ensure_ascii=False) + "\n"
     texts = {
         "README.md": card_text(manifest, stats),
         "croissant.json": description,
+        "eval.yaml": eval_text(manifest),
         "stats.json": json.dumps(asdict(stats), indent=1) + "\n",
         **{f"schemas/{name}": schema_text(schema) for name, schema in schemas().items()},
     }

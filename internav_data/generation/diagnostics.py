@@ -83,6 +83,7 @@ _USES = {
     "meshes": "needed only for meshes of your own: ",
     "train": "needed only for environments, training and evaluation: ",
     "tensorboard": "needed only for TensorBoard's files: ",
+    "hub": "needed only for `internav-gen upload`: ",
 }
 """Uses of the extras that generating and validating do without."""
 
