@@ -105,8 +105,10 @@ def test_actions_and_names_of_engines_need_nothing_heavy():
     code = """
 from internav_data.episodes import EpisodeConfig
 from internav_data.physics import ENGINES
+from internav_data.physics.config import PhysicsConfig
 from internav_data.world import ACTIONS, Action, StepResult
 EpisodeConfig().check()
+PhysicsConfig().check()
 """
     assert not modules_after(code) & HEAVY
 

@@ -240,7 +240,7 @@ def _dataset(given: dict[str, Any]) -> Dataset[Any]:
     if given["episodes_per_scene"] is not None:
         filters.append(("index", "<", given["episodes_per_scene"]))
     split = None if given["split"] == "all" else given["split"]
-    return load_dataset(dataset_to_read(given["dataset"]), split, filters or None)
+    return load_dataset(dataset_to_read(given["dataset"], solves=True), split, filters or None)
 
 
 def _settings(given: dict[str, Any]) -> EvaluationConfig:

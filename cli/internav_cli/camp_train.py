@@ -163,7 +163,7 @@ def _request(given: dict[str, Any]) -> Request:
     words = (given["stages"] or ",".join(PARTS)).replace(" ", "").split(",")
     parts = () if words == [CLONING] else tuple(words)
     return Request(
-        dataset=dataset_to_read(given["dataset"]),
+        dataset=dataset_to_read(given["dataset"], solves=True),
         out=given["out"] or Path("runs") / f"{method}-{config.seed}",
         method=method,
         config=config,

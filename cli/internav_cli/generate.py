@@ -12,12 +12,14 @@ from internav_cli.options import (
     JSON,
     config_from,
     config_options,
+    engine_is_named,
     name_dataset,
     positive,
     progress,
 )
 
 if TYPE_CHECKING:
+    from internav_data.generation import GenerationConfig
     from internav_data.generation.report import Report
 
 MAX_NAMED_SCENES = 10
@@ -129,7 +131,9 @@ def command(
 
         click.echo(config_toml(config), nl=False)
         return 0
+    keep = engine_is_named(**settings)
     if scene is not None:
+        config = config if keep or out is None else _with_held_engine(config, out)
         from internav_data.generation.reproduce import scene_again
 
         text, verdict = scene_again(config, scene, episode, out)
@@ -144,7 +148,8 @@ def command(
         made = forecast(config, scenes, workers or 0, progress())
         click.echo(made.to_json() if as_json else made.summary())
         return 0
-    name_dataset(out)
+    config = config if keep else _with_held_engine(config, out)
+    name_dataset(out, config.physics.engine)
     from internav_data.dataset import dataset_folder
     from internav_data.generation import generate
 
@@ -159,6 +164,14 @@ def command(
         retry_quarantined=retry_quarantined,
     )
     return _print_report(report, as_json=as_json)
+
+
+def _with_held_engine(config: GenerationConfig, out: Path | None) -> GenerationConfig:
+    """Return the config with the engine of the dataset that is to be continued, if there is one."""
+    from internav_data.dataset import dataset_folder
+    from internav_data.generation.run import with_held_engine
+
+    return with_held_engine(config, dataset_folder(out))
 
 
 def _print_report(report: Report, *, as_json: bool) -> int:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from internav_data.physics.engines import DEFAULT_ENGINE
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -51,6 +53,11 @@ _CONFIG = (
         metavar="ROOMS",
         help="A count (4), a range (2-5) or a programme (kitchen,living,bedroom:2).",
     ),
+    click.option(
+        "--physics",
+        type=click.Choice(["bullet", "mujoco"]),
+        help=f"Engine that settles and pushes.  [default: the dataset's, else {DEFAULT_ENGINE}]",
+    ),
     click.option("--floor-plan", metavar="FILE", help="A floor plan of your own (TOML or JSON)."),
     click.option(
         "--assets",
@@ -78,6 +85,7 @@ def config_from(
     floor_plan: str | None = None,
     folders: tuple[str, ...] = (),
     episode_preset: str | None = None,
+    physics: str | None = None,
     **more: Any,  # noqa: ANN401 - further settings by key, __ for a dot
 ) -> GenerationConfig:
     """Return the config that the options describe: preset, file, then options, then --set."""
@@ -88,6 +96,7 @@ def config_from(
         "house.preset": preset,
         "house.rooms": rooms,
         "house.floor_plan": floor_plan,
+        "physics.engine": physics,
         "assets": list(folders) or None,
     } | {key.replace("__", "."): value for key, value in more.items()}
     chosen = {key: value for key, value in options.items() if value is not None}
@@ -96,36 +105,70 @@ def config_from(
     return config
 
 
-def dataset_to_read(given: Path | None) -> Path:
+def engine_is_named(
+    config_file: Path | None = None,
+    overrides: tuple[str, ...] = (),
+    physics: str | None = None,
+    **_: object,
+) -> bool:
+    """Return whether the options of `config_from` name a physics engine."""
+    from internav_data.core.config import keys_given
+
+    return physics is not None or "physics.engine" in keys_given(config_file, overrides, {})
+
+
+def dataset_to_read(given: Path | None, *, solves: bool = False) -> Path:
     """Return the folder of the dataset that a command reads, and name it on stderr.
 
     A folder without a dataset is left to the error that names it.
 
+    Parameters
+    ----------
+    given
+        Folder that the command was given; None for the default one.
+    solves
+        Whether the command solves physics: then the dataset's engine is named too, and has to be
+        installed.
+
     Raises
     ------
     CorruptDataError
-        There is no dataset in the default folder.
+        There is no dataset in the default folder, or its manifest is damaged.
+    MissingEngineError
+        The dataset's physics engine is not installed.
 
     """
     from internav_data.dataset import has_manifest, read_manifest
     from internav_data.dataset.location import MINI_FOLDER, folder_to_read
+    from internav_data.physics.engines.installed import require_engine
 
     folder = folder_to_read(given)
     if has_manifest(folder):
-        name_dataset(folder if folder == MINI_FOLDER else given)
+        engine = _engine_of(folder) if solves else ""
+        name_dataset(folder if folder == MINI_FOLDER else given, engine)
+        if engine:
+            require_engine(engine, str(folder))
     elif given is None:
         read_manifest(folder)  # raises: nothing is there, or nothing finished
     return folder
 
 
-def name_dataset(given: Path | None) -> None:
-    """Write on stderr which dataset a command takes, and why if none was named."""
+def _engine_of(folder: Path) -> str:
+    from internav_data.dataset import read_manifest
+    from internav_data.physics.config import PhysicsConfig
+
+    return PhysicsConfig.of_dataset(read_manifest(folder).config).engine
+
+
+def name_dataset(given: Path | None, engine: str = "") -> None:
+    """Write on stderr which dataset a command takes, why if none was named, and its engine."""
     from internav_data.dataset.location import dataset_folder, origin
 
     if os.environ.get("RANK", "0") != "0":
         return  # torchrun starts this program once a rank
     reason = origin(given)
-    click.echo(f"dataset: {dataset_folder(given)}" + (f" ({reason})" if reason else ""), err=True)
+    line = f"dataset: {dataset_folder(given)}" + (f" ({reason})" if reason else "")
+    click.echo(line + (f"; physics: {engine}" if engine else ""), err=True)
 
 
 def progress() -> GenerationProgress:

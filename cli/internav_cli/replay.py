@@ -97,7 +97,7 @@ def command(
     for path in paths:
         if path.exists() and not force:
             raise UsageError(f"{path}: is there already; choose another name, or pass --force")
-    folder = dataset_to_read(dataset)
+    folder = dataset_to_read(dataset, solves=True)
     house, task, assets, config = _stored(folder, *place)
     if given is None and task.expert is None:
         raise UsageError(

@@ -62,7 +62,7 @@ def command(
     from internav_data.verification import validate
 
     progress = _show_progress if sys.stderr.isatty() else None
-    folder = dataset_to_read(dataset)
+    folder = dataset_to_read(dataset, solves=level == "physics")
     findings = validate(folder, level, sample, workers or available_cores(), progress)
     if progress is not None:
         click.echo("\r\033[K", nl=False, err=True)

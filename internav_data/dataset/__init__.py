@@ -6,6 +6,7 @@ from internav_data.dataset.commit import (
     commit_scenes,
     done_scenes,
     end_staging,
+    held_config,
     identity_of,
     open_staging,
 )
@@ -83,6 +84,7 @@ __all__ = [
     "find_damage",
     "from_table",
     "has_manifest",
+    "held_config",
     "identity_of",
     "load_dataset",
     "locate",

@@ -43,6 +43,7 @@ from internav_data.dataset.staging import (
     IDENTITY,
     Identity,
     Staging,
+    any_staged,
     clear_staging,
     read_identity,
     remove_foreign,
@@ -78,6 +79,24 @@ def identity_of(manifest: Manifest) -> Identity:
         manifest.config,
         obstacle_shares=manifest.obstacle_shares or {},
     )
+
+
+def held_config(out: StoreLike) -> Mapping[str, Any] | None:
+    """Return the config of the dataset that a folder holds, or of its staged scenes; None for none.
+
+    Settings of earlier releases are at their present place.
+
+    Raises
+    ------
+    CorruptDataError
+        The manifest, or the identity of an unfinished dataset, is damaged.
+
+    """
+    store = store_of(out)
+    if has_manifest(store):
+        return read_manifest(store).config
+    begun = exists(store, IDENTITY) and any_staged(store)
+    return present_settings(read_identity(store).config) if begun else None
 
 
 def open_staging(

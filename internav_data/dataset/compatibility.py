@@ -15,7 +15,10 @@ import pyarrow as pa
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-MOVED_SETTINGS: Final = {("episodes", "push_model"): ("world", "push_model")}
+MOVED_SETTINGS: Final = {
+    ("episodes", "push_model"): ("world", "push_model"),
+    ("episodes", "engine"): ("physics", "engine"),
+}
 """Section and name of settings of earlier releases, and where they are today."""
 
 

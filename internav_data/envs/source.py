@@ -24,6 +24,8 @@ from internav_data.envs.auxiliary import auxiliary_starts
 from internav_data.envs.order import EpisodeOrder, scene_bounds
 from internav_data.geometry import round_m
 from internav_data.navigation import SPACING_M
+from internav_data.physics.config import PhysicsConfig
+from internav_data.physics.engines.installed import require_engine
 from internav_data.records.errors import UsageError
 from internav_data.render.camera import StaticScene
 from internav_data.world import HouseModel
@@ -118,9 +120,13 @@ class Source:
     ------
     UsageError
         Nothing is selected.
+    MissingEngineError
+        The dataset's physics engine is not installed.
     """
 
     def __init__(self, dataset: Dataset[Episode]) -> None:
+        engine = PhysicsConfig.of_dataset(dataset.manifest.config).engine
+        require_engine(engine, f"dataset {dataset.path}")
         self.dataset = dataset
         self.auxiliary_starts = lru_cache(STARTS_KEPT)(self._auxiliary_starts)
         if len(dataset) == 0:
@@ -203,6 +209,8 @@ def open_source(
         There is no dataset, or it is damaged.
     UsageError
         An unknown split, column or operator, or nothing selected.
+    MissingEngineError
+        The dataset's physics engine is not installed.
     """
     if not isinstance(dataset, str | Path):
         if dataset.columns is not None:

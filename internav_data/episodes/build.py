@@ -23,6 +23,7 @@ from internav_data.episodes.spawn import EpisodeDraft, spawn
 from internav_data.geometry import round_m
 from internav_data.navigation import SPACING_M, node_paths
 from internav_data.physics import get_solver
+from internav_data.physics.config import DEFAULT_PHYSICS
 from internav_data.planner.blind import run_blind
 from internav_data.planner.search import solve
 from internav_data.records import (
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 
     from internav_data.catalog.attributes import HiddenAttributes
     from internav_data.episodes.spawn import Spawned
+    from internav_data.physics.config import PhysicsConfig
     from internav_data.planner.beliefs import TypeBelief
     from internav_data.records import Asset, Expert, House, Outcome, Redraw
     from internav_data.world.config import WorldConfig
@@ -75,6 +77,7 @@ def build_episodes(
     attempt: int = 0,
     hidden: HiddenAttributes | None = None,
     beliefs: Mapping[str, TypeBelief] | None = None,
+    physics: PhysicsConfig = DEFAULT_PHYSICS,
 ) -> tuple[Episode, ...]:
     """Build the episodes first … first + count - 1 of a house.
 
@@ -100,11 +103,13 @@ def build_episodes(
     beliefs
         Beliefs about the catalogue's types (`planner.beliefs.type_beliefs`) of the blind expert;
         None for no such expert.
+    physics
+        Settings of physics: the engine.
 
     Raises
     ------
     UsageError
-        No physics engine has the config's name, or all assets have weight 0.
+        No physics engine has the name, or all assets have weight 0.
     QuarantineError
         An episode cannot be made within the bounds of the settings.
 
@@ -115,6 +120,7 @@ def build_episodes(
         attempt=attempt,
         hidden=hidden,
         beliefs=beliefs,
+        physics=physics,
     )
     return batch.episodes
 
@@ -131,6 +137,7 @@ def build_batch(
     hidden: HiddenAttributes | None = None,
     beliefs: Mapping[str, TypeBelief] | None = None,
     before_draw: Callable[[], None] = lambda: None,
+    physics: PhysicsConfig = DEFAULT_PHYSICS,
 ) -> EpisodeBatch:
     """Build episodes and count the discarded draws.
 
@@ -139,7 +146,7 @@ def build_batch(
     """
     config = config or EpisodeConfig()
     settings = _BatchSettings(world_config, beliefs, before_draw)
-    site, weighed = SpawnSite.of(house, hidden), ObstaclePool.of(pool, config)
+    site, weighed = SpawnSite.of(house, hidden, physics.engine), ObstaclePool.of(pool, config)
     redraws: Counter[Redraw] = Counter()
     episodes = []
     for index in range(first, first + count):
@@ -210,7 +217,7 @@ def _draw(
         (*draft.start, draft.quarter),
         draft.goal,
         settings.world_config,
-        config.engine,
+        site.engine,
         [obstacle.affordance for obstacle in draft.obstacles],
     )
     # The expert comes first: an episode without one is discarded and needs no outcomes.
@@ -407,7 +414,7 @@ def _obstacle(
 
 
 def _physics(draft: EpisodeDraft) -> Physics:
-    engine = get_solver(draft.config.engine)
+    engine = get_solver(draft.site.engine)
     return Physics(
         engine=engine.name,
         build=engine.build,

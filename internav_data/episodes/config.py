@@ -8,7 +8,6 @@ from difflib import get_close_matches
 from typing import Annotated, ClassVar, Literal, get_args
 
 from internav_data.core.config import Bounds, check_bounds
-from internav_data.physics.engines import DEFAULT_ENGINE, ENGINES
 from internav_data.records.errors import UsageError
 
 IdleObstacles = Literal["keep", "drop"]
@@ -21,6 +20,7 @@ class EpisodeConfig:
     """Settings of the episodes; the defaults are calibrated to Table 2 of the paper."""
 
     RENAMED: ClassVar[dict[str, str]] = {
+        "engine": "physics.engine",
         "push_model": "world.push_model",
         "redraws": "max_redraws",
         "sideways_m": "lateral_std_m",
@@ -61,8 +61,6 @@ class EpisodeConfig:
     balance: bool = False
     """Draw by weights that let each type of the catalogue stand about as often as its share of the
     assets, where uniform draws leave few large objects."""
-    engine: str = DEFAULT_ENGINE
-    """Physics engine of settling, outcomes, expert and environments; `bullet` is the only one."""
     blind_expert: bool = False
     """Store the run of an expert that knows the averages of types, not an object's own mass,
     friction and fixedness, and learns by failing."""
@@ -79,14 +77,12 @@ class EpisodeConfig:
 
         """
         check_bounds(self, "{key}: expected {expected}, got {value}", "episodes.")
-        for key, value, known in (
-            ("engine", self.engine, ENGINES),
-            ("idle_obstacles", self.idle_obstacles, get_args(IdleObstacles)),
-        ):
-            if value not in known:
-                raise UsageError(
-                    f"episodes.{key}: expected one of {', '.join(known)}, got {value!r}"
-                )
+        known = get_args(IdleObstacles)
+        if self.idle_obstacles not in known:
+            raise UsageError(
+                f"episodes.idle_obstacles: expected one of {', '.join(known)}, "
+                f"got {self.idle_obstacles!r}"
+            )
 
     def max_obstacles_for(self, room_count: int) -> int:
         """Return the maximum number of obstacles in a house with a number of rooms."""

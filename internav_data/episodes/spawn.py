@@ -193,7 +193,7 @@ def settled_at(draft: EpisodeDraft, body: Body) -> SettleResult:
         body,
         draft.config.gap_m,
         lambda: _near(draft, prisms_of(body.asset, body.pose)),
-        draft.config.engine,
+        draft.site.engine,
     )
 
 

@@ -23,6 +23,7 @@ from internav_data.core.files import read_file
 from internav_data.episodes.config import EpisodeConfig, check_types
 from internav_data.houses.config import HouseConfig
 from internav_data.houses.plan_file import FLOOR_PLAN, load_floor_plan
+from internav_data.physics.config import PhysicsConfig
 from internav_data.records.errors import UsageError
 from internav_data.world.config import WorldConfig
 
@@ -61,6 +62,8 @@ class GenerationConfig:
     """Settings of the episodes."""
     world: WorldConfig = field(default_factory=WorldConfig)
     """Settings of the world that outcomes, experts and environments share."""
+    physics: PhysicsConfig = field(default_factory=PhysicsConfig)
+    """Settings of the physics that all of these are solved with."""
 
     def check(self) -> None:
         """Check all values, and that the files they name are there.
@@ -77,6 +80,7 @@ class GenerationConfig:
         self.episodes.check()
         self.world.check()
         self.world.check_force()
+        self.physics.check()
         check_bounds(self)
         if not self.assets:
             # A user's meshes may have types of their own: those are known once they are read.

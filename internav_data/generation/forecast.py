@@ -16,6 +16,7 @@ from internav_data.generation.executors import DEFAULT_EXECUTOR, get_executor
 from internav_data.generation.progress import GenerationProgress
 from internav_data.generation.run import check_scenes
 from internav_data.generation.scenes import asset_folders, build_scene
+from internav_data.physics.engines.installed import require_engine
 from internav_data.records.errors import QuarantineError
 from internav_data.records.splits import split_of_scene
 
@@ -86,14 +87,18 @@ def forecast(
     ------
     UsageError
         A count or setting out of its bounds.
+    MissingEngineError
+        The config's physics engine is not installed.
     QuarantineError
         Not one scene of the sample could be made, or none within `SAMPLE_S`.
 
     """
     check_scenes(scenes)
     config.check()
+    require_engine(config.physics.engine, switchable=True)
     (progress or GenerationProgress()).log(
-        f"making up to {SAMPLE_SCENES} scenes to measure, for {SAMPLE_S:.0f} s at most"
+        f"making up to {SAMPLE_SCENES} scenes to measure, for {SAMPLE_S:.0f} s at most; "
+        f"physics: {config.physics.engine}"
     )
     sample = _sample(config, range(min(scenes, SAMPLE_SCENES)))
     made, tried = len(sample.houses), len(sample.houses) + sample.failed

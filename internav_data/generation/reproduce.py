@@ -76,7 +76,7 @@ def scene_again(
     if episode is not None:
         episodes = episodes[-1:]
     parts = [record for record in (None if episode is not None else house, *episodes) if record]
-    verdict = f"made {house.scene_id}: {len(episodes)} episodes"
+    verdict = f"made {house.scene_id}: {len(episodes)} episodes; physics: {config.physics.engine}"
     if out is not None:
         _compare(out, config, house, episodes)
         verdict += f"; the same as in {out}"

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import contextlib
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final
 
 from internav_data.core.extras import require
 from internav_data.core.interrupts import InterruptedRunError, Interrupts
@@ -28,6 +28,7 @@ from internav_data.dataset import (
     end_staging,
     find_damage,
     has_manifest,
+    held_config,
     open_staging,
     read_manifest,
     repair_files,
@@ -47,6 +48,9 @@ from internav_data.generation.scenes import (
     scene_maker,
 )
 from internav_data.houses.quota import room_count
+from internav_data.physics.config import FIRST_PHYSICS, PhysicsConfig
+from internav_data.physics.engines import DEFAULT_ENGINE
+from internav_data.physics.engines.installed import require_engine
 from internav_data.records import Pose
 from internav_data.records.errors import (
     CorruptDataError,
@@ -75,6 +79,8 @@ MAX_FIRST_FAILURES = 20
 """Scenes that fail before one succeeds, after which the config is at fault."""
 MAX_NAMED_MESHES = 5
 """Meshes that one error message names."""
+_FIRST: Final = GenerationConfig(physics=FIRST_PHYSICS)
+"""Values of the settings that a dataset's config lacks, since it is older than they are."""
 TAIL_SCENES = 8
 """Last scenes, a slot of the executor, that begin largest first, so that all slots end together."""
 
@@ -121,6 +127,8 @@ def generate(
     ------
     ModuleNotFoundError
         A package of the extra `generate` is missing.
+    MissingEngineError
+        The config's physics engine is not installed.
     UsageError
         A count or setting out of its bounds, or a folder that holds something else.
     LockedError
@@ -135,11 +143,13 @@ def generate(
 
     """
     # In a worker, what is missing would be a failure of each scene.
-    require("numba", "platformdirs", "pybullet", "scipy")
+    require("numba", "platformdirs", "scipy")
     progress = progress or GenerationProgress()
     check_scenes(scenes)
     chosen = get_executor(executor, workers) if isinstance(executor, str) else executor
     config.check()
+    with _disk_errors(out):
+        _require_engine(config, out)
     assets = assets or _catalogue(config)
     identity = identity_for(config, assets)
     with _disk_errors(out):
@@ -148,7 +158,7 @@ def generate(
         store = FolderStore(out)
         with store.lock(BUSY):
             _forget_idle_staging(store)
-            staging = open_staging(store, identity, GenerationConfig().identity(assets.digest))
+            staging = open_staging(store, identity, _FIRST.identity(assets.digest))
             done = _done_before(staging, scenes, "all" if retry_quarantined else "died")
             commits = PrefixCommits(staging, identity, _all_of(assets), done, progress)
             scenes = max(scenes, commits.held)
@@ -164,18 +174,48 @@ def generate(
     return report_of(out, manifest, progress)
 
 
+def with_held_engine(config: GenerationConfig, out: Path) -> GenerationConfig:
+    """Return a config with the physics engine of the dataset that a folder holds, if it holds one.
+
+    Raises
+    ------
+    CorruptDataError
+        The dataset's manifest is damaged, or names no engine that there is.
+
+    """
+    held = held_config(FolderStore(out))
+    if held is None:
+        return config
+    engine = PhysicsConfig.of_dataset(held).engine
+    return replace(config, physics=replace(config.physics, engine=engine))
+
+
+def _require_engine(config: GenerationConfig, out: Path) -> None:
+    """Check that the engine is installed; another one is offered where no scene is made yet."""
+    begun = held_config(FolderStore(out)) is not None
+    require_engine(config.physics.engine, str(out) if begun else "", switchable=not begun)
+
+
 def _catalogue(config: GenerationConfig) -> Catalogue:
     from internav_data.catalog import catalogue  # noqa: PLC0415
 
     assets = catalogue(asset_folders(config))
     if config.assets:
         ours = catalogue().assets
-        check_standing([a for asset_id, a in assets.assets.items() if asset_id not in ours])
+        users = [a for asset_id, a in assets.assets.items() if asset_id not in ours]
+        check_standing(users, config.physics.engine)
     return assets
 
 
-def check_standing(assets: Iterable[Asset]) -> None:
+def check_standing(assets: Iterable[Asset], engine: str = DEFAULT_ENGINE) -> None:
     """Refuse meshes that do not stay where they are put: none of them would be spawned.
+
+    Parameters
+    ----------
+    assets
+        Assets of a user.
+    engine
+        Name of the physics engine that lets them fall.
 
     Raises
     ------
@@ -183,12 +223,12 @@ def check_standing(assets: Iterable[Asset]) -> None:
         Some meshes tip over or roll away; it names them.
 
     """
-    from internav_data.physics import Body, settle  # noqa: PLC0415 - pybullet, for users with meshes
+    from internav_data.physics import Body, settle  # noqa: PLC0415 - numba, for users with meshes
     from internav_data.physics.scene import UPRIGHT  # noqa: PLC0415 - as above
 
     origin = Pose(0.0, 0.0, 0.0, UPRIGHT)
     rests = (
-        (asset.asset_id, settle(Body.of(asset, origin), math.inf, tuple).refusal)
+        (asset.asset_id, settle(Body.of(asset, origin), math.inf, tuple, engine).refusal)
         for asset in assets
     )
     fallen = [f"{asset_id} {refusal}" for asset_id, refusal in rests if refusal]

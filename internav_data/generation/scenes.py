@@ -65,7 +65,7 @@ def build_scene(
 
     """
     from internav_data.catalog.attributes import hidden_attributes  # noqa: PLC0415 - as below
-    from internav_data.episodes import build_batch  # noqa: PLC0415 - numba, pybullet when used
+    from internav_data.episodes import build_batch  # noqa: PLC0415 - numba, engine when used
     from internav_data.houses import build_house  # noqa: PLC0415 - as above
 
     reason, hidden = "", hidden_attributes(config.catalog, catalogue.spawnable)
@@ -81,6 +81,7 @@ def build_scene(
                 hidden=hidden,
                 beliefs=beliefs,
                 before_draw=before_draw,
+                physics=config.physics,
             )
         except QuarantineError as error:
             reason = str(error)

@@ -99,6 +99,7 @@ def generate_episodes(
                 attempt=attempt,
                 hidden=hidden,
                 beliefs=beliefs_for(assets, config),
+                physics=config.physics,
             )
         except QuarantineError as error:
             reason = str(error)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Final
 from internav_data.core.locks import ThreadLock
 from internav_data.physics.cache import Solver, origin
 from internav_data.physics.engines import DEFAULT_ENGINE, ENGINES
+from internav_data.physics.engines.installed import require_engine
 from internav_data.physics.result_cache import ResultCache, result_cache
-from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -43,11 +43,16 @@ def get_solver(name: str = DEFAULT_ENGINE) -> Solver:
     ------
     UsageError
         No engine has this name.
+    MissingEngineError
+        The engine's library is not installed.
 
     """
-    if name not in ENGINES:
-        raise UsageError(f"no physics engine is called {name!r}; known are {', '.join(ENGINES)}")
-    engine, known = ENGINES[name](), None if _cache_off.get() else result_cache()
+    try:
+        engine = ENGINES[name]()
+    except (KeyError, ModuleNotFoundError):
+        require_engine(name)
+        raise
+    known = None if _cache_off.get() else result_cache()
     found = _CACHED.get((engine, known))  # every push asks: no lock where there is an engine
     if found is not None:
         return found

@@ -18,6 +18,10 @@ class UsageError(InternavError):
     exit_code: ClassVar[int] = 2
 
 
+class MissingEngineError(InternavError):
+    """Physics engine whose library is not installed; the text has the command that installs it."""
+
+
 class ValidationError(InternavError):
     """Dataset whose contents are wrong by the validator's own computation."""
 

@@ -7,12 +7,14 @@ from internav_cli.generate import command
 
 from internav_data.catalog.config import Attributes
 from internav_data.generation.config import EPISODE_PRESETS
+from internav_data.physics.engines import EngineName
 from internav_data.records import PUSH_SPECS
 
 KNOWN = {
-    "attributes": get_args(Attributes),
+    "catalog__attributes": get_args(Attributes),
     "episode_preset": EPISODE_PRESETS,
-    "push_model": tuple(PUSH_SPECS),
+    "physics": get_args(EngineName),
+    "world__push_model": tuple(PUSH_SPECS),
 }
 
 

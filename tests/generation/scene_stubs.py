@@ -6,10 +6,13 @@ import json
 import os
 import signal
 import time
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import builders
 
+from internav_data.core.messages import Fatal
+from internav_data.core.worker import run_task
 from internav_data.dataset import STAGING, stage_scene
 from internav_data.records import Physics
 from internav_data.records.errors import QuarantineError
@@ -71,3 +74,24 @@ def stub(payload):
         return count
 
     return make
+
+
+@dataclass
+class InProcess:
+    """Runs every task in this process, the last one first: what another executor needs at least."""
+
+    slots: int = 1
+    closed: bool = False
+
+    def run(self, recipe, tasks, tick):
+        work = recipe.setup(recipe.payload)
+        try:
+            for task in reversed(list(tasks)):
+                if not tick():
+                    return
+                result = run_task(work, task)
+                if isinstance(result, Fatal):
+                    raise result.error()
+                yield result
+        finally:
+            self.closed = True

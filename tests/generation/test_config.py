@@ -136,7 +136,8 @@ WORDS = {
     "": "4",
     "force": "kick",
     "free": "real",
-    "bullet": "another",
+    "bullet": "mujoco",
+    "mujoco": "bullet",
     "keep": "drop",
 }
 """Another value for each setting that is a word."""

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 
 import pytest
 import worker_stubs
-from scene_stubs import CATALOGUE, stub
+from scene_stubs import CATALOGUE, InProcess, stub
 
 from internav_data.core.machine import available_cores
-from internav_data.core.messages import Done, Fatal, Recipe
-from internav_data.core.worker import run_task
+from internav_data.core.messages import Done, Recipe
 from internav_data.generation.config import load_config
 from internav_data.generation.executors import (
     EXECUTORS,
@@ -23,27 +21,6 @@ from internav_data.generation.run import generate
 from internav_data.records.errors import InternavError, QuarantineError, UsageError
 
 CONFIG = load_config(overrides=["episodes_per_scene=3"])
-
-
-@dataclass
-class InProcess:
-    """Runs every task in this process, the last one first: what another executor needs at least."""
-
-    slots: int = 1
-    closed: bool = False
-
-    def run(self, recipe, tasks, tick):
-        work = recipe.setup(recipe.payload)
-        try:
-            for task in reversed(list(tasks)):
-                if not tick():
-                    return
-                result = run_task(work, task)
-                if isinstance(result, Fatal):
-                    raise result.error()
-                yield result
-        finally:
-            self.closed = True
 
 
 def made(out, executor, scenes=12, **orders):

@@ -19,6 +19,7 @@ from internav_data.physics import (
     push,
     settle,
 )
+from internav_data.physics.config import PhysicsConfig
 from internav_data.physics.engines.bullet import bullet
 from internav_data.physics.result_cache import ResultCache
 from internav_data.physics.solving import RULES
@@ -143,8 +144,8 @@ def test_a_world_drops_by_the_engine_that_is_named(glide, hand_house):
 def test_episodes_ask_the_engine_of_their_config(glide):
     """Spawning, outcomes and expert; a world of the episode takes the same engine by itself."""
     house = build_house(0, 0, HouseConfig(), catalogue())
-    config = EpisodeConfig(engine="glide", keep_unsolvable=True)
-    (episode,) = build_episodes(house, 1, catalogue().spawnable, config)
+    config, physics = EpisodeConfig(keep_unsolvable=True), PhysicsConfig("glide")
+    (episode,) = build_episodes(house, 1, catalogue().spawnable, config, physics=physics)
     assert (episode.physics.engine, episode.physics.build) == ("glide", f"glide 1, rules {RULES}")
     assert {o.z for o in episode.obstacles} == {0.0}
     pushes = [o for one in episode.obstacles for o in one.outcomes[:4] if one.pushable]
@@ -182,5 +183,5 @@ def test_an_unknown_engine_is_refused_by_name(hand_house):
         push(body, 0, alone, engine="no engine")
     with pytest.raises(UsageError, match="'no engine'"):
         settle(body, 0.01, tuple, "no engine")
-    with pytest.raises(UsageError, match=r"episodes.engine: expected one of bullet, got 'no eng"):
-        EpisodeConfig(engine="no engine").check()
+    with pytest.raises(UsageError, match=r"physics.engine: expected one of bullet.*, got 'no eng"):
+        PhysicsConfig("no engine").check()

@@ -6,14 +6,15 @@ lists its methods and the figures that it states.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from internav_data.physics.engines.protocol import Engine
 
-DEFAULT_ENGINE: Final = "bullet"
+EngineName = Literal["bullet", "mujoco"]
+DEFAULT_ENGINE: Final[EngineName] = "bullet"
 """Name of the engine that is taken where none is named."""
 
 
@@ -29,3 +30,5 @@ time, for results are cached by engine.
 
 The result cache believes no entry once a source file of physics has changed, or a library that the
 engine names. An engine from elsewhere must change its `build` with its results."""
+MODULES: Final = {"bullet": "pybullet", "mujoco": "mujoco"}
+"""Module that an engine is built on, by the engine's name."""

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 import shapely
 
-from internav_data.physics.engines.bullet import ENGINE_LOCK
 from internav_data.verification.replay.bullet_house import BulletHouse, Standing
 from internav_data.verification.shapes import STEP_OVER_M
 
@@ -60,6 +59,8 @@ def is_sampled(episode: Episode) -> bool:
 
 def check_whole_house(house: House, shapes: Shapes, episode: Episode, expect: Expect) -> None:
     """Check an episode in its house: as it starts, and after each push that succeeds."""
+    from internav_data.physics.engines.bullet import ENGINE_LOCK  # noqa: PLC0415 - pybullet
+
     pushes = [
         (f"after {outcome.action} of obstacle {number}", ends, outcome.at_rest is True)
         for number, obstacle in enumerate(episode.obstacles)

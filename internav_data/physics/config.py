@@ -1,0 +1,68 @@
+"""Settings of physics: which engine settles and pushes everything in a dataset."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from internav_data.core.config import from_mapping
+from internav_data.physics.engines import DEFAULT_ENGINE, ENGINES, EngineName
+from internav_data.records.errors import CorruptDataError, UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class PhysicsConfig:
+    """Settings of the physics that settling, outcomes, experts and environments share."""
+
+    engine: EngineName = DEFAULT_ENGINE
+    """Physics engine: `bullet` (pybullet) or `mujoco` (mujoco-core). Data of two engines differ;
+    a dataset is of one, which its environments take too."""
+
+    def check(self, prefix: str = "physics.") -> None:
+        """Check all values.
+
+        Raises
+        ------
+        UsageError
+            No engine has the name.
+
+        """
+        if self.engine not in ENGINES:
+            raise UsageError(
+                f"{prefix}engine: expected one of {', '.join(ENGINES)}, got {self.engine!r}"
+            )
+
+    @staticmethod
+    def of_dataset(config: Mapping[str, Any]) -> PhysicsConfig:
+        """Return the settings in a dataset's config; missing ones are those of `FIRST_PHYSICS`.
+
+        Parameters
+        ----------
+        config
+            Config of a dataset's manifest.
+
+        Raises
+        ------
+        CorruptDataError
+            A value that no generator writes.
+
+        """
+        given, names = config.get("physics"), PhysicsConfig.__dataclass_fields__
+        values = given if isinstance(given, dict) else {}
+        known = {name: value for name, value in values.items() if name in names}
+        try:
+            made = from_mapping(FIRST_PHYSICS, known, "manifest.json", prefix="physics.")
+            made.check()
+        except UsageError as error:
+            raise CorruptDataError(f"config: {error}; generate the dataset again") from error
+        return made
+
+
+DEFAULT_PHYSICS: Final = PhysicsConfig()
+"""Settings of physics where none are named."""
+FIRST_PHYSICS: Final = PhysicsConfig("bullet")
+"""Settings of the datasets that name none, whatever the default is: they are older than these."""
