@@ -179,7 +179,7 @@ def test_every_engine_states_what_results_depend_on(glide):
 
 def test_an_unknown_engine_is_refused_by_name(hand_house):
     body = Body.of(BOX, Pose(0.0, 0.0, 0.001, UPRIGHT))
-    with pytest.raises(UsageError, match="'no engine'; known are bullet"):
+    with pytest.raises(UsageError, match="'no engine'; known are bullet, mujoco"):
         push(body, 0, alone, engine="no engine")
     with pytest.raises(UsageError, match="'no engine'"):
         settle(body, 0.01, tuple, "no engine")

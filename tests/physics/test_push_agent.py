@@ -8,7 +8,7 @@ from builders import UPRIGHT, crate
 from internav_data.catalog import catalogue
 from internav_data.geometry import footprint, yaw_quaternion
 from internav_data.houses import HouseConfig, build_house
-from internav_data.physics import Body, push, wall_body
+from internav_data.physics import Body, wall_body
 from internav_data.physics.kdop import overlap
 from internav_data.physics.pushing import count_movers
 from internav_data.physics.sweep import extent_of
@@ -43,7 +43,7 @@ def scene(heading):
 
 
 @pytest.mark.parametrize("heading", range(4))
-def test_a_push_that_never_comes_near_the_agent_is_the_same_without_it(heading, solved):
+def test_a_push_that_never_comes_near_the_agent_is_the_same_without_it(heading, solved, push):
     pose, near = scene(heading)
     without = push(Body.of(CRATE, pose), heading, near)
     assert without.success
@@ -59,7 +59,7 @@ def test_a_push_that_never_comes_near_the_agent_is_the_same_without_it(heading, 
     assert solved == [], "no agent, no other scene"
 
 
-def test_an_agent_that_something_comes_near_takes_part(solved):
+def test_an_agent_that_something_comes_near_takes_part(solved, push):
     pose, near = scene(0)
     without = push(Body.of(CRATE, pose), 0, near)
     ((_, there),) = without.moved
@@ -74,7 +74,7 @@ def test_an_agent_that_something_comes_near_takes_part(solved):
 
 
 @pytest.mark.parametrize("heading", range(4))
-def test_the_agent_is_named_where_it_alone_hinders(heading):
+def test_the_agent_is_named_where_it_alone_hinders(heading, push):
     dx, dy = AHEAD[heading]
     pose, agent = Pose(3.0, 4.0, 0.001, UPRIGHT), (3.0 + 0.405 * dx, 4.0 + 0.405 * dy)
     hindered = push(Body.of(SQUARE, pose), heading, among(), agent=agent, agent_gap_m=0.205)
@@ -113,7 +113,7 @@ def test_pulling_onto_the_agent_says_so_and_changes_nothing(hand_house):
 
 @pytest.mark.parametrize("side", range(4))
 @pytest.mark.parametrize("heading", range(4))
-def test_the_agent_does_not_lever_what_has_low_feet(heading, side):
+def test_the_agent_does_not_lever_what_has_low_feet(heading, side, push):
     # Its feet begin below 2 cm, where footprints leave them out: a column down to the floor stood
     # on them, and the thing crept on top of it for up to five seconds.
     telly = catalogue().assets["Television_05"]

@@ -24,7 +24,13 @@ def _bullet() -> Engine:
     return bullet()
 
 
-ENGINES: Final[dict[str, Callable[[], Engine]]] = {"bullet": _bullet}
+def _mujoco() -> Engine:
+    from internav_data.physics.engines.mujoco import mujoco_engine  # noqa: PLC0415 - imported when used
+
+    return mujoco_engine()
+
+
+ENGINES: Final[dict[str, Callable[[], Engine]]] = {"bullet": _bullet, "mujoco": _mujoco}
 """Function by engine name that returns this process's engine. It returns the same object every
 time, for results are cached by engine.
 

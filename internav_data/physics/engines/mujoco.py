@@ -1,0 +1,159 @@
+"""MuJoCo (Todorov, Erez and Tassa 2012; Google DeepMind) as physics engine.
+
+One thread solves at a time, from the first number of a scene to the last pose: scenes of the same
+shapes are written into one compiled model.
+"""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+from internav_data.core.locks import ThreadLock, once_per_process
+from internav_data.physics.engines.mujoco_scene import (
+    MARGIN_M,
+    STEP_S,
+    ModelBuilder,
+    mujoco,
+    set_friction_solver,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from internav_data.physics.engines.mujoco_scene import CompiledScene, MjData
+    from internav_data.physics.scene import PhysicsScene
+    from internav_data.records import Quaternion, Vec3
+
+ENGINE_LOCK = ThreadLock()
+"""Held while a scene is built, stepped and read: by one thread of the process."""
+
+
+@dataclass(slots=True, eq=False)
+class MuJoCo:
+    """Engine on MuJoCo's library, without graphics."""
+
+    builder: ModelBuilder = field(default_factory=ModelBuilder)
+    """ModelBuilder of scenes, with its compiled models."""
+    name: str = "mujoco"
+    libraries: tuple[str, ...] = ("mujoco-core",)
+    contact_margin_m: float = MARGIN_M
+    step_s: float = STEP_S
+    build: str = field(default_factory=lambda: f"mujoco {version('mujoco-core')}")
+
+    @contextmanager
+    def load(self, scene: PhysicsScene) -> Iterator[MuJoCoSimulation]:
+        """Load a scene in place of the one before; the engine is locked meanwhile.
+
+        Raises
+        ------
+        UsageError
+            MuJoCo refuses a shape of the scene.
+        RuntimeError
+            MuJoCo lost the scene: it became unstable or had too many contacts.
+
+        """
+        with ENGINE_LOCK, _warnings_unlogged():
+            made = self.builder.build(scene)
+            yield MuJoCoSimulation(made)
+            _check(made.data)
+
+
+class MuJoCoSimulation:
+    """A scene in motion in MuJoCo. Bodies go by their index in the scene."""
+
+    __slots__ = ("_forces", "_geoms", "_model_and_data", "_positions", "_pushed", "_velocities")
+
+    def __init__(self, made: CompiledScene) -> None:
+        data = made.data
+        self._model_and_data, self._geoms = (made.model, data), made.geoms
+        self._positions = {k: data.qpos[7 * n : 7 * n + 7] for k, n in made.movers.items()}
+        self._velocities = {k: data.qvel[6 * n : 6 * n + 6] for k, n in made.movers.items()}
+        self._forces = {k: data.qfrc_applied[6 * n : 6 * n + 3] for k, n in made.movers.items()}
+        self._pushed: list[int] = []
+        """Bodies on which a force acts during the next step."""
+
+    def step(self, count: int = 1) -> None:
+        """Advance by a number of time steps."""
+        model, data = self._model_and_data
+        for _ in range(count):
+            set_friction_solver(model, data)
+            mujoco.mj_step(model, data)
+            for body in self._pushed:
+                self._forces[body][:] = 0.0
+            self._pushed.clear()
+
+    def placement(self, body: int) -> tuple[Vec3, Quaternion]:
+        """Return a body's centre of mass, metres, and its orientation."""
+        x, y, z, w, a, b, c = self._positions[body].tolist()
+        return (x, y, z), (a, b, c, w)
+
+    def velocity(self, body: int) -> tuple[Vec3, Vec3]:
+        """Return the velocity of a body's centre of mass, m/s, and its spin, rad/s."""
+        x, y, z, *own = self._velocities[body].tolist()
+        # MuJoCo's spin is in the body's own axes.
+        return (x, y, z), _turned(self.placement(body)[1], (own[0], own[1], own[2]))
+
+    def set_velocity(self, body: int, linear: Vec3, angular: Vec3) -> None:
+        """Give a body a velocity, m/s, and a spin, rad/s."""
+        x, y, z, w = self.placement(body)[1]
+        self._velocities[body][:] = (*linear, *_turned((-x, -y, -z, w), angular))
+
+    def apply_force(self, body: int, force: Vec3) -> None:
+        """Apply a force, newtons, at a body's centre of mass during the next step."""
+        self._forces[body][:] = force
+        self._pushed.append(body)
+
+    def penetration_m(self, body: int) -> float:
+        """Return the depth of a body's deepest contact, metres; 0 without any."""
+        model, data = self._model_and_data
+        mujoco.mj_fwdPosition(model, data)  # a step leaves the contacts of its beginning
+        geoms = range(self._geoms[body].start, self._geoms[body].stop)
+        contacts: Any = data.contact
+        depths = [
+            MARGIN_M - contact.dist
+            for contact in contacts
+            if contact.geom[0] in geoms or contact.geom[1] in geoms
+        ]
+        return max([0.0, *depths])
+
+
+@contextmanager
+def _warnings_unlogged() -> Iterator[None]:
+    """Keep MuJoCo from writing a file MUJOCO_LOG.TXT: warnings are counted with the data, too."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def _check(data: MjData) -> None:
+    """Check that MuJoCo simulated a scene to its end without a warning.
+
+    Raises
+    ------
+    RuntimeError
+        It gave one.
+    """
+    counts = data.warning.number
+    if counts.any():
+        kinds = [str(mujoco.mjtWarning(k).name) for k in counts.nonzero()[0].tolist()]
+        raise RuntimeError(f"MuJoCo lost a scene: {', '.join(kinds)}")
+
+
+def _turned(turn: Quaternion, vector: Vec3) -> Vec3:
+    """Return a vector turned by a unit quaternion."""
+    (x, y, z, w), (a, b, c) = turn, vector
+    # With q for (x, y, z) it is v + 2 q x (q x v + w v).
+    i, j, k = y * c - z * b + w * a, z * a - x * c + w * b, x * b - y * a + w * c
+    return a + 2.0 * (y * k - z * j), b + 2.0 * (z * i - x * k), c + 2.0 * (x * j - y * i)
+
+
+@once_per_process  # a forked one would wait for a lock whose holder stayed behind
+def mujoco_engine() -> MuJoCo:
+    """Return this process's MuJoCo."""
+    return MuJoCo()

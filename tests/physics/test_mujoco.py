@@ -1,0 +1,98 @@
+"""Compiled models serve many scenes, and none of them is told from a scene in a new model."""
+
+import os
+
+import numpy as np
+import pytest
+from builders import UPRIGHT, asset, crate, part
+from scenes import THINGS, answer, scenes
+
+from internav_data.physics import Body, PhysicsScene
+from internav_data.physics.engines import mujoco_scene
+from internav_data.physics.engines.mujoco import MuJoCo, mujoco_engine
+from internav_data.physics.engines.mujoco_scene import mujoco
+from internav_data.physics.solving import solve_push
+from internav_data.records import PUSH_SPECS, Pose
+from internav_data.records.errors import UsageError
+
+STANDING = Pose(0.0, 0.0, 0.001, UPRIGHT)
+
+
+def test_a_used_model_is_as_good_as_a_new_one():
+    asked = scenes(25)
+    expected = [answer(MuJoCo(), *scene) for scene in asked]
+    for seed, capacity in enumerate((3, 64)):
+        engine = MuJoCo()
+        engine.builder.models.capacity = capacity
+        for k in np.random.default_rng(seed).permutation(len(asked)):
+            assert answer(engine, *asked[k]) == expected[k]
+
+
+def test_what_an_interrupt_left_in_a_model_is_swept_away(monkeypatch):
+    asked = [scene for scene, falls in scenes(60) if not falls]
+    lone = next(scene for scene in asked if len(scene.bodies) == 1)
+    engine = MuJoCo()
+    expected = solve_push(MuJoCo(), lone, PUSH_SPECS["force"])
+    for at in (3, 40):
+        calls = []
+        real = mujoco.mj_step
+
+        def interrupted(*args, calls=calls, real=real, at=at):
+            real(*args)
+            calls.append(1)
+            if len(calls) == at:
+                raise KeyboardInterrupt
+
+        with monkeypatch.context() as patch:
+            patch.setattr(mujoco, "mj_step", interrupted)
+            with pytest.raises(KeyboardInterrupt):
+                solve_push(engine, lone, PUSH_SPECS["force"])
+        assert solve_push(engine, lone, PUSH_SPECS["force"]) == expected
+
+
+def test_a_body_has_the_inertia_that_bullet_gives_it():
+    pybullet = pytest.importorskip("pybullet")
+    from internav_data.physics.engines.bullet import bullet
+
+    for thing in THINGS:
+        scene = PhysicsScene((Body.of(thing, STANDING),))
+        (identity,) = bullet().builder.build(scene)
+        inertia = pybullet.getDynamicsInfo(identity, -1, bullet().builder.client)[2]
+        made = MuJoCo().builder.build(scene)
+        assert made.model.body_inertia[1] == pytest.approx(inertia, rel=1e-4)
+        assert made.model.body_mass[1] == thing.mass_kg
+
+
+def test_a_shape_that_mujoco_refuses_is_named_in_one_line(monkeypatch):
+    """It takes hulls as thin as 1e-13 m, but no mesh without faces, nor more than 200,000."""
+    corners = [(x, y, z) for x in (0.0, 0.3) for y in (0.0, 0.3) for z in (0.0, 0.1)]
+    sheet = asset("Sheet_3", part("hull", (0.0, 0.0, 0.0), (0.3, 0.3, 0.1), corners=corners))
+    monkeypatch.setattr(mujoco_scene, "_mesh_file", lambda _: ("sheet.obj", b"v 0 0 0"))
+    with pytest.raises(UsageError, match="MuJoCo refuses a shape among Sheet_3: ") as refused:
+        solve_push(MuJoCo(), PhysicsScene((Body.of(sheet, STANDING),)), PUSH_SPECS["force"])
+    assert "\n" not in str(refused.value)
+
+
+def test_a_scene_that_mujoco_loses_is_no_solution(monkeypatch, tmp_path):
+    """An unstable scene would begin anew by itself, and be told from a push that moves nothing."""
+    monkeypatch.chdir(tmp_path)
+    real = mujoco.mj_step
+
+    def exploding(model, data):
+        data.qvel[0] = np.inf
+        real(model, data)
+
+    monkeypatch.setattr(mujoco, "mj_step", exploding)
+    scene = PhysicsScene((Body.of(crate("Box_0", (0.3, 0.3, 0.3)), STANDING),))
+    with pytest.raises(RuntimeError, match=r"MuJoCo lost a scene: .*mjWARN_BADQVEL"):
+        solve_push(MuJoCo(), scene, PUSH_SPECS["force"])
+    assert not list(tmp_path.iterdir()), "no log of MuJoCo's"
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+def test_a_forked_process_has_models_of_its_own():
+    here = mujoco_engine()
+    child = os.fork()
+    if child == 0:
+        os._exit(0 if mujoco_engine() is not here else 1)
+    assert os.waitpid(child, 0)[1] == 0
