@@ -12,7 +12,8 @@ Examples
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from internav_data.core.compile_cache import ensure_compile_cache
 from internav_data.core.lazy import lazy_imports
@@ -39,7 +40,7 @@ __all__ = [
 # Before anything imports numba.
 ensure_compile_cache()
 
-__getattr__, __dir__ = lazy_imports(
+_public, __dir__ = lazy_imports(
     __name__,
     {
         "camp": ["export_agent", "load_agent"],
@@ -49,3 +50,10 @@ __getattr__, __dir__ = lazy_imports(
         "records.version": ["__version__"],
     },
 )
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - as the public names are
+    """Return a public name; from the first one on, notebooks show houses and episodes."""
+    found = _public(name)
+    import_module("internav_data.views")  # registers pictures, and imports none of what draws them
+    return found

@@ -13,12 +13,14 @@ from internav_data.core.extras import require
 from internav_data.core.lru import LRUCache
 from internav_data.core.storage import Store, StoreLike, store_of
 from internav_data.dataset.decode import from_table
+from internav_data.dataset.flatten import COLUMNS, FLAT
 from internav_data.dataset.location import folder_to_read
 from internav_data.dataset.manifest import Manifest, check_file
 from internav_data.dataset.row_group_cache import RowGroupCache
 from internav_data.dataset.select import Filters, check_columns, joined, matching_rows, read_columns
 from internav_data.dataset.snapshot import read_shard, with_manifest
 from internav_data.dataset.stream import EpisodeStream
+from internav_data.dataset.summary_html import summary_html
 from internav_data.dataset.tables import ASSETS, EPISODES, SCENES
 from internav_data.records import Asset, Episode, House
 from internav_data.records.errors import UsageError
@@ -136,6 +138,10 @@ class Dataset(Generic[E]):
     def __repr__(self) -> str:
         chosen = f", split={self.split!r}" if self.split else ""
         return f"Dataset({str(self.path)!r}{chosen}, {len(self)} episodes)"
+
+    def _repr_html_(self) -> str:
+        """Return the dataset's statistics for a notebook."""
+        return summary_html(repr(self), self.store, self.manifest)
 
     @property
     def path(self) -> Path:
@@ -299,24 +305,50 @@ class Dataset(Generic[E]):
             raise UsageError(f"{place}: no scene {scene_id!r} (ids look like scene-000017)")
         return self._houses.get(scene_id, lambda: cast("House", cache.row(rows[scene_id])))
 
-    def to_table(self, columns: Sequence[str] | None = None) -> pa.Table:
-        """Return the selected episodes as an Arrow table of the given (or all) columns."""
+    def to_table(self, columns: Sequence[str] | str | None = None) -> pa.Table:
+        """Return the selected episodes as an Arrow table of the given (or all) columns.
+
+        Parameters
+        ----------
+        columns
+            Columns of episodes; or "obstacles" or "outcomes": a flat table of these, one row each
+            (`internav_data.dataset.flatten`).
+
+        Raises
+        ------
+        UsageError
+            There is no such column or flat table.
+        """
+        if isinstance(columns, str):
+            if columns not in FLAT:
+                raise UsageError(
+                    f"columns: expected a list of them, or one of {sorted(FLAT)}, got {columns!r}"
+                )
+            return FLAT[columns](self.to_table(COLUMNS))
         names = _first(columns, self.columns, EPISODES.schema.names)
         check_columns(names, EPISODES)
         table = read_columns(self.store, self._files, EPISODES, names)
         return table if self._index is None else table.take(self._index)
 
-    def to_pandas(self, columns: Sequence[str] | None = None) -> pd.DataFrame:
+    def to_pandas(self, columns: Sequence[str] | str | None = None) -> pd.DataFrame:
         """Return the selected episodes as a pandas frame: scalar columns unless named.
+
+        Parameters
+        ----------
+        columns
+            As of `to_table`: "obstacles" and "outcomes" are flat frames.
 
         Raises
         ------
+        UsageError
+            There is no such column or flat table.
         ModuleNotFoundError
             pandas is not installed.
         """
-        names = _first(columns, self.columns, scalar_columns())
         require("pandas")
-        return self.to_table(names).to_pandas()
+        if not isinstance(columns, str):
+            columns = _first(columns, self.columns, scalar_columns())
+        return self.to_table(columns).to_pandas()
 
     def to_torch(self, columns: Sequence[str] | None = None) -> dict[str, Any]:
         """Return scalar columns as torch tensors by name.

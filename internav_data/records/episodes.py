@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
+from internav_data.records.display import displayed
 from internav_data.records.houses import Split
 from internav_data.records.physics import Affordance, Dynamics
 from internav_data.records.poses import Pose, Quaternion, Vec2
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 Mode = Literal["blocked", "lengthened"]
 """Effect of an episode's obstacles on the lattice: no path to the goal, or a longer one."""
@@ -266,7 +270,58 @@ class Episode:
     """Actions of an agent that knows no object's mass, friction or fixedness and learns by failing,
     its failed interactions among them; null where none was asked for, or it missed the goal."""
 
+    def __repr__(self) -> str:
+        return "\n".join(_lines(self))
+
+    def _repr_html_(self) -> str | None:
+        """Return a map and the obstacles for a notebook."""
+        shown: str | None = displayed(self, "html")
+        return shown
+
     @property
     def interactive(self) -> bool:
         """Whether the lattice is blocked, so that only an interaction opens a path."""
         return self.mode == "blocked"
+
+
+def _lines(episode: Episode) -> Iterator[str]:
+    """Yield the lines of an episode's `repr`: one screen, where all fields would fill ten."""
+    start, goal, expert = episode.start, episode.goal, episode.expert
+    yield (
+        f"Episode {episode.episode_id} ({episode.split}, seed {episode.seed}): {episode.mode}"
+        f"{', sealed' if episode.sealed else ''}, {episode.room_count} rooms, "
+        f"{episode.rooms_on_path} on the path"
+    )
+    yield f"  start    ({start.x:g}, {start.y:g}) m, yaw {start.yaw_deg} deg, room {start.room}"
+    yield f"  goal     ({goal.x:g}, {goal.y:g}) m, room {goal.room}"
+    yield (
+        f"  path     {_path(episode.shortest_path_m, episode.shortest_path_steps)} without "
+        f"obstacles, {_path(episode.obstructed_path_m, episode.obstructed_path_steps)} with them"
+    )
+    for number, obstacle in enumerate(episode.obstacles):
+        label = "  obstacles" if number == 0 else ""
+        yield f"{label:<11}{number:>2} {_obstacle_line(obstacle)}"
+    if expert is None:
+        yield "  expert   none"
+    else:
+        yield (
+            f"  expert   {expert.steps} actions: {expert.pushes} pushes, {expert.picks} picks, "
+            f"{expert.path_m:g} m walked"
+        )
+    yield f"  physics  {episode.physics.build}"
+
+
+def _path(metres: float | None, steps: int | None) -> str:
+    one = "cut off" if metres is None else f"{metres:g} m"
+    other = "no lattice path" if steps is None else f"{steps} steps"
+    return f"{one} ({other})"
+
+
+def _obstacle_line(obstacle: Obstacle) -> str:
+    opened = [each.action for each in obstacle.outcomes or () if each.opened]
+    abilities = [name for name in ("pushable", "pickable") if getattr(obstacle, name)]
+    words = ", ".join(abilities) or "fixed"
+    return (
+        f"{obstacle.asset_id} at ({obstacle.x:g}, {obstacle.y:g}), {obstacle.mass_kg:g} kg, {words}"
+        + (f"; opened by {', '.join(opened)}" if opened else "")
+    )

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from internav_data.records.assets import RGB, Asset
+from internav_data.records.display import displayed
 from internav_data.records.physics import Affordance, Dynamics
 from internav_data.records.poses import Pose, Vec2
 
@@ -187,3 +188,16 @@ class House:
     """Area of all rooms, square metres."""
     assets: Mapping[str, Asset] = field(compare=False, repr=False)
     """Assets by asset_id: at least those of `objects`. Not part of the scene row."""
+
+    def __repr__(self) -> str:
+        types = ", ".join(room.type for room in self.rooms)
+        return (
+            f"House {self.scene_id} ({self.split}, seed {self.seed}, {self.preset}): "
+            f"{len(self.rooms)} rooms ({types}), {self.area_m2:g} m2, {len(self.doors)} doors, "
+            f"{len(self.objects)} objects"
+        )
+
+    def _repr_png_(self) -> bytes | None:
+        """Return a picture from above for a notebook."""
+        shown: bytes | None = displayed(self, "png")
+        return shown

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from internav_data.core.lazy import lazy_imports
+from internav_data.records.display import register_display
+from internav_data.views.notebook import episode_html, house_png
 
 if TYPE_CHECKING:
     from internav_data.views.episodes import draw_episode, episode_lines
@@ -30,6 +32,9 @@ __all__ = [
     "write_png",
     "write_video",
 ]
+
+register_display("House", "png", house_png)
+register_display("Episode", "html", episode_html)
 
 # A picture of a house needs neither physics nor camera.
 __getattr__, __dir__ = lazy_imports(

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final, Self
 import numpy as np
 
 from internav_data.records.errors import UsageError
+from internav_data.views.notebook import replay_html
 from internav_data.views.replay_painters import (
     CameraPainter,
     Footer,
@@ -68,6 +69,15 @@ class Replay:
         model = house if isinstance(house, HouseModel) else HouseModel.of(house)
         who = title or ("expert" if actions is None else "given actions")
         return cls(play(model, episode, assets, actions, config), who)
+
+    def __repr__(self) -> str:
+        episode = self.story.episode.episode_id
+        end = "reaches the goal" if self.success else "misses the goal"
+        return f"Replay({episode!r}, {self.title}, {self.steps} actions, {end})"
+
+    def _repr_html_(self) -> str:
+        """Return the replay as a GIF for a notebook."""
+        return replay_html(self)
 
     @property
     def success(self) -> bool:

@@ -77,6 +77,21 @@ def _label(text: str, width: int) -> Image:
     return strip.finished()[:_LABEL_PX, :width]
 
 
+def png_bytes(image: Image) -> bytes:
+    """Return an RGB picture (h, w, 3) uint8 as PNG.
+
+    Raises
+    ------
+    InternavError
+        It is no picture.
+    """
+    good, data = cv2.imencode(".png", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
+    if not good:
+        raise InternavError(f"a picture of shape {image.shape} cannot be written as PNG")
+    found: bytes = data.tobytes()
+    return found
+
+
 def write_png(path: Path, image: Image) -> None:
     """Write an RGB picture (h, w, 3) uint8 atomically as PNG.
 
@@ -86,10 +101,11 @@ def write_png(path: Path, image: Image) -> None:
         The file cannot be written.
     """
     path = Path(path)
-    good, data = cv2.imencode(".png", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
-    if not good:
-        raise InternavError(f"{path}: a picture of shape {image.shape} cannot be written as PNG")
     try:
-        write_atomically(path, data.tobytes())
+        data = png_bytes(image)
+    except InternavError as error:
+        raise InternavError(f"{path}: {error}") from None
+    try:
+        write_atomically(path, data)
     except OSError as error:
         raise InternavError(f"{path}: cannot be written: {error.strerror}") from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import struct
 import typing
@@ -55,7 +56,7 @@ def slow_digest(table: pa.Table) -> str:
 
 # -0.0 is falsy: the slow way above would write 0.0 for it.
 def _no_negative_zero(record):
-    return "-0.0" not in repr(record)
+    return "-0.0" not in repr(dataclasses.astuple(record))
 
 
 @settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))

@@ -4,6 +4,7 @@ import itertools
 import math
 import subprocess
 import sys
+from dataclasses import astuple
 
 import networkx as nx
 import pytest
@@ -191,12 +192,13 @@ def test_same_episode_in_a_fresh_process(episodes):
         "from internav_data.houses import build_house, HouseConfig\n"
         "from internav_data.episodes import build_episodes\n"
         "house = build_house(0, 6, HouseConfig(), catalogue())\n"
-        "print(repr(build_episodes(house, 1, catalogue().spawnable, first=2)[0]))"
+        "from dataclasses import astuple\n"
+        "print(repr(astuple(build_episodes(house, 1, catalogue().spawnable, first=2)[0])))"
     )
     done = subprocess.run(
         [sys.executable, "-c", script], check=True, capture_output=True, text=True
     )
-    assert done.stdout.strip() == repr(episodes[6][2])
+    assert done.stdout.strip() == repr(astuple(episodes[6][2]))
 
 
 def test_obstacles_stay_at_rest_in_a_whole_scene_of_bullet(houses, episodes):
