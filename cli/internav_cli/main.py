@@ -26,6 +26,7 @@ COMMANDS = {
     "validate": "Validate a dataset independently of its generator; list every error.",
     "stats": "Print statistics of a dataset, beside the paper's Table 2.",
     "show": "Draw a house or an episode from above as a PNG.",
+    "view": "Show a dataset in the browser: statistics, gallery, episodes with their outcomes.",
     "replay": "Record a video of an episode: the agent's camera beside the map.",
     "upload": "Upload a dataset to the Hugging Face hub; print the plan first.",
     "schema": "Print the JSON Schemas of every row and file.",

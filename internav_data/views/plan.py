@@ -74,10 +74,14 @@ def house_line(house: House) -> str:
 
 def house_canvas(house: House, pixels: int) -> Canvas:
     """Return an empty canvas around a house."""
+    return Canvas(*map_corners(house), pixels, PAPER)
+
+
+def map_corners(house: House) -> tuple[Vec2, Vec2]:
+    """Return the lower left and the upper right corner of a house's picture, metres."""
     xs, ys = [p[0] for p in house.outline], [p[1] for p in house.outline]
     low = (min(xs) - _MARGIN_M, min(ys) - _MARGIN_M)
-    high = (max(xs) + _MARGIN_M, max(ys) + _MARGIN_M)
-    return Canvas(low, high, pixels, PAPER)
+    return low, (max(xs) + _MARGIN_M, max(ys) + _MARGIN_M)
 
 
 def paint_house(
@@ -86,11 +90,13 @@ def paint_house(
     on_path: Collection[int] | None = None,
     *,
     scale_at: Vec2 | None = None,
+    letter_px: float = 8.0,
 ) -> None:
     """Paint floors, shadows, objects, walls, windows and doors, in this order; then a scale.
 
     With `on_path`, these rooms are tinted and the other rooms' floors pale. The scale's lower left
-    corner is outside the house, clear of the entrance's arrow, or at `scale_at`.
+    corner is outside the house, clear of the entrance's arrow, or at
+    `scale_at`; its letters are `letter_px` high.
     """
     for room in house.rooms:
         paint_floor(canvas, house, room)
@@ -117,7 +123,7 @@ def paint_house(
         _paint_door(canvas, house, door)
     for window in house.windows:
         _paint_window(canvas, window)
-    _paint_scale(canvas, scale_at or _scale_place(canvas, house))
+    _paint_scale(canvas, scale_at or _scale_place(canvas, house, letter_px), letter_px)
 
 
 def _rectangle(wall: Wall) -> list[Vec2]:
@@ -196,34 +202,35 @@ def _arrow(house: House, door: Door) -> tuple[Floats, Floats]:
     return head, np.array([tip - inwards * 0.44, tip - inwards * 0.2])
 
 
-def _scale_place(canvas: Canvas, house: House) -> Vec2:
+def _scale_place(canvas: Canvas, house: House, letter_px: float) -> Vec2:
     """Return the lower left corner of the scale: below the house, else above it.
 
     At either end of the side, whichever no arrow of an entrance lies across.
     """
     xs, ys = [p[0] for p in house.outline], [p[1] for p in house.outline]
-    right = max(xs) - _scale_width(canvas)
+    wide = _scale_width(canvas, letter_px)
+    right = max(xs) - wide
     places = [(x, y) for y in (min(ys) - 0.45, max(ys) + 0.36) for x in (min(xs), right)]
     arrows = [np.vstack(_arrow(house, door)) for door in house.doors if not door.open]
-    return next((p for p in places if not any(_on_scale(canvas, p, a) for a in arrows)), places[0])
+    return next((p for p in places if not any(_on_scale(wide, p, a) for a in arrows)), places[0])
 
 
-def _on_scale(canvas: Canvas, at: Vec2, points: Floats) -> bool:
-    """Return whether the box of some points (n, 2) comes near a scale."""
+def _on_scale(wide: float, at: Vec2, points: Floats) -> bool:
+    """Return whether the box of some points (n, 2) comes near a scale of some width."""
     low, high = points.min(axis=0), points.max(axis=0)
     return bool(
         at[0] - _BESIDE_M < high[0]
-        and low[0] < at[0] + _scale_width(canvas) + _BESIDE_M
+        and low[0] < at[0] + wide + _BESIDE_M
         and at[1] - _BESIDE_M < high[1]
         and low[1] < at[1] + _SCALE_HIGH_M + _BESIDE_M
     )
 
 
-def _scale_width(canvas: Canvas) -> float:
-    return _SCALE_TEXT_M + canvas.text_width("2 m", 8.0)
+def _scale_width(canvas: Canvas, letter_px: float) -> float:
+    return _SCALE_TEXT_M + canvas.text_width("2 m", letter_px)
 
 
-def _paint_scale(canvas: Canvas, at: Vec2) -> None:
+def _paint_scale(canvas: Canvas, at: Vec2, letter_px: float) -> None:
     """Draw a bar of two metres."""
     x, y = at
     for k, colour in ((0, INK), (1, PAPER)):
@@ -232,11 +239,18 @@ def _paint_scale(canvas: Canvas, at: Vec2) -> None:
     top = y + _SCALE_HIGH_M
     canvas.line([(x, y), (x + 2, y), (x + 2, top), (x, top)], INK, 1.0, closed=True)
     canvas.text(
-        (x + _SCALE_TEXT_M, y + _SCALE_HIGH_M / 2.0), "2 m", 8.0, INK, anchor="left", halo=PAPER
+        (x + _SCALE_TEXT_M, y + _SCALE_HIGH_M / 2.0),
+        "2 m",
+        letter_px,
+        INK,
+        anchor="left",
+        halo=PAPER,
     )
 
 
-def paint_labels(canvas: Canvas, house: House, taken: Sequence[Floats]) -> None:
+def paint_labels(
+    canvas: Canvas, house: House, taken: Sequence[Floats], *, letter_px: float = 9.5
+) -> None:
     """Write each room's name and area where they hide least.
 
     Parameters
@@ -245,6 +259,8 @@ def paint_labels(canvas: Canvas, house: House, taken: Sequence[Floats]) -> None:
         A painted house.
     taken
         Further shapes (n, 2) to stay clear of.
+    letter_px
+        Height of the names' capital letters, pixels; less where a room is too narrow.
     """
     seen = [
         o
@@ -256,18 +272,18 @@ def paint_labels(canvas: Canvas, house: House, taken: Sequence[Floats]) -> None:
     rugs = canvas.mask([o.plan for o in seen if o.top_m <= _RUG_M])
     blocked = np.maximum(blocked, rugs // 2)
     for room in house.rooms:
-        _label_room(canvas, room, blocked)
+        _label_room(canvas, room, blocked, letter_px)
 
 
-def _label_room(canvas: Canvas, room: Room, blocked: Image) -> None:
+def _label_room(canvas: Canvas, room: Room, blocked: Image, letter_px: float) -> None:
     name, area = room.type.replace("_", " "), f"{room.area_m2:.1f} m2"
     xs, ys = [p[0] for p in room.polygon], [p[1] for p in room.polygon]
     window = canvas.window((min(xs), min(ys)), (max(xs), max(ys)))
     inside = canvas.mask([room.polygon])[window] > 127
     free = np.where(inside, 1.0 - blocked[window].astype(np.float32) / 255.0, 0.0)
     x, y = canvas.metres(window)
-    height = 9.5
-    while height > 5.5 and canvas.text_width(name, height) > 0.8 * (max(xs) - min(xs)):
+    height = letter_px
+    while height > 0.58 * letter_px and canvas.text_width(name, height) > 0.8 * (max(xs) - min(xs)):
         height -= 0.5
     size = (
         max(canvas.text_width(name, height), canvas.text_width(area, height * 0.8)),

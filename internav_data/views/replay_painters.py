@@ -316,21 +316,13 @@ class CameraPainter:
         frames = self._camera.render([view])
         picture: Image = frames.rgb[0]
         if shot.target >= 0:
-            self._highlight(picture, frames.ids[0] == 1 + self._instances[shot.target])
+            highlight(picture, frames.ids[0] == 1 + self._instances[shot.target])
         if held >= 0:
             self._in_hand(picture, held)
         if shot.mood == "bad":
             wide = max(2, self._size // 80)
             cv2.rectangle(picture, (0, 0), (self._size - 1, self._size - 1), _FAILED, 2 * wide)
         return picture
-
-    def _highlight(self, picture: Image, mask: NDArray[np.bool_]) -> None:
-        """Draw a line around a mask (h, w) in the picture."""
-        thick = max(1, self._size // 200)
-        inside = mask.astype(np.uint8)
-        for reach, colour in ((2 * thick + 1, _RIM), (thick + 1, _HIGHLIGHT)):
-            kernel = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
-            picture[(cv2.dilate(inside, kernel) > 0) & ~mask] = colour
 
     def _in_hand(self, picture: Image, item: int) -> None:
         """Show the held object in a corner."""
@@ -340,6 +332,15 @@ class CameraPainter:
             asset = self._story.moments[0].world.items[item].asset
             icon = self._icons[item] = _icon(asset, side)
         picture[-side - gap : -gap, -side - gap : -gap] = icon
+
+
+def highlight(picture: Image, mask: NDArray[np.bool_]) -> None:
+    """Draw a line around a mask (h, w) into a picture (h, w, 3) uint8."""
+    thick = max(1, len(picture) // 200)
+    inside = mask.astype(np.uint8)
+    for reach, colour in ((2 * thick + 1, _RIM), (thick + 1, _HIGHLIGHT)):
+        kernel = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
+        picture[(cv2.dilate(inside, kernel) > 0) & ~mask] = colour
 
 
 def _icon(asset: Asset, side: int) -> Image:

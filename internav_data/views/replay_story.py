@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal
 
 from internav_data.navigation import SPACING_M
-from internav_data.records import Pose
 from internav_data.records.errors import UsageError
+from internav_data.views.motion import eased, interpolated
 from internav_data.world import ACTION_COUNT, Action, HouseModel, World
 from internav_data.world.actions import INTERACTION_KINDS
 from internav_data.world.config import DEFAULT_WORLD
@@ -16,7 +15,7 @@ from internav_data.world.config import DEFAULT_WORLD
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from internav_data.records import Asset, Episode, Quaternion, Vec2
+    from internav_data.records import Asset, Episode, Pose, Vec2
     from internav_data.world import StepResult
     from internav_data.world.config import WorldConfig
 
@@ -352,11 +351,11 @@ def _slide(
     still = _still(story, after, 1, "", "plain", result.target, shown=before)
     text = f"{result.action.words}: {story.name(result.target)}"
     for k in range(1, count):
-        share = 1.0 - (1.0 - k / count) ** 2
+        share = eased(k / count)
         poses = dict(still.poses)
         for item, pose in result.moved:
             begin = poses[item]
-            poses[item] = pose if begin is None else _interpolated(begin, pose, share)
+            poses[item] = pose if begin is None else interpolated(begin, pose, share)
         yield Shot(
             frames=1,
             moment=after,
@@ -371,18 +370,3 @@ def _slide(
             target=result.target,
             path_steps=still.path_steps,
         )
-
-
-def _interpolated(begin: Pose, end: Pose, share: float) -> Pose:
-    """Return a pose between two, by the shorter rotation."""
-    a, b = begin.quaternion, end.quaternion
-    sign = 1.0 if sum(p * q for p, q in zip(a, b, strict=True)) >= 0.0 else -1.0
-    x, y, z, w = (p + share * (sign * q - p) for p, q in zip(a, b, strict=True))
-    length = math.sqrt(x * x + y * y + z * z + w * w)
-    turned: Quaternion = (x / length, y / length, z / length, w / length)
-    return Pose(
-        begin.x + share * (end.x - begin.x),
-        begin.y + share * (end.y - begin.y),
-        begin.z + share * (end.z - begin.z),
-        turned,
-    )

@@ -1,0 +1,168 @@
+"""Server of the page on this machine alone: GET requests that name it as 127.0.0.1 or localhost."""
+
+from __future__ import annotations
+
+import errno
+import threading
+import webbrowser
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import TYPE_CHECKING, Final
+
+from internav_data.records.errors import UsageError
+from internav_data.viewer.routes import Response, failure, respond
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from internav_data.viewer.viewed import ViewedDataset
+
+HOST: Final = "127.0.0.1"
+PORT: Final = 8437
+"""Port where none is asked for; another free one if it is taken."""
+_TIMEOUT_S: Final = 30.0
+"""Longest wait for a request on a connection, seconds."""
+_HEADERS: Final = {
+    "Cache-Control": "no-store",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+}
+_POLICY: Final = "default-src 'none'"
+
+
+class ViewerServer(ThreadingHTTPServer):
+    """HTTP server of one dataset's page, bound to `HOST`.
+
+    A page of another site whose name was made to resolve to this machine (DNS rebinding) sends that
+    name as the request's host, and is refused.
+
+    Raises
+    ------
+    UsageError
+        The port is taken, or may not be taken by this user.
+    """
+
+    daemon_threads = True
+    allow_reuse_address = True
+
+    def __init__(self, viewed: ViewedDataset, port: int = 0) -> None:
+        self.viewed = viewed
+        try:
+            super().__init__((HOST, port), _Handler)
+        except (OSError, OverflowError) as error:
+            raise UsageError(_refusal(port, error)) from error
+        bound = self.server_address[1]
+        self.hosts = {f"{name}:{bound}" for name in (HOST, "localhost", "[::1]")}
+        """Values of the header Host that are answered."""
+
+    @property
+    def url(self) -> str:
+        """Address of the page."""
+        return f"http://{HOST}:{self.server_address[1]}/"
+
+
+def _refusal(port: int, error: Exception) -> str:
+    if getattr(error, "errno", None) == errno.EADDRINUSE:
+        return f"--port {port}: another program listens there; choose another port, or leave it out"
+    reason = getattr(error, "strerror", None) or error
+    return f"--port {port}: cannot listen there ({reason}); choose one from 1024 to 65535"
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """Handler of one connection."""
+
+    server: ViewerServer
+    protocol_version = "HTTP/1.1"
+    timeout = _TIMEOUT_S
+    server_version, sys_version = "internav-view", ""
+
+    def do_GET(self) -> None:
+        hosts = self.headers.get_all("Host") or []
+        if len(hosts) != 1 or hosts[0].lower() not in self.server.hosts:
+            self._send(failure(403, f"this server answers as {HOST} and localhost alone"))
+        elif self.headers.get("Content-Length", "0") != "0" or "Transfer-Encoding" in self.headers:
+            self.close_connection = True
+            self._send(failure(400, "a request with a body: expected none"))
+        else:
+            self._send(respond(self.server.viewed, self.path))
+
+    def _send(self, response: Response) -> None:
+        try:
+            self.send_response(response.status)
+            for name, value in _HEADERS.items():
+                self.send_header(name, value)
+            self.send_header("Content-Security-Policy", response.policy or _POLICY)
+            self.send_header("Content-Type", response.kind)
+            self.send_header("Content-Length", str(len(response.body)))
+            self.end_headers()
+            self.wfile.write(response.body)
+        except (ConnectionError, TimeoutError):
+            self.close_connection = True  # whoever asked has turned the page
+
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+        """Answer a request that is none of ours, as one of another method, by one line."""
+        del explain
+        self.close_connection = True
+        self._send(failure(code, message or "expected a GET request"))
+
+    def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - http.server's name
+        """Log nothing: requests are a page's own."""
+
+
+def open_server(viewed: ViewedDataset, port: int | None) -> ViewerServer:
+    """Return a server on a port; without one on `PORT`, or on any that is free.
+
+    Raises
+    ------
+    UsageError
+        The port that was asked for is taken.
+    """
+    if port is not None:
+        return ViewerServer(viewed, port)
+    try:
+        return ViewerServer(viewed, PORT)
+    except UsageError:
+        return ViewerServer(viewed, 0)
+
+
+def serve(
+    viewed: ViewedDataset,
+    port: int | None = None,
+    *,
+    browser: bool = True,
+    say: Callable[[str], object] = print,
+) -> None:
+    """Serve a dataset's page until the process is interrupted.
+
+    Parameters
+    ----------
+    viewed
+        The dataset.
+    port
+        Port to listen on, 0 for any free one.
+    browser
+        Whether to open the user's browser.
+    say
+        Function that is told the address, and whether a browser was found.
+
+    Raises
+    ------
+    UsageError
+        The port is taken.
+    """
+    with open_server(viewed, port) as server:
+        viewed.warm()
+        say(f"{server.url} shows the dataset; Ctrl-C ends it")
+        if browser:
+            threading.Thread(target=_open, args=(server.url, say), daemon=True).start()
+        server.serve_forever(poll_interval=0.2)
+
+
+def _open(url: str, say: Callable[[str], object]) -> None:
+    try:
+        opened = webbrowser.open(url)
+    except webbrowser.Error:
+        opened = False
+    if not opened:
+        say(f"no browser was found: open {url} in one on this machine")
