@@ -32,6 +32,8 @@ _PANE: RGB = (176, 216, 240)
 _ENTRANCE: RGB = (176, 62, 48)
 _LABEL: RGB = (70, 66, 62)
 _MARGIN_M = 0.75
+_SCALE_PX = 8.0
+"""Height of the scale's letters, pixels."""
 _WALL_M = 0.12
 _RUG_M = 0.05
 _SCALE_HIGH_M, _SCALE_TEXT_M = 0.09, 2.12
@@ -90,7 +92,7 @@ def paint_house(
     on_path: Collection[int] | None = None,
     *,
     scale_at: Vec2 | None = None,
-    letter_px: float = 8.0,
+    letter_px: float = _SCALE_PX,
 ) -> None:
     """Paint floors, shadows, objects, walls, windows and doors, in this order; then a scale.
 
@@ -202,7 +204,7 @@ def _arrow(house: House, door: Door) -> tuple[Floats, Floats]:
     return head, np.array([tip - inwards * 0.44, tip - inwards * 0.2])
 
 
-def _scale_place(canvas: Canvas, house: House, letter_px: float) -> Vec2:
+def _scale_place(canvas: Canvas, house: House, letter_px: float = _SCALE_PX) -> Vec2:
     """Return the lower left corner of the scale: below the house, else above it.
 
     At either end of the side, whichever no arrow of an entrance lies across.
@@ -226,7 +228,7 @@ def _on_scale(wide: float, at: Vec2, points: Floats) -> bool:
     )
 
 
-def _scale_width(canvas: Canvas, letter_px: float) -> float:
+def _scale_width(canvas: Canvas, letter_px: float = _SCALE_PX) -> float:
     return _SCALE_TEXT_M + canvas.text_width("2 m", letter_px)
 
 

@@ -230,9 +230,10 @@ def test_a_missing_picture_says_why_in_its_place(browser, address, viewed, monke
         raise CorruptDataError("train-00000.parquet: expected 9 bytes, got 7 (truncated or edited)")
 
     monkeypatch.setattr(type(viewed), "thumbnail", damaged)
-    browser.get(address + "?fresh#/episodes?split=val")
+    browser.get(address + "?fresh#/episodes?distance=4.59-4.59")
     wait(browser, "document.querySelector('.shot .failure') !== null")
     assert "truncated or edited" in browser.find_element("css selector", ".shot").text
+    assert count(browser, ".card") == 1
     browser.get_log("browser")
 
 
