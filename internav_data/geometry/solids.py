@@ -98,9 +98,10 @@ _FILLED = {"box": 1.0, "cylinder": math.pi / 4.0, "sphere": math.pi / 6.0}
 def centre_of_mass(asset: Asset) -> Vec3:
     """Return the centre of mass in the asset's frame, metres, of parts of equal density."""
     total, moment = 0.0, np.zeros(3)
-    for part in asset.parts:
+    corners, rows = asset_corners(asset)
+    for part, first, end in zip(asset.parts, rows, rows[1:], strict=False):
         if part.shape == "hull":
-            volume, centroid = _hull_mass(part_corners(part))
+            volume, centroid = _hull_mass(corners[first:end])
         else:
             volume = _FILLED[part.shape] * part.size[0] * part.size[1] * part.size[2]
             centroid = np.array(part.centre)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from internav_data.geometry import centre_of_mass, multiply, rotation_matrix
 from internav_data.physics.scene import PushSolution, SettleSolution
-from internav_data.physics.sweep import bounding_radius_m, sweep_recorder
+from internav_data.physics.sweep import SweepRecorder, bounding_radius_m
 from internav_data.records import Pose
 
 if TYPE_CHECKING:
@@ -38,9 +38,9 @@ WINDOW_S: Final = 0.1
 STILL_WINDOWS: Final = 2
 """Number of successive windows after which bodies are at rest that tremble in place: they drift no
 faster than `REST_SPEED` and `REST_SPIN`. In one window alone a swing may turn."""
-CREEP_S: Final = 2.0
-"""Time after which bodies are at rest that stay close to one pose, seconds. Jammed ones creep for
-ever; one that creeps over an edge has fallen by then."""
+CREEP_WINDOWS: Final = 20
+"""Number of windows (2 s) after which bodies are at rest that stay close to one pose. Jammed ones
+creep for ever; one that creeps over an edge has fallen by then."""
 CREEP_M: Final = 0.001
 """Distance of a pose that is close to another, metres."""
 CREEP_RAD: Final = 0.005
@@ -84,7 +84,7 @@ def solve_push(engine: Engine, scene: PhysicsScene, spec: PushSpec) -> PushSolut
     moving = [k for k, body in enumerate(scene.bodies) if body.moves]
     pusher = _Pusher(spec, scene.bodies[0].dynamics.mass_kg, engine.step_s)
     limit = pusher.steps_left + round(PUSH_LIMIT_S / engine.step_s)
-    recorders = [sweep_recorder(scene.bodies[k].asset, limit) for k in moving]
+    recorders = [SweepRecorder(scene.bodies[k].asset) for k in moving]
     movers = list(zip(moving, recorders, strict=True))
     rest = _RestRule(moving, engine.step_s)
     steps = 0
@@ -103,10 +103,11 @@ def solve_push(engine: Engine, scene: PhysicsScene, spec: PushSpec) -> PushSolut
                 slow = slow and shift < rest.slow_m and _is_slow(simulation, k)
             if rest.note(simulation, slow=slow, held=pusher.holds):
                 pusher.let_go()
+        sweeps, paths = zip(*(recorder.recorded() for recorder in recorders), strict=True)
         return PushSolution(
             poses=tuple(_pose(simulation, k, scene.bodies[k]) for k in moving),
-            sweeps=tuple(recorder.dop8 for recorder in recorders),
-            paths=tuple(recorder.path for recorder in recorders),
+            sweeps=sweeps,
+            paths=paths,
             seconds=steps * engine.step_s,
             at_rest=rest.holds,
         )
@@ -170,20 +171,18 @@ class _Calm:
         self._velocities: list[tuple[Vec3, Vec3]] = []
         """Velocities of the bodies after the first of these."""
 
-    @property
-    def holds(self) -> bool:
-        """Whether all bodies are calm."""
+    def note(self, simulation: Simulation, *, slow: bool) -> bool:
+        """Take notice of whether all bodies were slow in a step; return whether they are calm."""
+        if not slow:
+            self._steps = 0
+            return False
+        self._steps += 1
+        if self._steps in {1, self._enough}:
+            before = self._velocities
+            self._velocities = [simulation.velocity(k) for k in self._bodies]
+            if self._steps > 1 and not all(map(_steady, before, self._velocities)):
+                self._steps = 1
         return self._steps >= self._enough
-
-    def note(self, simulation: Simulation, *, slow: bool) -> None:
-        """Take notice of a step: whether all bodies were slow in it."""
-        self._steps = self._steps + 1 if slow else 0
-        if self._steps not in {1, self._enough}:
-            return
-        before = self._velocities
-        self._velocities = [simulation.velocity(k) for k in self._bodies]
-        if self._steps > 1 and not all(map(_steady, before, self._velocities)):
-            self._steps = 1
 
 
 class _RestRule:
@@ -220,12 +219,14 @@ class _RestRule:
             self._steps, self._still, self._close, self._first = 0, 0, 0, self._latest
         self._held = held
         self._steps += 1
-        self._calm.note(simulation, slow=slow)
+        calm = self._calm.note(simulation, slow=slow)
         if self._steps % self._window == 0:
             self._look(simulation)
-        stay = self._still >= STILL_WINDOWS or self._close * WINDOW_S >= CREEP_S
-        self.holds = not held and (self._calm.holds or stay)
-        return held and self._still > 0
+        if held:
+            return self._still > 0
+        stay = self._still >= STILL_WINDOWS or self._close >= CREEP_WINDOWS
+        self.holds = calm or stay
+        return False
 
     def _look(self, simulation: Simulation) -> None:
         """Look at how far the bodies have drifted since earlier windows."""

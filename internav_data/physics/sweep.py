@@ -27,10 +27,7 @@ KEPT_M: Final = 0.004
 _POSE: Final = 7
 """Length of a recorded pose: the centre of mass (3) and a quaternion (4)."""
 PATH_POSE_BYTES: Final = 4 * _POSE
-"""Length of one pose in `SweepRecorder.path`, bytes."""
-_KEPT, _LATEST, _COUNT, _LENGTH = 8, 15, 22, 23
-"""Offsets into a recorder's state, one array that its kernel can write: the 8-DOP comes first, then
-the last recorded pose, the latest pose and the number of recorded poses; `_LENGTH` is its size."""
+"""Length of one pose in `SweepRecorder.recorded`, bytes."""
 
 
 @lru_cache(maxsize=4096)
@@ -51,52 +48,34 @@ def bounding_radius_m(asset: Asset) -> float:
 
 
 @njit(cache=True)
-def _follow(
-    state: Floats,
-    kept: Poses,
-    corners: Floats,
-    radius: float,
-    x: float,
-    y: float,
-    z: float,
-    qx: float,
-    qy: float,
-    qz: float,
-    qw: float,
-) -> float:
-    """Widen the 8-DOP to a pose and record the pose if the body moved far enough since the last.
-
-    Returns the distance of the centre of mass from the latest pose, metres; inf at first.
-    """
-    widen(state[:8], corners, x, y, qx, qy, qz, qw)
-    pose = (x, y, z, qx, qy, qz, qw)
-    count = int(state[_COUNT])
-    first = count == 0
-    far = math.hypot(math.hypot(x - state[_KEPT], y - state[_KEPT + 1]), z - state[_KEPT + 2])
-    dot = qx * state[_KEPT + 3] + qy * state[_KEPT + 4]
-    dot += qz * state[_KEPT + 5] + qw * state[_KEPT + 6]
-    # A bound of the angle since the last recorded pose without its arc cosine: dot is the cosine
-    # of half the angle, and an angle is at most pi times the sine of its half.
-    turn = math.pi * math.sqrt(max(0.0, 1.0 - dot * dot))
-    dx, dy, dz = x - state[_LATEST], y - state[_LATEST + 1], z - state[_LATEST + 2]
-    if (first or far + radius * turn >= KEPT_M) and count < len(kept):
-        for k in range(_POSE):
-            kept[count, k] = pose[k]
-            state[_KEPT + k] = pose[k]
-        state[_COUNT] = count + 1
-    for k in range(_POSE):
-        state[_LATEST + k] = pose[k]
-    return math.inf if first else math.sqrt(dx * dx + dy * dy + dz * dz)
+def _record(corners: Floats, radius: float, poses: Floats, reach: Floats) -> Poses:
+    """Widen an 8-DOP (8,) to poses (n, 7); return those that lie apart, and the latest one."""
+    kept = np.empty((len(poses) + 1, _POSE), dtype=np.float32)
+    count, last = 0, 0
+    for k in range(len(poses)):
+        x, y, z, qx, qy, qz, qw = poses[k]
+        widen(reach, corners, x, y, qx, qy, qz, qw)
+        far = math.hypot(math.hypot(x - poses[last, 0], y - poses[last, 1]), z - poses[last, 2])
+        dot = qx * poses[last, 3] + qy * poses[last, 4]
+        dot += qz * poses[last, 5] + qw * poses[last, 6]
+        # A bound of the angle since the last recorded pose without its arc cosine: dot is the
+        # cosine of half the angle, and an angle is at most pi times the sine of its half.
+        turn = math.pi * math.sqrt(max(0.0, 1.0 - dot * dot))
+        if k == 0 or far + radius * turn >= KEPT_M:
+            kept[count] = poses[k]
+            count, last = count + 1, k
+    kept[count] = poses[-1]
+    return kept[: count + 1]
 
 
-@dataclass(slots=True)
 class SweepRecorder:
     """Record of one body's motion: a planar 8-DOP of its sweep, and sampled poses."""
 
-    _corners: Floats
-    _radius: float
-    _state: Floats
-    _kept: Poses
+    __slots__ = ("_asset", "_placements")
+
+    def __init__(self, asset: Asset) -> None:
+        self._asset = asset
+        self._placements: list[tuple[Vec3, Quaternion]] = []
 
     def follow(self, middle: Vec3, turn: Quaternion) -> float:
         """Add the body's present centre of mass and orientation to the record.
@@ -107,28 +86,29 @@ class SweepRecorder:
             Distance that the centre of mass moved since the last call, metres; inf at first.
 
         """
-        return _follow(self._state, self._kept, self._corners, self._radius, *middle, *turn)
+        placements = self._placements
+        shift = math.dist(middle, placements[-1][0]) if placements else math.inf
+        placements.append((middle, turn))
+        return shift
 
-    @property
-    def dop8(self) -> Dop8:
-        """Planar 8-DOP of the sweep so far."""
-        a, b, c, d, e, f, g, h = self._state[:8].tolist()
-        return a, b, c, d, e, f, g, h
+    def recorded(self) -> tuple[Dop8, bytes]:
+        """Return what is known of the motion so far.
 
-    @property
-    def path(self) -> bytes:
-        """Recorded poses, (n, 7) float32 as bytes, the first and the latest included."""
-        poses = self._kept[: int(self._state[_COUNT])]
-        last = self._state[_LATEST : _LATEST + _POSE].astype(np.float32)
-        return poses.tobytes() + last.tobytes()
+        Returns
+        -------
+        dop8
+            Planar 8-DOP of the sweep.
+        path
+            Recorded poses, (n, 7) float32 as bytes, the first and the latest included.
 
-
-def sweep_recorder(asset: Asset, steps: int) -> SweepRecorder:
-    """Return an empty recorder for at most `steps` calls of `follow`."""
-    state = np.zeros(_LENGTH)
-    state[:8] = -math.inf
-    kept = np.empty((steps + 1, _POSE), dtype=np.float32)
-    return SweepRecorder(centred_corners(asset), bounding_radius_m(asset), state, kept)
+        """
+        # All at once: a call of a compiled kernel takes a tenth of a step of the engine.
+        poses = np.array([(*middle, *turn) for middle, turn in self._placements])
+        reach = np.full(8, -math.inf)
+        asset = self._asset
+        path = _record(centred_corners(asset), bounding_radius_m(asset), poses, reach)
+        a, b, c, d, e, f, g, h = reach.tolist()
+        return (a, b, c, d, e, f, g, h), path.tobytes()
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from internav_data.geometry import asset_corners, part_corners, rotation_matrix
+from internav_data.geometry import asset_corners, rotation_matrix
 
 if TYPE_CHECKING:
     from internav_data.core.typing import Floats, Ints
@@ -37,8 +37,11 @@ def _planes_of(corners: Floats) -> Floats:
     from scipy.spatial import ConvexHull  # noqa: PLC0415 - imported when used
 
     # qhull repeats a plane for each triangle of a face, equal but for the last bits.
-    rows = np.unique(np.round(ConvexHull(corners).equations, 9), axis=0)
-    return np.column_stack([rows[:, :3], -rows[:, 3]])
+    rows = np.round(ConvexHull(corners).equations, 9)
+    # As np.unique(rows, axis=0), in a third of its time.
+    rows = rows[np.lexsort(rows.T[::-1])]
+    new = np.append(True, (rows[1:] != rows[:-1]).any(axis=1))
+    return rows[new] * (1.0, 1.0, 1.0, -1.0)
 
 
 def _box_planes(size: tuple[float, float, float]) -> Floats:
@@ -51,11 +54,11 @@ def _box_planes(size: tuple[float, float, float]) -> Floats:
     return np.array(rows)
 
 
-def _part_planes(part: Part) -> Floats:
-    """Return the planes (m, 4) of a part in the asset's frame."""
+def _part_planes(part: Part, corners: Floats) -> Floats:
+    """Return the planes (m, 4) of a part with these corners (n, 3), in the asset's frame."""
     if part.shape == "box":
         return moved_planes(_box_planes(part.size), rotation_matrix(part.rotation), part.centre)
-    return _planes_of(part_corners(part))
+    return _planes_of(corners)
 
 
 def moved_planes(planes: Floats, matrix: Floats, shift: tuple[float, float, float]) -> Floats:
@@ -73,7 +76,9 @@ def moved_planes(planes: Floats, matrix: Floats, shift: tuple[float, float, floa
 @lru_cache(maxsize=2048)
 def occlusion_shape(asset: Asset) -> OcclusionShape:
     """Return an asset's occlusion shape in its own frame; cached, read-only."""
-    planes = [_part_planes(part) for part in asset.parts]
+    corners, rows = asset_corners(asset)
+    parts = zip(asset.parts, np.split(corners, rows[1:-1]), strict=True)
+    planes = [_part_planes(part, own) for part, own in parts]
     starts = np.cumsum([0, *(len(p) for p in planes)]).astype(np.int64)
     points, owners = _visibility_points(asset)
     return OcclusionShape(np.vstack(planes), starts, points, owners)

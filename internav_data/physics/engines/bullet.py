@@ -10,7 +10,7 @@ from __future__ import annotations
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from internav_data.core.locks import ThreadLock, once_per_process
 from internav_data.core.temporary import process_folder
@@ -74,14 +74,15 @@ class BulletSimulation:
 
     def placement(self, body: int) -> tuple[Vec3, Quaternion]:
         """Return a body's centre of mass, metres, and its orientation."""
-        return cast(
-            "tuple[Vec3, Quaternion]",
-            pybullet.getBasePositionAndOrientation(self.ids[body], self.client),
+        found: tuple[Vec3, Quaternion] = pybullet.getBasePositionAndOrientation(
+            self.ids[body], self.client
         )
+        return found
 
     def velocity(self, body: int) -> tuple[Vec3, Vec3]:
         """Return the velocity of a body's centre of mass, m/s, and its spin, rad/s."""
-        return cast("tuple[Vec3, Vec3]", pybullet.getBaseVelocity(self.ids[body], self.client))
+        found: tuple[Vec3, Vec3] = pybullet.getBaseVelocity(self.ids[body], self.client)
+        return found
 
     def set_velocity(self, body: int, linear: Vec3, angular: Vec3) -> None:
         """Give a body a velocity, m/s, and a spin, rad/s."""
