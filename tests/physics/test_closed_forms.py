@@ -1,5 +1,7 @@
 """Motions whose end a formula knows, on every engine; slides are in `test_push`."""
 
+import math
+
 import numpy as np
 import pytest
 from builders import UPRIGHT, asset, crate, part
@@ -16,6 +18,10 @@ KICK, FORCE = PUSH_SPECS["kick"], PUSH_SPECS["force"]
 
 def solved(engine, spec, *bodies):
     return solve_push(ENGINES[engine](), PhysicsScene(bodies), spec)
+
+
+def position(pose):
+    return pose.x, pose.y, pose.z
 
 
 def greatest_tilt_deg(solution):
@@ -115,3 +121,15 @@ def test_a_glancing_collision_rubs_by_the_product_too(engine, friction):
         (across, along, _), _ = simulation.velocity(0)
     assert across < 0.02
     assert (1.0 - along) / (1.0 - across) == pytest.approx(0.6 * friction, abs=0.03)
+
+
+def test_a_body_that_nothing_touches_stays_where_it_is(engine):
+    """It may sleep, or be borne: what trembles would have moved after a push elsewhere."""
+    box = crate("Box_0", (0.4, 0.4, 0.4), friction=0.6)
+    far = Pose(0.0, 1.0, 0.001, UPRIGHT)
+    solution = solved(engine, KICK, Body.of(box, STANDING), Body.of(box, far))
+    assert math.dist(position(solution.poses[1]), position(far)) < 1e-12
+    struck = solved(
+        engine, KICK, Body.of(box, STANDING), Body.of(box, Pose(0.6, 0.0, 0.001, UPRIGHT))
+    )
+    assert struck.poses[1].x > 0.62

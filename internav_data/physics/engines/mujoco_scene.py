@@ -86,8 +86,9 @@ FAST: Final = 0.05
 with them (`set_friction_solver`)."""
 FRICTION_IMPEDANCE: Final = {True: 1e-4, False: 10.0}
 """Impedance of friction by that of normal forces where something is fast, and where nothing is."""
-NO_SLIP_ITERATIONS: Final = {True: 5, False: 0}
-"""Iterations of the second solver, which finds friction by given normal forces."""
+NO_SLIP_ITERATIONS: Final = {True: 2, False: 0}
+"""Iterations of the second solver, which finds friction by given normal forces. After five the ends
+of pushes are no closer to Bullet's, and a step of several bodies takes half as long again."""
 CONTACT_DIMENSIONS: Final = 3
 """Contacts resist slipping. Contacts that resist rolling too took four times as long to solve: that
 is a torque of each body here, for all its weight."""
@@ -172,6 +173,8 @@ def _compiled(scene: PhysicsScene) -> CompiledScene:
         reason = " ".join(str(error).split())
         raise UsageError(f"MuJoCo refuses a shape among {ids}: {reason}") from error
     moving = [k for k, body in enumerate(scene.bodies) if body.moves]
+    model.tree_sleep_policy[:] = mujoco.mjtSleepPolicy.mjSLEEP_INIT
+    model.tree_sleep_policy[:1] = mujoco.mjtSleepPolicy.mjSLEEP_NEVER  # what falls or is pushed
     return CompiledScene(
         model,
         mujoco.MjData(model),
@@ -192,6 +195,8 @@ def _new_spec() -> MjSpec:
     option.gravity = (0.0, 0.0, -GRAVITY)
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    # Asleep, a body that is not touched neither trembles nor costs time; a touch wakes it.
+    option.enableflags = mujoco.mjtEnableBit.mjENBL_SLEEP
     # A scene that becomes unstable must be noticed, not begin anew.
     option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
     _add_geom(spec.worldbody, "", mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 1))
