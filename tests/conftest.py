@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import builders
+import engines  # noqa: F401 - chooses the default one
 import pytest
 from hypothesis import HealthCheck, settings
 

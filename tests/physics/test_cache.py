@@ -13,6 +13,7 @@ from types import SimpleNamespace
 
 import pytest
 from builders import UPRIGHT, crate
+from engines import default_engine
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -32,7 +33,6 @@ from internav_data.physics.cache import (
     unpack_push,
     unpack_settle,
 )
-from internav_data.physics.engines.bullet import bullet
 from internav_data.physics.result_cache import FILE_NAME, ResultCache
 from internav_data.physics.solving import solve_push, solve_settle
 from internav_data.records import PUSH_SPECS, Pose
@@ -44,17 +44,17 @@ FORCE = PUSH_SPECS["force"]
 
 
 class Counting:
-    """Bullet under another name; it counts the scenes that it loads."""
+    """The default engine under another name; it counts the scenes that it loads."""
 
-    name, build, libraries = "counting", "1", ("pybullet",)
-    contact_margin_m, step_s = 0.0, bullet().step_s
+    name, build, libraries = "counting", "1", default_engine().libraries
+    contact_margin_m, step_s = 0.0, default_engine().step_s
 
     def __init__(self):
         self.asked = 0
 
     def load(self, scene):
         self.asked += 1
-        return bullet().load(scene)
+        return default_engine().load(scene)
 
 
 def remembering(folder, origin="here", engine=None):
@@ -67,8 +67,8 @@ def test_a_later_process_reads_what_was_solved_to_the_last_bit(tmp_path):
     assert first.engine.asked == 2
     first.result_cache.flush()
     later = remembering(tmp_path)
-    assert later.push(LONE, FORCE) == pushed == solve_push(bullet(), LONE, FORCE)
-    assert later.settle(LONE) == settled == solve_settle(bullet(), LONE)
+    assert later.push(LONE, FORCE) == pushed == solve_push(default_engine(), LONE, FORCE)
+    assert later.settle(LONE) == settled == solve_settle(default_engine(), LONE)
     assert later.engine.asked == 0
 
 
@@ -182,9 +182,11 @@ def test_other_rules_or_machines_are_not_believed(tmp_path):
     ["_CODE", "platform.python_version", "platform.libc_ver", "metadata.distribution"],
 )
 def test_whatever_answers_depend_on_is_in_the_origin(monkeypatch, part):
-    here = origin.__wrapped__(bullet())
-    older = SimpleNamespace(name="bullet", build="pybullet 0, rules 0", libraries=("pybullet",))
-    assert origin.__wrapped__(older) != here == origin.__wrapped__(bullet())
+    here = origin.__wrapped__(default_engine())
+    older = SimpleNamespace(
+        name=default_engine().name, build="0, rules 0", libraries=default_engine().libraries
+    )
+    assert origin.__wrapped__(older) != here == origin.__wrapped__(default_engine())
     other = {
         "_CODE": "other code",
         "platform.python_version": lambda: "3.99",
@@ -192,7 +194,7 @@ def test_whatever_answers_depend_on_is_in_the_origin(monkeypatch, part):
         "metadata.distribution": lambda name: Record(f"another build of {name}"),
     }[part]
     monkeypatch.setattr(f"internav_data.physics.cache.{part}", other)
-    assert origin.__wrapped__(bullet()) not in (None, here)
+    assert origin.__wrapped__(default_engine()) not in (None, here)
 
 
 def test_every_module_that_physics_imports_is_in_the_digest(tmp_path):
@@ -207,7 +209,7 @@ def test_every_module_that_physics_imports_is_in_the_digest(tmp_path):
         shutil.copyfile(file, copied)
     here = module.code_digest(root)
     assert module.code_digest(tmp_path) == here
-    assert here in origin(bullet())
+    assert here in origin(default_engine())
     seen = {here}
     for file in found.values():
         copied = tmp_path / file.relative_to(root)
@@ -226,7 +228,7 @@ class Record:
 
 def test_where_a_build_cannot_be_told_nothing_is_kept(monkeypatch):
     monkeypatch.setattr("internav_data.physics.cache.metadata.distribution", lambda _: Record(None))
-    assert origin.__wrapped__(bullet()) is None
+    assert origin.__wrapped__(default_engine()) is None
     monkeypatch.undo()
     other = SimpleNamespace(name="other", build="1", libraries=("no such library",))
     assert origin.__wrapped__(other) is None
@@ -367,7 +369,7 @@ def test_a_file_damaged_anywhere_costs_no_answer_and_is_begun_anew(tmp_path, whe
 def test_a_folder_that_cannot_be_made_keeps_nothing(tmp_path):
     (tmp_path / "file").write_text("in the way")
     solver = remembering(tmp_path / "file" / "below")
-    assert solver.push(LONE, FORCE) == solve_push(bullet(), LONE, FORCE)
+    assert solver.push(LONE, FORCE) == solve_push(default_engine(), LONE, FORCE)
     assert solver.result_cache.count() == 0
 
 
@@ -422,5 +424,5 @@ def test_solving_anew_believes_nothing_that_is_kept(tmp_path, monkeypatch):
     held = ResultCache(tmp_path)
     assert get_solver().push(LONE, FORCE) == lie
     with cache_disabled():
-        assert get_solver().push(LONE, FORCE) == solve_push(bullet(), LONE, FORCE) != lie
+        assert get_solver().push(LONE, FORCE) == solve_push(default_engine(), LONE, FORCE) != lie
     assert get_solver().push(LONE, FORCE) == lie

@@ -4,9 +4,9 @@ import math
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-import holds
 import pytest
 from builders import UPRIGHT, crate
+from engines import bullet_only
 
 from internav_data.physics import Body, push, wall_body
 from internav_data.physics.displacement import tilt_deg
@@ -99,7 +99,10 @@ def test_what_creeps_for_ever_is_at_rest_after_two_seconds_and_what_it_tips_over
     assert not solved(lambda t: 0.001 * t).at_rest
 
 
+@bullet_only
 def test_what_leans_while_it_is_pressed_falls_back():
+    import holds
+
     """Pressed over a curb, its top against a wall: 200 N hold it there, and nothing else does."""
     curb = wall_body(Wall(0.152, -1.0, 0.25, 1.0, 0.0, 0.1))
     wall = wall_body(Wall(0.32, -1.0, 0.44, 1.0, 0.0, 2.6))
@@ -111,8 +114,11 @@ def test_what_leans_while_it_is_pressed_falls_back():
     assert holds.holds(holds.drift(bodies)[0])
 
 
+@bullet_only
 def test_poses_after_pushes_hold_in_a_fresh_scene():
     """Fifty successful pushes of generated episodes; `benchmarks/holds.py` asks thousands."""
+    import holds
+
     count = 0
     for world, _ in holds.made(seed=11):
         for index, _, pushed in holds.successful_pushes(world):

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import pytest
 from builders import UPRIGHT, chair, crate
+from engines import default_engine
 from threaded import run_in_threads
 
 from internav_data.physics import Body, PhysicsScene, cache_disabled, get_solver
 from internav_data.physics.cache import Solver, pack_push
-from internav_data.physics.engines.bullet import bullet
 from internav_data.physics.result_cache import ResultCache
 from internav_data.physics.solving import solve_push
 from internav_data.records import PUSH_SPECS, Pose
@@ -34,7 +34,7 @@ def solved(solver):
 
 
 def uncached():
-    return Solver(bullet(), None, "here")
+    return Solver(default_engine(), None, "here")
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def test_threads_in_one_engine_solve_as_one_does(alone):
 
 def test_threads_keep_what_one_would_keep(alone, tmp_path):
     held = ResultCache(tmp_path)
-    engine = Solver(bullet(), held, "here")
+    engine = Solver(default_engine(), held, "here")
     assert run_in_threads(lambda _: solved(engine), 8) == [alone] * 8
     assert held.count() == 2 * len(LONE)
     later = ResultCache(tmp_path)
@@ -86,7 +86,7 @@ def test_a_fork_while_another_thread_solves_solves_too(alone):
             child = os.fork()
             if child == 0:
                 signal.alarm(60)  # one that waits for a lock for ever ends
-                os._exit(0 if solve_push(bullet(), LONE[0], FORCE) == alone[0][0] else 1)
+                os._exit(0 if solve_push(default_engine(), LONE[0], FORCE) == alone[0][0] else 1)
             codes.append(os.waitpid(child, 0)[1])
         return codes
 

@@ -8,11 +8,11 @@ import builders
 import physical
 import pytest
 from builders import UPRIGHT, asset, part, scene_object
+from engines import of_bullet
 from scenery import ASSETS
 
 from internav_data.geometry import centre_of_mass
 from internav_data.physics import cache_disabled, get_solver
-from internav_data.physics.engines import bullet_scene
 from internav_data.records import MovedObject, Pose
 from internav_data.verification.checked_config import CheckedConfig
 from internav_data.verification.checked_layout import CheckedLayout
@@ -29,6 +29,8 @@ from internav_data.verification.replay.whole_house import EVERY, check_whole_hou
 from internav_data.verification.scenes import check_scene
 from internav_data.verification.shapes import Shapes
 from internav_data.world import World
+
+bullet_scene = of_bullet("internav_data.physics.engines.bullet_scene")
 
 PLATE = asset(  # a box on a plate that is lower than any footprint and wider than the box
     "Plate_1",
