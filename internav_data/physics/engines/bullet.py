@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from internav_data.core.locks import ThreadLock, once_per_process
 from internav_data.core.temporary import process_folder
-from internav_data.physics.engines.bullet_scene import HULL_MARGIN_M, STEP_S, Builder, pybullet
+from internav_data.physics.engines.bullet_scene import HULL_MARGIN_M, Builder, pybullet
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -41,8 +41,12 @@ class Bullet:
     name: str = "bullet"
     libraries: tuple[str, ...] = ("pybullet",)
     contact_margin_m: float = HULL_MARGIN_M
-    step_s: float = STEP_S
     build: str = field(default_factory=lambda: f"pybullet {version('pybullet')}")
+
+    @property
+    def step_s(self) -> float:
+        """Time step, seconds."""
+        return self.builder.step_s
 
     @contextmanager
     def load(self, scene: PhysicsScene) -> Iterator[BulletSimulation]:

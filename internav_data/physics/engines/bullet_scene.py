@@ -52,7 +52,7 @@ def _import_quietly() -> ModuleType:
 pybullet: Any = _import_quietly()
 
 STEP_S = 1.0 / 240.0
-"""Time step, seconds."""
+"""Time step of all data, seconds."""
 GRAVITY = 9.81
 """Acceleration of gravity, m/s²."""
 SOLVER_ITERATIONS = 20
@@ -81,6 +81,8 @@ class Builder:
 
     client: int
     folder: Path
+    step_s: float = STEP_S
+    """Time step, seconds."""
     scenes_per_world: int = SCENES_PER_WORLD
     """1 gives every scene an empty world: 1.5 times as slow, and by definition without history."""
     _files: dict[Asset, str] = field(default_factory=dict)
@@ -133,7 +135,7 @@ class Builder:
     def _set_parameters(self) -> None:
         # For every scene: some are globals of Bullet, and a user's own client may have set them.
         pybullet.setPhysicsEngineParameter(
-            fixedTimeStep=STEP_S,
+            fixedTimeStep=self.step_s,
             numSolverIterations=SOLVER_ITERATIONS,
             numSubSteps=0,
             deterministicOverlappingPairs=1,

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 from internav_data.core.locks import ThreadLock, once_per_process
 from internav_data.physics.engines.mujoco_scene import (
     MARGIN_M,
-    STEP_S,
     ModelBuilder,
     mujoco,
     set_friction_solver,
@@ -40,8 +39,12 @@ class MuJoCo:
     name: str = "mujoco"
     libraries: tuple[str, ...] = ("mujoco-core",)
     contact_margin_m: float = MARGIN_M
-    step_s: float = STEP_S
     build: str = field(default_factory=lambda: f"mujoco {version('mujoco-core')}")
+
+    @property
+    def step_s(self) -> float:
+        """Time step, seconds."""
+        return self.builder.step_s
 
     @contextmanager
     def load(self, scene: PhysicsScene) -> Iterator[MuJoCoSimulation]:

@@ -63,7 +63,7 @@ def _imported() -> ModuleType:
 mujoco: Any = _imported()
 
 STEP_S: Final = 1.0 / 240.0
-"""Time step, seconds."""
+"""Time step of all data, seconds."""
 GRAVITY: Final = 9.81
 """Acceleration of gravity, m/s²."""
 MARGIN_M: Final = 0.00101
@@ -76,8 +76,8 @@ metres. Bullet takes the same box: twice the margin of its hulls."""
 ROLLING_FRICTION: Final = 0.01
 """Rolling and spinning friction of a body, metres. On the floor each has its own times the other's
 coefficient of friction, as in Bullet: here as a torque that resists all turning."""
-STIFFNESS: Final = (2.0 * STEP_S, 1.0)
-"""Time constant of contacts, seconds, the shortest that is stable, and their damping ratio. At
+CONTACT_STEPS: Final = 2.0
+"""Time constant of contacts, time steps: the shortest that is stable. They are damped critically. At
 MuJoCo's default of 20 ms what hits a wall at 2 m/s sinks in by 15 mm."""
 IMPEDANCE: Final = (0.95, 0.99, 0.001, 0.5, 2.0)
 """MuJoCo's `solimp` of contacts."""
@@ -121,6 +121,8 @@ class CompiledScene:
 class ModelBuilder:
     """ModelBuilder of scenes; it keeps compiled models by the shapes of their bodies."""
 
+    step_s: float = STEP_S
+    """Time step, seconds."""
     models: LRUCache[ModelKey, CompiledScene] = field(default_factory=lambda: LRUCache(MODELS))
 
     def build(self, scene: PhysicsScene) -> CompiledScene:
@@ -137,7 +139,9 @@ class ModelBuilder:
         bodies = tuple(
             (None if _is_wall(body) else body.asset, body.moves) for body in scene.bodies
         )
-        made = self.models.get((bodies, scene.agent is not None), lambda: _compiled(scene))
+        made = self.models.get(
+            (bodies, scene.agent is not None), lambda: _compiled(scene, self.step_s)
+        )
         _fill(made, scene)
         return made
 
@@ -149,7 +153,7 @@ def _is_wall(body: Body) -> bool:
     return single and not body.moves and body.dynamics.friction == 1.0
 
 
-def _compiled(scene: PhysicsScene) -> CompiledScene:
+def _compiled(scene: PhysicsScene, step_s: float) -> CompiledScene:
     spec = _new_spec()
     first = _FLOOR_GEOMS
     if scene.agent is not None:
@@ -172,6 +176,9 @@ def _compiled(scene: PhysicsScene) -> CompiledScene:
         ids = ", ".join(dict.fromkeys(body.asset.asset_id for body in scene.bodies))
         reason = " ".join(str(error).split())
         raise UsageError(f"MuJoCo refuses a shape among {ids}: {reason}") from error
+    model.opt.timestep = step_s
+    for stiffness in (model.geom_solref, model.pair_solref, model.dof_solref):
+        stiffness[:] = (CONTACT_STEPS * step_s, 1.0)
     moving = [k for k, body in enumerate(scene.bodies) if body.moves]
     model.tree_sleep_policy[:] = mujoco.mjtSleepPolicy.mjSLEEP_INIT
     model.tree_sleep_policy[:1] = mujoco.mjtSleepPolicy.mjSLEEP_NEVER  # what falls or is pushed
@@ -191,7 +198,6 @@ def _new_spec() -> MjSpec:
     spec.compiler.usethread = 0
     spec.memory = ARENA_BYTES
     option = spec.option
-    option.timestep = STEP_S
     option.gravity = (0.0, 0.0, -GRAVITY)
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
@@ -212,7 +218,6 @@ def _add_geom(body: MjsBody, name: str, kind: MjtGeom, **shape: object) -> None:
         conaffinity=1 if name and body.joints else 0,
         condim=CONTACT_DIMENSIONS,
         friction=(0.0, 0.0, 0.0),
-        solref=STIFFNESS,
         solimp=IMPEDANCE,
         margin=MARGIN_M / 2.0,  # a contact has the sum of both
         **shape,
@@ -276,7 +281,6 @@ def _add_pairs(
                     geomname1=here,
                     geomname2=there,
                     condim=CONTACT_DIMENSIONS,
-                    solref=STIFFNESS,
                     solimp=IMPEDANCE,
                     margin=MARGIN_M,
                 )
@@ -312,7 +316,7 @@ def _set_dynamics(model: MjModel, row: int, mover: int, body: Body) -> None:
     model.body_inertia[row] = _inertia(body.asset, mass_kg)
     spin = slice(6 * mover + 3, 6 * mover + 6)
     model.dof_frictionloss[spin] = ROLLING_FRICTION * (1.0 + friction) * mass_kg * GRAVITY
-    model.dof_solref[spin], model.dof_solimp[spin] = STIFFNESS, IMPEDANCE
+    model.dof_solimp[spin] = IMPEDANCE
 
 
 def set_friction_solver(model: MjModel, data: MjData) -> None:
