@@ -158,6 +158,11 @@ test-lowest: ## run a part of every room's tests with the lowest versions that p
 wheels: $(STAMP) ## ask the package index for wheels, each platform and Python; downloads 5 GB
 	$(BIN)/python -m pytest -q -m slow $(ARGS) tests/test_wheels.py
 
+.PHONY: docs
+docs: $(STAMP) ## build the documentation's site into build/docs; a warning is an error
+	$(BIN)/python -m sphinx -b html -W --keep-going -q docs build/docs
+	@echo "Look at   build/docs/index.html"
+
 .PHONY: wheel-test
 wheel-test: $(STAMP) ## build wheel and sdist, try the wheel in an environment of its own; ARGS=quick
 	rm -rf dist

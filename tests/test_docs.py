@@ -62,10 +62,20 @@ def test_python_in_the_docs_runs(page, small_dataset, small_run, monkeypatch):
         exec(compile(code, page.name, "exec"), {})  # noqa: S102 - our own words
 
 
+def test_every_page_has_a_place_in_the_sites_contents():
+    contents = (ROOT / "docs" / "index.md").read_text()
+    listed = set(re.findall(r"(?m)^([\w-]+)$", contents))
+    pages = {page.stem for page in (ROOT / "docs").glob("*.md")} - {"index"}
+    assert pages <= listed, "put the page into a toctree of docs/index.md"
+    assert listed <= pages
+
+
 def commands_in(page):
     """Command lines of ours in a page."""
     text = re.sub(r"(?m)^torchrun .* -m internav_cli\.camp_train", "camp-train", page.read_text())
-    return re.findall(r"^(?:internav-gen|camp-eval|camp-train) .*$", text, re.MULTILINE)
+    return re.findall(
+        r"^(?:internav-data|internav-gen|camp-eval|camp-train) .*$", text, re.MULTILINE
+    )
 
 
 def test_pages_have_commands_and_links():
@@ -76,12 +86,13 @@ def test_pages_have_commands_and_links():
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_commands_in_the_docs_exist_with_their_options(page):
     from click.testing import CliRunner
-    from internav_cli import camp_eval, camp_train
+    from internav_cli import camp_eval, camp_train, data
     from internav_cli.main import cli
 
     for line in commands_in(page):
         words = re.split(r" +#|[|]|> ", line)[0].split()
         command, path = {
+            "internav-data": (data.cli, words[1:2]),
             "internav-gen": (cli, words[1:2]),
             "camp-eval": (camp_eval.cli, ["compare" if words[1:2] == ["compare"] else "evaluate"]),
             "camp-train": (camp_train.command, []),

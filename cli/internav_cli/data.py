@@ -55,7 +55,7 @@ Examples:
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
-    default=Path("demo"),
+    default="demo",
     show_default=True,
     help="Folder for the dataset and the pictures.",
 )
@@ -116,6 +116,7 @@ def _advice(out: Path) -> Iterator[str]:
         f"Watch     {out / 'replay.gif'} in a browser, {out / 'replay.mp4'} in a player: "
         "things moved out of the way"
     )
+    yield f"Browse    internav-gen view {shlex.quote(str(out / 'dataset'))}"
     yield f"The data  {out / 'dataset'} (begin with its README.md)"
     loading = f"load_dataset({str(out / 'dataset')!r})"
     yield f"Load it   from internav_data import load_dataset; {loading}[0]"

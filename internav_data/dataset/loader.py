@@ -336,7 +336,7 @@ class Dataset(Generic[E]):
         Parameters
         ----------
         columns
-            As of `to_table`: "obstacles" and "outcomes" are flat frames.
+            Columns, or a flat table by name, see `to_table`.
 
         Raises
         ------

@@ -68,12 +68,12 @@ def _row(number: int, obstacle: Obstacle) -> str:
     outcomes = obstacle.outcomes or ()
     groups: tuple[list[str], list[str], list[str]] = ([], [], [])
     for outcome in outcomes:
-        groups[0 if outcome.opened else 1 if outcome.success else 2].append(_said(outcome))
+        groups[0 if outcome.opened else 1 if outcome.success else 2].append(_outcome_words(outcome))
     cells = [str(number), obstacle.asset_id, f"{obstacle.mass_kg:g}", *map(", ".join, groups)]
     return f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
 
 
-def _said(outcome: Outcome) -> str:
+def _outcome_words(outcome: Outcome) -> str:
     if outcome.success and outcome.action != "pick":
         return f"{outcome.action} {outcome.displacement_m:.2f} m"
     return outcome.action
