@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from internav_data.core.arithmetic import plain_sum
 from internav_data.core.extras import install_command, require
 from internav_data.records.errors import UsageError
 
@@ -64,7 +65,7 @@ def convex_pieces(path: Path, vertices: Floats, faces: Ints, max_parts: int) -> 
     if _is_convex(mesh, hull_piece) or max_parts == 1:
         return [hull_piece]
     pieces = _pieces(path, mesh, max_parts)
-    total = sum(piece.volume for piece in pieces)
+    total = plain_sum(piece.volume for piece in pieces)
     if total <= 0.0:
         raise UsageError(f"{path}: encloses no volume; close its surface or give it thickness")
     large = [piece for piece in pieces if piece.volume >= _MIN_SHARE * total]
@@ -82,7 +83,7 @@ def enclosed_volume(vertices: Floats, faces: Ints) -> float | None:
     bodies = _bodies(trimesh.Trimesh(vertices, faces, process=True))
     if not bodies or not all(body.is_watertight for body in bodies):
         return None
-    return sum(abs(float(body.volume)) for body in bodies)
+    return plain_sum(abs(float(body.volume)) for body in bodies)
 
 
 def _bodies(mesh: Any) -> list[Any]:  # noqa: ANN401 - trimesh

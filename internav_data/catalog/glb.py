@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
+from internav_data.core.arithmetic import plain_sum
 from internav_data.core.files import FileLimits, parse_json
 from internav_data.records.errors import UsageError
 
@@ -53,5 +54,5 @@ def check_glb(path: Path, content: bytes, max_faces: int) -> None:
 def _primitives(scene: dict[str, Any]) -> int:
     sizes = [len(mesh["primitives"]) for mesh in scene.get("meshes", ())]
     placed = [node["mesh"] for node in scene.get("nodes", ()) if "mesh" in node]
-    total: int = max(sum(sizes), sum(sizes[k] for k in placed))
+    total: int = max(plain_sum(sizes), plain_sum(sizes[k] for k in placed))
     return total

@@ -20,6 +20,7 @@ import numpy as np
 from internav_data.catalog.convex import Piece, convex_pieces, enclosed_volume
 from internav_data.catalog.glb import check_glb
 from internav_data.catalog.user_manifest import MESH_SUFFIXES, MeshNote, read_notes
+from internav_data.core.arithmetic import plain_sum
 from internav_data.core.extras import EXTRAS, missing, require
 from internav_data.core.files import FileLimits, read_file
 from internav_data.records import Asset, Part
@@ -130,7 +131,7 @@ def _asset(path: Path, note: MeshNote) -> Asset:
     if note.lay_flat:
         pieces = _laid_flat(pieces)
     parts, size = _fitted(path, pieces, colour)
-    volume = sum(piece.volume for piece in pieces)
+    volume = plain_sum(piece.volume for piece in pieces)
     _compare_volumes(path, enclosed_volume(points, faces), volume)
     mass = note.mass_kg if note.mass_kg is not None else max(0.01, _DENSITY_KG_M3 * volume)
     stem = re.sub(r"[^A-Za-z0-9]+", "_", path.stem).strip("_") or "mesh"
@@ -220,7 +221,7 @@ def _content(path: Path) -> bytes:
     if path.suffix.lower() == ".glb":
         check_glb(path, content, MAX_FACES)
     elif path.suffix.lower() == ".obj":
-        groups = sum(map(content.count, (b"\nusemtl", b"\no ", b"\ng ")))
+        groups = plain_sum(map(content.count, (b"\nusemtl", b"\no ", b"\ng ")))
         if groups > MAX_GROUPS:
             raise UsageError(f"{path}: {groups} groups, at most {MAX_GROUPS}; join them")
         if _ZERO_INDEX.search(content):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from internav_data.core.arithmetic import plain_sum
 from internav_data.geometry import (
     Polygons,
     clearance,
@@ -202,7 +203,7 @@ def _spot(
 ) -> tuple[float, float] | None:
     """Return the point at a share of a path's length, moved sideways; None if in another room."""
     points = site.path_between(first, second)
-    left = along * sum(math.dist(a, b) for a, b in pairwise(points))
+    left = along * plain_sum(math.dist(a, b) for a, b in pairwise(points))
     for a, b in pairwise(points):
         leg = math.dist(a, b)
         if left <= leg and leg > 0.0:

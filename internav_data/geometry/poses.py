@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from internav_data.core.arithmetic import plain_sum
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -25,7 +27,7 @@ def round_m(value: float) -> float:
 
 def round_quaternion(quaternion: Quaternion) -> Quaternion:
     """Normalise, round to 1e-6 and choose the sign with w >= 0 (z, y, x decide where w is 0)."""
-    length = math.sqrt(sum(q * q for q in quaternion))
+    length = math.sqrt(plain_sum(q * q for q in quaternion))
     rounded = [round(q / length, QUATERNION_DIGITS) for q in quaternion]
     leading = next((q for q in (rounded[3], rounded[2], rounded[1], rounded[0]) if q != 0.0), 1.0)
     sign = 1.0 if leading > 0.0 else -1.0

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from internav_data.catalog.attributes import DRAWS
+from internav_data.core.arithmetic import plain_sum
 from internav_data.geometry import round_m
 from internav_data.houses.choice import choose_floor_plan
 from internav_data.houses.furniture import furnish
@@ -251,6 +252,6 @@ def _finished(draft: HouseDraft) -> House:
         objects=draft.objects,
         materials=draft.materials,
         room_graph=tuple(sorted({o.rooms for o in draft.doors if o.open})),
-        area_m2=round_m(sum(grid.area_cm2(room) for room in range(count)) / 1e4),
+        area_m2=round_m(plain_sum(grid.area_cm2(room) for room in range(count)) / 1e4),
         assets={asset_id: draft.catalogue.assets[asset_id] for asset_id in used},
     )

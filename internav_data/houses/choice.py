@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from internav_data.core.arithmetic import plain_sum
 from internav_data.houses.access import door_tree, possible_doors
 from internav_data.houses.layouts import draw_layout, row_layout
 from internav_data.houses.plan import FloorGrid, FloorPlan
@@ -83,7 +84,7 @@ def best_tree(candidate: PlanCandidate, rng: Generator) -> list[RoomEdge] | None
         tree = door_tree(candidate.types, edges, rng, jitter)
         if tree is None:
             return None
-        score = sum(score_terms(candidate, tree, TREE_SCORE).values())
+        score = plain_sum(score_terms(candidate, tree, TREE_SCORE).values())
         if best is None or score < best[0]:
             best = (score, tree)
     return best[1] if best is not None else None

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from internav_data.core.arithmetic import plain_sum
 from internav_data.houses.standards import HALF_WALL_CM
 
 if TYPE_CHECKING:
@@ -76,7 +77,7 @@ def wall_faces(
     for k in range(count):
         (ax, ay), (bx, by) = inner[k], inner[(k + 1) % count]
         (dx, dy), line = directions[k], corners[k]
-        windows = sum(
+        windows = plain_sum(
             1
             for o in openings
             if o.kind is None

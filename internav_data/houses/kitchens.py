@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from internav_data.core.arithmetic import plain_sum
 from internav_data.houses.groups import narrow
 from internav_data.houses.pieces import FACING_WALL, Group, Picker, PlacedAsset, against, in_front
 
@@ -26,7 +27,7 @@ def _run(p: Picker, kinds: tuple[str, ...], longest: float) -> Group | None:
     """Make pieces side by side along a wall; counters as long as the wall allows."""
     fixed: list[Asset | None] = [p.one(kind) if kind != "CounterTop" else None for kind in kinds]
     counters = kinds.count("CounterTop")
-    spare = longest - sum(a.size[0] + SEAM_M for a in fixed if a is not None)
+    spare = longest - plain_sum(a.size[0] + SEAM_M for a in fixed if a is not None)
     items: list[PlacedAsset] = []
     x = 0.0
     for kind, asset in zip(kinds, fixed, strict=True):

@@ -10,6 +10,7 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from internav_data.core.arithmetic import plain_sum
 from internav_data.houses.room_types import ROOM_TYPES
 from internav_data.houses.slicing import (
     GRID_CM,
@@ -55,7 +56,7 @@ def sliced_layout(specs: Sequence[RoomSpec], rng: Generator) -> Layout:
     order = sorted(set(range(len(specs))) - guests.keys(), key=lambda k: (_position(specs[k]), k))
     if float(rng.random()) < 0.35:  # noqa: PLR2004 - other orders now and then
         order = _shuffled(rng, order)
-    area = sum(spec.area_m2 for spec in specs) * 1e4
+    area = plain_sum(spec.area_m2 for spec in specs) * 1e4
     aspect = _uniform(rng, 1.0, 1.6 if len(specs) == 1 else 1.75)
     side = _min_depth(specs, order)
     # Whole centimetres, not the grid of the inner walls: houses of few rooms would repeat.
@@ -172,14 +173,15 @@ def _fill_band(
     rng: Generator,
 ) -> Layout:
     x0, y0, x1, y1 = rect
-    areas = [sum(specs[k].area_m2 for k in cell) for cell in cells]
+    areas = [plain_sum(specs[k].area_m2 for k in cell) for cell in cells]
     min_widths = [max(min_width_cm(specs[k]) for k in cell) for cell in cells]
-    spare = max(0.0, (x1 - x0) - sum(min_widths))
+    spare = max(0.0, (x1 - x0) - plain_sum(min_widths))
     # Widths follow areas, but never under the minimum.
     wanted = [
-        max(0.0, a / sum(areas) * (x1 - x0) - w) for a, w in zip(areas, min_widths, strict=True)
+        max(0.0, a / plain_sum(areas) * (x1 - x0) - w)
+        for a, w in zip(areas, min_widths, strict=True)
     ]
-    factor = spare / sum(wanted) if sum(wanted) > 0.0 else 0.0
+    factor = spare / plain_sum(wanted) if plain_sum(wanted) > 0.0 else 0.0
     layout: Layout = {}
     left = x0
     reach = float(x0)
@@ -223,8 +225,8 @@ def hall_layout(specs: Sequence[RoomSpec], rng: Generator, wings: float = 0.0) -
     rest = [k for k in rest if k not in end]
     top, bottom = _split_bands(specs, rest, rng)
     hall_width = snapped(min_width_cm(specs[hall]) * _uniform(rng, 1.0, 1.35))
-    depth = 100 * math.sqrt(sum(specs[k].area_m2 for k in rest) / len(rest))
-    area = sum(specs[k].area_m2 for k in rest) * 1e4
+    depth = 100 * math.sqrt(plain_sum(specs[k].area_m2 for k in rest) / len(rest))
+    area = plain_sum(specs[k].area_m2 for k in rest) * 1e4
     sides = (1 if top else 0) + (1 if bottom else 0)
     length = snapped(area / (sides * depth * _uniform(rng, 0.85, 1.2)))
     layout: Layout = {hall: [(0, 0, length, hall_width)]}
@@ -238,7 +240,7 @@ def hall_layout(specs: Sequence[RoomSpec], rng: Generator, wings: float = 0.0) -
         side = length
         if sides == 2 and porch == int(above):  # noqa: PLR2004 - both sides of the hall
             side = length - max(120, snapped(length * _uniform(rng, 0.12, 0.25)))
-        band_area = sum(specs[k].area_m2 for k in band) * 1e4
+        band_area = plain_sum(specs[k].area_m2 for k in band) * 1e4
         deep = max(snapped(band_area / side), _min_depth(specs, band))
         heights.append(deep)
         y0, y1 = (hall_width, hall_width + deep) if above else (-deep, 0)
@@ -246,7 +248,7 @@ def hall_layout(specs: Sequence[RoomSpec], rng: Generator, wings: float = 0.0) -
         layout.update(_fill_band(specs, cells, (0, y0, side, y1), hall_above=not above, rng=rng))
     if end:
         height = heights[0] + heights[1] + hall_width
-        width = snapped(sum(specs[k].area_m2 for k in end) * 1e4 / height)
+        width = snapped(plain_sum(specs[k].area_m2 for k in end) * 1e4 / height)
         width = max(width, _min_depth(specs, end))
         order = end if len(end) < 4 else _shuffled(rng, end)  # noqa: PLR2004 - few keep their order
         rect = (-width, -heights[1], 0, heights[0] + hall_width)

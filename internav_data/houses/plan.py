@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from internav_data.core.arithmetic import plain_sum
 from internav_data.houses.standards import DOOR_HEIGHT_CM, HALF_WALL_CM, WALL_CM
 from internav_data.records import OUTSIDE
 
@@ -109,7 +110,7 @@ class FloorGrid:
 
     def area_cm2(self, room: int) -> int:
         """Area of a room, centre line to centre line, cm²."""
-        return sum(
+        return plain_sum(
             (self.xs[i + 1] - self.xs[i]) * (self.ys[j + 1] - self.ys[j])
             for i, j in self.cells[room]
         )
@@ -225,7 +226,7 @@ class FloorPlan:
     @property
     def score(self) -> float:
         """Sum of the penalties: the lower, the more like a home."""
-        return sum(self.score_terms.values())
+        return plain_sum(self.score_terms.values())
 
 
 def clear_size_m(rect: Rect) -> tuple[float, float]:
@@ -241,5 +242,5 @@ def clear_area_m2(grid: FloorGrid, room: int) -> float:
     """Return the area of a room between its wall faces, m²."""
     # Half a wall off all around, but a rectilinear polygon has four more outer corners than inner
     # ones, at which the strips overlap.
-    around = sum(s.length for s in grid.segments if room in {s.before, s.after})
+    around = plain_sum(s.length for s in grid.segments if room in {s.before, s.after})
     return (grid.area_cm2(room) - HALF_WALL_CM * around + 4 * HALF_WALL_CM**2) / 1e4

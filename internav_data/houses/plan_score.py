@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
+from internav_data.core.arithmetic import plain_sum
 from internav_data.houses.access import door_cost
 from internav_data.houses.plan import clear_area_m2, clear_size_m
 from internav_data.houses.room_types import ROOM_PAIRS, ROOM_TYPES, type_pair
@@ -96,27 +97,27 @@ def measured_room(
 
 
 def _area_error(plan: PlanCandidate, _: Sequence[RoomEdge]) -> float:
-    return sum(math.log(room.area_m2 / room.spec.area_m2) ** 2 for room in plan.rooms)
+    return plain_sum(math.log(room.area_m2 / room.spec.area_m2) ** 2 for room in plan.rooms)
 
 
 def _slender_rooms(plan: PlanCandidate, _: Sequence[RoomEdge]) -> float:
-    return sum(
+    return plain_sum(
         max(0.0, room.long_m / room.short_m - room.spec.standard.aspect) ** 2 for room in plan.rooms
     )
 
 
 def _large_rooms(plan: PlanCandidate, _: Sequence[RoomEdge]) -> float:
-    return sum(max(0.0, r.clear_m2 / r.spec.standard.high_m2 - 1.0) for r in plan.rooms)
+    return plain_sum(max(0.0, r.clear_m2 / r.spec.standard.high_m2 - 1.0) for r in plan.rooms)
 
 
 def _nooks(plan: PlanCandidate, _: Sequence[RoomEdge]) -> float:
     # Nooks that are neither room nor corridor look wrong.
-    return sum(max(0.0, NOOK_SHARE - room.main_m2 / room.area_m2) for room in plan.rooms)
+    return plain_sum(max(0.0, NOOK_SHARE - room.main_m2 / room.area_m2) for room in plan.rooms)
 
 
 def _dark_rooms(plan: PlanCandidate, _: Sequence[RoomEdge]) -> float:
     return float(
-        sum(
+        plain_sum(
             ROOM_TYPES[room.spec.type].habitable and room.outer_wall_cm < DAYLIGHT_CM
             for room in plan.rooms
         )
@@ -132,7 +133,7 @@ def _long_house(plan: PlanCandidate, _: Sequence[RoomEdge]) -> float:
 def _missing_neighbours(plan: PlanCandidate, _: Sequence[RoomEdge]) -> float:
     types = plan.types
     present = {type_pair(types[a], types[b]) for a, b in plan.spans}
-    return sum(
+    return plain_sum(
         pair.shared_wall
         for names, pair in ROOM_PAIRS.items()
         if names[0] in types and names[1] in types and names not in present
@@ -144,17 +145,19 @@ def _halls(plan: PlanCandidate) -> list[int]:
 
 
 def _large_halls(plan: PlanCandidate, _: Sequence[RoomEdge]) -> float:
-    house = sum(room.area_m2 for room in plan.rooms)
-    return sum(max(0.0, plan.rooms[k].area_m2 / house - HALL_SHARE) for k in _halls(plan))
+    house = plain_sum(room.area_m2 for room in plan.rooms)
+    return plain_sum(max(0.0, plan.rooms[k].area_m2 / house - HALL_SHARE) for k in _halls(plan))
 
 
 def _idle_halls(plan: PlanCandidate, tree: Sequence[RoomEdge]) -> float:
-    return sum(max(0.0, HALL_DOORS - sum(k in door for door in tree)) for k in _halls(plan))
+    return plain_sum(
+        max(0.0, HALL_DOORS - plain_sum(k in door for door in tree)) for k in _halls(plan)
+    )
 
 
 def _door_costs(plan: PlanCandidate, tree: Sequence[RoomEdge]) -> float:
     types = plan.types
-    return sum(door_cost(types[a], types[b]) for a, b in tree)
+    return plain_sum(door_cost(types[a], types[b]) for a, b in tree)
 
 
 def _private_doors(plan: PlanCandidate, tree: Sequence[RoomEdge]) -> float:
@@ -162,14 +165,14 @@ def _private_doors(plan: PlanCandidate, tree: Sequence[RoomEdge]) -> float:
     types = plan.types
     pairs = [(types[a], types[b]) for a, b in tree]
     private = [pair for pair in pairs if all(ROOM_TYPES[name].private for name in pair)]
-    return sum(0.1 if set(pair) == {"bathroom", "bedroom"} else 1.0 for pair in private)
+    return plain_sum(0.1 if set(pair) == {"bathroom", "bedroom"} else 1.0 for pair in private)
 
 
 def _private_passages(plan: PlanCandidate, tree: Sequence[RoomEdge]) -> float:
     """Count the doors to public rooms that private rooms have beyond one."""
     private = [ROOM_TYPES[name].private for name in plan.types]
-    return sum(
-        max(0.0, sum(room in {a, b} and not private[a + b - room] for a, b in tree) - 1)
+    return plain_sum(
+        max(0.0, plain_sum(room in {a, b} and not private[a + b - room] for a, b in tree) - 1)
         for room in range(len(private))
         if private[room]
     )
@@ -177,8 +180,8 @@ def _private_passages(plan: PlanCandidate, tree: Sequence[RoomEdge]) -> float:
 
 def _through_bathroom(plan: PlanCandidate, tree: Sequence[RoomEdge]) -> float:
     """Count the doors that bathrooms have beyond one: nobody should have to walk through one."""
-    return sum(
-        max(0.0, sum(room in edge for edge in tree) - 1)
+    return plain_sum(
+        max(0.0, plain_sum(room in edge for edge in tree) - 1)
         for room, name in enumerate(plan.types)
         if name == "bathroom"
     )
@@ -211,7 +214,7 @@ def _bathrooms(plan: PlanCandidate) -> list[int]:
 
 def _behind_kitchen(plan: PlanCandidate, tree: Sequence[RoomEdge]) -> float:
     """Count the bathrooms that are reached through a kitchen alone."""
-    return float(sum(not _reaches_all(plan, tree, k, "kitchen") for k in _bathrooms(plan)))
+    return float(plain_sum(not _reaches_all(plan, tree, k, "kitchen") for k in _bathrooms(plan)))
 
 
 def _none_for_all(plan: PlanCandidate, tree: Sequence[RoomEdge]) -> float:
@@ -246,7 +249,7 @@ def mean_rooms_on_path(grid: FloorGrid, tree: Sequence[RoomEdge]) -> float:
             ring = [n for m in ring for n in joined[m] if n not in seen]
             seen.update(ring)
             steps += 1
-            weight = areas[start] * sum(areas[n] for n in ring)
+            weight = areas[start] * plain_sum(areas[n] for n in ring)
             weights += weight
             total += weight * steps
     return total / weights

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from internav_data.core.arithmetic import plain_sum
 from internav_data.houses.quota import SHARES, room_count, size_quantile
 from internav_data.houses.room_types import ROOM_TYPES, RoomStandard
 from internav_data.records import ProgrammeStream, Purpose
@@ -73,7 +74,7 @@ SINGLE_BEDROOM = RoomStandard(9.2, 6.8, 11.0, 2.2, 1.75)
 
 
 def _choose(rng: Generator, weighted: list[tuple[float, str]]) -> str:
-    position = float(rng.random()) * sum(weight for weight, _ in weighted)
+    position = float(rng.random()) * plain_sum(weight for weight, _ in weighted)
     for weight, value in weighted:
         position -= weight
         if position < 0.0:
@@ -131,7 +132,7 @@ def _areas(
     least = [s.low_m2 * (1.08 + 0.14 * float(rng.random())) for s in standards]
     if config.preset == "paper":
         count = len(areas)
-        larger *= PAPER_AREA_M2 * count / sum(areas) * config.scale_of(count) ** 2
+        larger *= PAPER_AREA_M2 * count / plain_sum(areas) * config.scale_of(count) ** 2
         areas = [max(low, a * larger) for low, a in zip(least, areas, strict=True)]
     else:
         areas = [

@@ -8,6 +8,7 @@ from __future__ import annotations
 from statistics import NormalDist
 from typing import TYPE_CHECKING
 
+from internav_data.core.arithmetic import plain_sum
 from internav_data.records import ProgrammeStream, Purpose, SceneKey, generator
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def room_count(seed: int, scene: int, shares: Mapping[int, float] = SHARES) -> i
     # The golden-ratio sequence, shifted by a random offset and mapped through the inverse
     # cumulative distribution of the shares.
     turn = float(generator(seed, Purpose.PROGRAMME, episode=ProgrammeStream.COUNTS).random())
-    position = (turn + scene * GOLDEN) % 1.0 * sum(shares.values())
+    position = (turn + scene * GOLDEN) % 1.0 * plain_sum(shares.values())
     for count in sorted(shares):
         position -= shares[count]
         if position < 0.0:

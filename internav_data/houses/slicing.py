@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from internav_data.core.arithmetic import plain_sum
 from internav_data.houses.standards import HALF_WALL_CM, WALL_CM
 
 if TYPE_CHECKING:
@@ -38,14 +39,14 @@ def _best_cut(specs: Sequence[RoomSpec], order: Sequence[int], rng: Generator) -
     a share of the total.
     """
     areas = [specs[k].area_m2 for k in order]
-    total = sum(areas)
+    total = plain_sum(areas)
     weights: list[float] = []
     running = 0.0
     for area in areas[:-1]:
         running += area
         share = running / total
         weights.append((share * (1.0 - share)) ** 2)
-    position = float(rng.random()) * sum(weights)
+    position = float(rng.random()) * plain_sum(weights)
     running = 0.0
     for k, weight in enumerate(weights):
         running += areas[k]

@@ -11,6 +11,7 @@ from functools import lru_cache
 from math import fsum
 from typing import TYPE_CHECKING, Final
 
+from internav_data.core.arithmetic import plain_sum
 from internav_data.planner.push_heuristic import GRAVITY
 from internav_data.records import Dynamics
 
@@ -114,7 +115,7 @@ class Experience:
             return float(tried[index])
         belief = self._beliefs.get(kind)
         prior = 0.0 if belief is None else belief.movable_share
-        return (PRIOR_WEIGHT * prior + sum(tried.values())) / (PRIOR_WEIGHT + len(tried))
+        return (PRIOR_WEIGHT * prior + plain_sum(tried.values())) / (PRIOR_WEIGHT + len(tried))
 
     def believed(self, world: World) -> World:
         """Return a world as it is believed to be: all poses, and the types' dynamics."""

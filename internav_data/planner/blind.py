@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from internav_data.core.arithmetic import plain_sum
 from internav_data.navigation import SPACING_M
 from internav_data.planner.beliefs import Experience
 from internav_data.planner.knowledge import Knowledge, attempt_of
@@ -56,7 +57,7 @@ class BlindRun(NamedTuple):
         return Expert(
             actions=self.actions,
             steps=len(self.actions),
-            pushes=sum(self.actions.count(push) for push in PUSHES),
+            pushes=plain_sum(self.actions.count(push) for push in PUSHES),
             picks=self.actions.count(Action.PICKUP),
             path_m=SPACING_M * self.actions.count(Action.MOVE_AHEAD),
         )

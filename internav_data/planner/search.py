@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from internav_data.core.arithmetic import plain_sum
 from internav_data.navigation import SPACING_M
 from internav_data.planner.cost_to_go import FAR, viewpoints
 from internav_data.planner.knowledge import NO_KNOWLEDGE, coarse_position
@@ -513,7 +514,7 @@ def replay(world: World, actions: Sequence[int]) -> Expert | None:
     return Expert(
         actions=tuple(int(action) for action in actions),
         steps=len(actions),
-        pushes=sum(counts[push] for push in PUSHES),
+        pushes=plain_sum(counts[push] for push in PUSHES),
         picks=counts[Action.PICKUP],
         path_m=SPACING_M * counts[Action.MOVE_AHEAD],
     )

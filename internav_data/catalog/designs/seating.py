@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from internav_data.catalog.sampling import BLACK, CHROME, IRON, STEEL
 from internav_data.catalog.shapes import ring
+from internav_data.core.arithmetic import plain_sum
 
 if TYPE_CHECKING:
     from internav_data.catalog.sampling import UniformSampler
@@ -171,7 +172,7 @@ def sofa(s: Sketch, w: float, d: float, h: float, sampler: UniformSampler) -> No
         (span[0] + 0.02, span[1] - 0.02), (-d / 2, front + 0.12), (0.34 * h, 0.48 * h), cloth, 0.3
     )
     for cx in span:
-        inset = 0.07 if cx < sum(span) / 2 else -0.07
+        inset = 0.07 if cx < plain_sum(span) / 2 else -0.07
         s.rod((cx + inset, -d / 2 + 0.07), (0, 0.1 * h), 0.025, wood)
 
 
