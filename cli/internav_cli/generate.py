@@ -35,6 +35,7 @@ Examples:
   internav-gen generate --out data/demo --scenes 240          extends it
   internav-gen generate --out data/flats --rooms kitchen,living,bedroom:2 --preset realistic
   internav-gen generate --out data/confounded --attributes hidden
+  internav-gen generate --out data/sure --cross-check       outcomes two engines agree on
   internav-gen generate --out data/dense --episode-preset dense   obstacles that matter
   internav-gen generate --dry-run --workers 8                 how long, how large
   internav-gen generate --scene 17 --episode 3                one episode again, as JSON
@@ -80,6 +81,13 @@ workers gives the same bytes.""",
     is_flag=True,
     default=None,
     help="Store the run of an expert that knows types' averages only, and learns by failing.",
+)
+@click.option(
+    "--cross-check",
+    "physics__cross_check",
+    is_flag=True,
+    default=None,
+    help="Ask the other engine for each push too, and store where both agree.",
 )
 @click.option(
     "--push-model",

@@ -117,7 +117,7 @@ def engine_is_named(
     return physics is not None or "physics.engine" in keys_given(config_file, overrides, {})
 
 
-def dataset_to_read(given: Path | None, *, solves: bool = False) -> Path:
+def dataset_to_read(given: Path | None, *, solves: bool = False, engine: str | None = None) -> Path:
     """Return the folder of the dataset that a command reads, and name it on stderr.
 
     A folder without a dataset is left to the error that names it.
@@ -127,8 +127,9 @@ def dataset_to_read(given: Path | None, *, solves: bool = False) -> Path:
     given
         Folder that the command was given; None for the default one.
     solves
-        Whether the command solves physics: then the dataset's engine is named too, and has to be
-        installed.
+        Whether the command solves physics: then the engine is named too, and has to be installed.
+    engine
+        Engine that it solves with; None for the dataset's.
 
     Raises
     ------
@@ -144,10 +145,10 @@ def dataset_to_read(given: Path | None, *, solves: bool = False) -> Path:
 
     folder = folder_to_read(given)
     if has_manifest(folder):
-        engine = _engine_of(folder) if solves else ""
-        name_dataset(folder if folder == MINI_FOLDER else given, engine)
-        if engine:
-            require_engine(engine, str(folder))
+        chosen = (engine or _engine_of(folder)) if solves else ""
+        name_dataset(folder if folder == MINI_FOLDER else given, chosen)
+        if chosen:
+            require_engine(chosen, "" if engine else str(folder))
     elif given is None:
         read_manifest(folder)  # raises: nothing is there, or nothing finished
     return folder

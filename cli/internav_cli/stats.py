@@ -92,6 +92,15 @@ def interaction_lines(stats: dict[str, Any]) -> list[str]:
             f"{sum(row['opened'] for row in rows)} open a blocked way"
         )
     lines[-1] += f"; {stats['openable_share_of_blocked']:.1%} of the blocked open by one of these"
+    both = stats["agreement"]
+    if both is not None:
+        lowest = sorted((share, kind) for kind, share in both["share_by_type"].items())[:3]
+        named = ", ".join(f"{kind} {share:.1%}" for share, kind in lowest if share < 1.0)
+        lines.append(
+            f"two engines agree on {both['share']:.1%} of {both['asked']} pushes"
+            + (f" (lowest: {named})" if named else "")
+            + f", on all of an episode's in {both['episodes_share']:.1%}"
+        )
     told = stats["confounding"]
     if told is not None:
         lines.append(

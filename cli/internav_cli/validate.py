@@ -23,6 +23,7 @@ Examples:
   internav-gen validate data/demo --level files         hashes and checksums only
   internav-gen validate data/demo --level physics       every push, pick and expert again
   internav-gen validate data/paper --level physics --sample 300 --workers 2
+  internav-gen validate data/demo --level physics --physics mujoco   a second opinion
 
 \b
 Levels:
@@ -46,6 +47,12 @@ Exit code 3 when something in the dataset is not true, 5 when it cannot be read.
 @click.option(
     "--sample", type=int, callback=positive, help="Geometry and physics of so many scenes only."
 )
+@click.option(
+    "--physics",
+    type=click.Choice(["bullet", "mujoco"]),
+    help="At level physics: replay by this engine; another than the dataset's is asked for all "
+    "pushes, and the share is told on which it agrees.  [default: the dataset's]",
+)
 @click.option("--workers", type=int, callback=positive, help="Processes.  [default: one a core]")
 @JSON
 def command(
@@ -53,6 +60,7 @@ def command(
     dataset: Path | None,
     level: Any,  # noqa: ANN401 - one of LEVELS, by click
     sample: int | None,
+    physics: str | None,
     workers: int | None,
     as_json: bool,
 ) -> int:
@@ -62,8 +70,8 @@ def command(
     from internav_data.verification import validate
 
     progress = _show_progress if sys.stderr.isatty() else None
-    folder = dataset_to_read(dataset, solves=level == "physics")
-    findings = validate(folder, level, sample, workers or available_cores(), progress)
+    folder = dataset_to_read(dataset, solves=level == "physics", engine=physics)
+    findings = validate(folder, level, sample, workers or available_cores(), progress, physics)
     if progress is not None:
         click.echo("\r\033[K", nl=False, err=True)
     click.echo(findings.to_json() if as_json else findings.summary())

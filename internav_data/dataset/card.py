@@ -123,8 +123,19 @@ expert, replayed before it was stored, solves {100 * expert.solved_share:.1f} % 
 {expert.steps.mean:.1f} steps on average ({expert.pushes:.2f} pushes, {expert.picks:.2f} picks); its
 SPL of {expert.spl:.3f} and STS of {expert.sts:.3f} are the ceiling to compare agents with. It
 refused {100 * expert.refused_share:.1f} % of the draws.
-"""
+{_agreement(stats)}"""
     )
+
+
+def _agreement(stats: Stats) -> str:
+    found = stats.agreement
+    if found is None:
+        return ""
+    return f"""
+A second physics engine was asked for {found.asked:,} pushes: on {100 * found.share:.1f} % it gives
+the same success and opening (`agrees`), in {100 * found.episodes_share:.1f} % of the episodes on
+all of them (`agreed`).
+"""
 
 
 def _use() -> str:

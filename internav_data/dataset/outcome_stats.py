@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 EXPERT_COLUMNS = tuple(f"expert.{name}" for name in ("steps", "pushes", "picks", "path_m"))
 OUTCOME_COLUMNS = tuple(
     f"obstacles.list.element.outcomes.list.element.{name}"
-    for name in ("action", "success", "opened")
+    for name in ("action", "success", "opened", "agrees")
 )
 REFUSED: Redraw = "no expert"
 
@@ -71,6 +71,22 @@ class OutcomeRow:
     """Number of interactions that open a blocked path by themselves."""
 
 
+@dataclass(frozen=True, slots=True)
+class AgreementRow:
+    """Agreement of two physics engines on the outcomes of pushes: the same success and opening."""
+
+    asked: int
+    """Number of pushes that both engines were asked for."""
+    share: float
+    """Share of these on which they agree."""
+    share_by_type: Mapping[str, float]
+    """The same share by type of obstacle."""
+    episodes: int
+    """Number of episodes on all of whose outcomes they agree."""
+    episodes_share: float
+    """Share of all episodes."""
+
+
 @dataclass(slots=True)
 class OutcomeCounts:
     """Counts over the outcomes of some files."""
@@ -80,6 +96,10 @@ class OutcomeCounts:
     opened: Counter[str] = field(default_factory=Counter)
     openable: int = 0
     """Episodes that a single interaction opens."""
+    asked: Counter[str] = field(default_factory=Counter)
+    """Pushes that a second engine was asked for, by type of obstacle."""
+    agree: Counter[str] = field(default_factory=Counter)
+    """Those on which it agrees."""
 
     def add(self, obstacles: pa.ListArray) -> None:
         """Count the outcomes of a column of obstacles, one list for each episode."""
@@ -102,6 +122,9 @@ class OutcomeCounts:
             self.possible[row["action"]] += row["able_sum"]
             self.succeeded[row["action"]] += row["success_sum"]
             self.opened[row["action"]] += row["opened_sum"]
+        kinds = parts["type"].take(obstacle)
+        self.asked.update(kinds.filter(rows["agrees"].is_valid()).to_pylist())
+        self.agree.update(kinds.filter(rows["agrees"].fill_null(False)).to_pylist())  # noqa: FBT003
         episode = pc.list_parent_indices(obstacles).take(obstacle)
         self.openable += len(pc.unique(episode.filter(rows["opened"])))
 
@@ -113,6 +136,31 @@ class OutcomeCounts:
             )
             for action, count in sorted(self.possible.items())
         )
+
+
+def agreement_row(counts: OutcomeCounts, agreed: pa.ChunkedArray) -> AgreementRow | None:
+    """Return the agreement of two engines; None where one alone was asked.
+
+    Parameters
+    ----------
+    counts
+        Counts over the outcomes.
+    agreed
+        Column `agreed` of the episodes.
+
+    """
+    if agreed.null_count == len(agreed):
+        return None
+    agreeing = int(pc.sum(agreed).as_py())
+    return AgreementRow(
+        asked=counts.asked.total(),
+        share=share(counts.agree.total(), counts.asked.total()),
+        share_by_type={
+            kind: share(counts.agree[kind], count) for kind, count in sorted(counts.asked.items())
+        },
+        episodes=agreeing,
+        episodes_share=share(agreeing, len(agreed)),
+    )
 
 
 def expert_row(table: pa.Table, manifest: Manifest) -> ExpertRow:

@@ -21,9 +21,11 @@ from internav_data.dataset.manifest import Manifest, read_manifest
 from internav_data.dataset.outcome_stats import (
     EXPERT_COLUMNS,
     OUTCOME_COLUMNS,
+    AgreementRow,
     ExpertRow,
     OutcomeCounts,
     OutcomeRow,
+    agreement_row,
     expert_row,
 )
 from internav_data.dataset.snapshot import read_shard
@@ -46,6 +48,7 @@ _SCALARS = (
         "obstructed_path_m",
         "obstructed_path_steps",
     ),
+    "agreed",
 )
 _START = tuple(f"start.{name}" for name in ("faces_wall", "reachable_nodes"))
 POCKET_NODES = 4
@@ -140,6 +143,8 @@ class Stats:
     outcomes: tuple[OutcomeRow, ...]
     openable_share_of_blocked: float
     """Share of blocked episodes that a single interaction opens."""
+    agreement: AgreementRow | None
+    """Agreement of two physics engines; null where one alone was asked (`physics.cross_check`)."""
     confounding: ConfoundingRow | None
     """Predictability of pushes from the look of their obstacles; null without any push outcome."""
     redraws: Mapping[str, int]
@@ -267,6 +272,7 @@ def _stats(
         expert=expert_row(table, manifest),
         outcomes=outcomes.rows(),
         openable_share_of_blocked=share(outcomes.openable, int(blocked.sum())),
+        agreement=agreement_row(outcomes, table.column("agreed")),
         confounding=confounding,
         redraws=dict(manifest.redraws),
         quarantined=len(manifest.quarantined),

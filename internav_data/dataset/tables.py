@@ -107,9 +107,10 @@ EPISODES: TableSpec[Episode] = TableSpec(
             "shortest_path_steps",
             "obstructed_path_m",
             "obstructed_path_steps",
+            "agreed",
         ),
     ),
-    tuple(f"{_OUTCOME}.{name}" for name in ("pose.", "moved.list.element.pose.")),
+    tuple(f"{_OUTCOME}.{name}" for name in ("pose.", "moved.list.element.pose.", "other_pose.")),
 )
 SCENES: TableSpec[House] = TableSpec("scenes", House, ("scene_id", "scene", "area_m2"))
 ASSETS: TableSpec[Asset] = TableSpec("assets", Asset, ("asset_id",))

@@ -28,6 +28,7 @@ class Arguments(TypedDict, total=False):
 
     split: str | None
     filters: list[tuple[str, str, object]] | None
+    agreed_only: bool
     task: str | Sequence[str]
     max_steps: int
     failed_done_reward: float
@@ -151,7 +152,12 @@ class EnvSlot:
             )
         tasks = [TASKS[name] for name in task_names(arguments, count)]
         LOADED_HOUSES.capacity = max(LOADED_HOUSES.capacity, kept)
-        source = open_source(dataset, arguments.get("split"), arguments.get("filters"))
+        source = open_source(
+            dataset,
+            arguments.get("split"),
+            arguments.get("filters"),
+            agreed_only=arguments.get("agreed_only", False),
+        )
         world = source.world_config
         if "push_model" in arguments:
             world = replace(world, push_model=arguments["push_model"])

@@ -17,9 +17,10 @@ import numpy as np
 
 from internav_data.core.files import read_file
 from internav_data.core.lru import LRUCache
-from internav_data.dataset import load_dataset
+from internav_data.dataset import load_dataset, read_manifest
 from internav_data.dataset.location import folder_to_read
 from internav_data.dataset.manifest import MANIFEST, MANIFEST_LIMITS
+from internav_data.dataset.select import joined
 from internav_data.envs.auxiliary import auxiliary_starts
 from internav_data.envs.order import EpisodeOrder, scene_bounds
 from internav_data.geometry import round_m
@@ -35,7 +36,8 @@ if TYPE_CHECKING:
     import pyarrow as pa
     from numpy.typing import NDArray
 
-    from internav_data.dataset import Dataset
+    from internav_data.dataset import Dataset, Manifest
+    from internav_data.dataset.select import Filters
     from internav_data.envs.auxiliary import AuxiliaryStart, InteractionKind
     from internav_data.records import Episode, House
 
@@ -191,37 +193,57 @@ class Source:
         return auxiliary_starts(model, episode, self.dataset.assets, kind)
 
 
+AGREED: Final = (("agreed", "==", True),)
+"""Filters of the episodes on whose outcomes two physics engines agree."""
 _SOURCES: Final[LRUCache[str, Source]] = LRUCache(SOURCES_KEPT)
 
 
 def open_source(
     dataset: str | Path | Dataset[Episode],
     split: str | None = None,
-    filters: list[tuple[str, str, object]] | None = None,
+    filters: Filters | None = None,
+    *,
+    agreed_only: bool = False,
 ) -> Source:
     """Open a dataset, or return the one that this process has open already.
 
-    A split and filters choose among the episodes of a loaded dataset, too.
+    A split and filters choose among the episodes of a loaded dataset, too; `agreed_only` leaves
+    those on whose outcomes two physics engines agree.
 
     Raises
     ------
     CorruptDataError
         There is no dataset, or it is damaged.
     UsageError
-        An unknown split, column or operator, or nothing selected.
+        An unknown split, column or operator, nothing selected, or `agreed_only` where one engine
+        alone was asked.
     MissingEngineError
         The dataset's physics engine is not installed.
     """
+    if agreed_only:
+        filters = joined(AGREED, filters)
     if not isinstance(dataset, str | Path):
         if dataset.columns is not None:
             raise UsageError(
                 f"{dataset!r}: loaded with columns={list(dataset.columns)}: environments need "
                 "episodes: load it without columns"
             )
+        if agreed_only:
+            _check_agreed(dataset.manifest)
         return Source(dataset.select(split, filters))
     path = folder_to_read(dataset)
     if not (path / MANIFEST).exists():
         load_dataset(path)  # raises with what is wrong there
+    if agreed_only:
+        _check_agreed(read_manifest(path))
     digest = hashlib.sha256(read_file(path / MANIFEST, MANIFEST_LIMITS)).hexdigest()
     key = repr((str(path.resolve()), digest, split, filters))
     return _SOURCES.get(key, lambda: Source(load_dataset(path, split, filters)))
+
+
+def _check_agreed(manifest: Manifest) -> None:
+    if not PhysicsConfig.of_dataset(manifest.config).cross_check:
+        raise UsageError(
+            "agreed_only: one physics engine alone was asked for this dataset's outcomes; generate "
+            "one with --cross-check"
+        )

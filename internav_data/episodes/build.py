@@ -104,7 +104,7 @@ def build_episodes(
         Beliefs about the catalogue's types (`planner.beliefs.type_beliefs`) of the blind expert;
         None for no such expert.
     physics
-        Settings of physics: the engine.
+        Settings of physics: the engine, and whether another one is asked too.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def build_batch(
     """
     config = config or EpisodeConfig()
     settings = _BatchSettings(world_config, beliefs, before_draw)
-    site, weighed = SpawnSite.of(house, hidden, physics.engine), ObstaclePool.of(pool, config)
+    site, weighed = SpawnSite.of(house, hidden, physics), ObstaclePool.of(pool, config)
     redraws: Counter[Redraw] = Counter()
     episodes = []
     for index in range(first, first + count):
@@ -217,7 +217,7 @@ def _draw(
         (*draft.start, draft.quarter),
         draft.goal,
         settings.world_config,
-        site.engine,
+        site.physics.engine,
         [obstacle.affordance for obstacle in draft.obstacles],
     )
     # The expert comes first: an episode without one is discarded and needs no outcomes.
@@ -346,7 +346,8 @@ def _recorded(
     """Turn a finished draft into an episode; its predicates are judged on the rounded poses."""
     # The lattice distance is known from spawning; outcomes need both distances before any of them.
     house, obstructed_path_m = draft.site.house, world.obstructed_path_m()
-    outcomes = outcomes_of(world, (draft.steps, obstructed_path_m))
+    other_engine = draft.site.physics.other_engine
+    outcomes = outcomes_of(world, (draft.steps, obstructed_path_m), other_engine)
     movable = [world.moves_alone(index) for index in world.obstacles]
     relevant = relevance_of(draft)
     return Episode(
@@ -374,6 +375,11 @@ def _recorded(
         expert=expert,
         physics=_physics(draft),
         blind_expert=blind,
+        agreed=(
+            None
+            if other_engine is None
+            else all(outcome.agrees is not False for five in outcomes for outcome in five)
+        ),
     )
 
 
@@ -414,10 +420,14 @@ def _obstacle(
 
 
 def _physics(draft: EpisodeDraft) -> Physics:
-    engine = get_solver(draft.site.engine)
+    physics = draft.site.physics
+    engine = get_solver(physics.engine)
+    other = None if physics.other_engine is None else get_solver(physics.other_engine)
     return Physics(
         engine=engine.name,
         build=engine.build,
         settle_s=max(o.settled.seconds for o in draft.obstacles),
         penetration_m=max(o.settled.penetration_m for o in draft.obstacles),
+        other_engine=None if other is None else other.name,
+        other_build=None if other is None else other.build,
     )

@@ -36,7 +36,9 @@ Distances = tuple[int | None, float | None]
 """Lattice distance to the goal in steps and Euclidean path length in metres; None if cut off."""
 
 
-def outcomes_of(world: World, before: Distances | None = None) -> tuple[tuple[Outcome, ...], ...]:
+def outcomes_of(
+    world: World, before: Distances | None = None, other_engine: str | None = None
+) -> tuple[tuple[Outcome, ...], ...]:
     """Return the outcomes of every obstacle of a world, in the obstacles' order.
 
     There are five for each obstacle: `PUSH_DIRECTIONS` in order, then `PICK`. A failed one leaves
@@ -50,12 +52,22 @@ def outcomes_of(world: World, before: Distances | None = None) -> tuple[tuple[Ou
         to its goal.
     before
         Those distances before any interaction, if they are known already.
+    other_engine
+        Name of a physics engine that is asked for a second opinion on each push; None for none.
 
     """
     before = before or (world.path_steps(), world.obstructed_path_m())
+    other = None if other_engine is None else world.asking(other_engine)
+
+    def pushed(index: int, heading: int, lifted: _Lifted) -> Outcome:
+        outcome = _pushed(world, index, heading, before, lifted)
+        if other is None or not world.items[index].dynamics.pushable:
+            return outcome
+        return _compared(outcome, other, index, heading, blocked=before[0] is None)
+
     return tuple(
         (
-            *(_pushed(world, index, heading, before, lifted) for heading in range(4)),
+            *(pushed(index, heading, lifted) for heading in range(4)),
             _picked(world, index, before, lifted),
         )
         for index in world.obstacles
@@ -137,6 +149,26 @@ def _pushed(world: World, index: int, heading: int, before: Distances, lifted: _
         at_rest=pushed.at_rest,
         reach_m=reach_m,
         reach_opened=reach_opened,
+    )
+
+
+def _compared(
+    outcome: Outcome, other: World, index: int, heading: int, *, blocked: bool
+) -> Outcome:
+    """Return the outcome of a push with the second opinion of another engine.
+
+    `blocked` says whether there is anything to open.
+    """
+    pushed = other.simulate_push(index, heading, agent=False)
+    opened = False
+    if blocked and pushed.success:
+        there = other.copy()
+        there.put([(index, pushed.pose), *pushed.moved])
+        opened = there.path_steps() is not None
+    return replace(
+        outcome,
+        agrees=(pushed.success, opened) == (outcome.success, outcome.opened),
+        other_pose=pushed.pose if pushed.success else None,
     )
 
 

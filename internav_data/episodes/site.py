@@ -9,7 +9,7 @@ import numpy as np
 
 from internav_data.geometry import Polygons, house_footprints
 from internav_data.navigation import SPACING_M, room_paths, rooms_of
-from internav_data.physics.engines import DEFAULT_ENGINE
+from internav_data.physics.config import DEFAULT_PHYSICS, PhysicsConfig
 from internav_data.physics.narrow_phase import joined_prisms, prisms_of
 from internav_data.world import HouseModel
 
@@ -43,8 +43,8 @@ class SpawnSite:
     """Room of each node, (n,) int64."""
     hidden: HiddenAttributes | None = None
     """Distribution of the obstacles' attributes; None where their look tells them."""
-    engine: str = DEFAULT_ENGINE
-    """Name of the physics engine."""
+    physics: PhysicsConfig = DEFAULT_PHYSICS
+    """Settings of physics."""
     _paths_between: dict[tuple[Vec2, Vec2], tuple[Vec2, ...]] = field(default_factory=dict)
     _room_paths: dict[tuple[int, int], tuple[tuple[tuple[int, ...], ...], bool]] = field(
         default_factory=dict
@@ -52,7 +52,9 @@ class SpawnSite:
 
     @staticmethod
     def of(
-        house: House, hidden: HiddenAttributes | None = None, engine: str = DEFAULT_ENGINE
+        house: House,
+        hidden: HiddenAttributes | None = None,
+        physics: PhysicsConfig = DEFAULT_PHYSICS,
     ) -> SpawnSite:
         """Prepare a house for episodes, whose obstacles may have hidden attributes."""
         model = HouseModel.of(house)
@@ -71,7 +73,7 @@ class SpawnSite:
             nodes=nodes.astype(np.int64),
             rooms=rooms_of(house, SPACING_M * nodes.astype(np.float64)),
             hidden=hidden,
-            engine=engine,
+            physics=physics,
         )
 
     def path_between(self, first: Vec2, second: Vec2) -> tuple[Vec2, ...]:

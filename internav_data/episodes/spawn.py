@@ -194,7 +194,7 @@ def settled_at(draft: EpisodeDraft, body: Body) -> SettleResult:
         body,
         draft.config.gap_m,
         lambda: _near(draft, prisms_of(body.asset, body.pose)),
-        draft.site.engine,
+        draft.site.physics.engine,
     )
 
 

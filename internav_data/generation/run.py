@@ -194,6 +194,8 @@ def _require_engine(config: GenerationConfig, out: Path) -> None:
     """Check that the engine is installed; another one is offered where no scene is made yet."""
     begun = held_config(FolderStore(out)) is not None
     require_engine(config.physics.engine, str(out) if begun else "", switchable=not begun)
+    if config.physics.other_engine is not None:
+        require_engine(config.physics.other_engine, "cross-check")
 
 
 def _catalogue(config: GenerationConfig) -> Catalogue:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from internav_data.core.config import from_mapping
-from internav_data.physics.engines import DEFAULT_ENGINE, ENGINES, EngineName
+from internav_data.physics.engines import DEFAULT_ENGINE, ENGINES, EngineName, second_engine
 from internav_data.records.errors import CorruptDataError, UsageError
 
 if TYPE_CHECKING:
@@ -21,6 +21,9 @@ class PhysicsConfig:
     engine: EngineName = DEFAULT_ENGINE
     """Physics engine: `bullet` (pybullet) or `mujoco` (mujoco-core). Data of two engines differ;
     a dataset is of one, which its environments take too."""
+    cross_check: bool = False
+    """Ask the other engine for each outcome of a push too, and store whether both agree: `agrees`
+    and `other_pose` of outcomes, `agreed` of episodes."""
 
     def check(self, prefix: str = "physics.") -> None:
         """Check all values.
@@ -35,6 +38,16 @@ class PhysicsConfig:
             raise UsageError(
                 f"{prefix}engine: expected one of {', '.join(ENGINES)}, got {self.engine!r}"
             )
+        if self.other_engine not in (None, *ENGINES):
+            raise UsageError(
+                f"{prefix}cross_check: there is no second engine beside {self.engine}: expected "
+                "false, got true"
+            )
+
+    @property
+    def other_engine(self) -> EngineName | None:
+        """Name of the engine that is asked for a second opinion; None for none."""
+        return second_engine(self.engine) if self.cross_check else None
 
     @staticmethod
     def of_dataset(config: Mapping[str, Any]) -> PhysicsConfig:

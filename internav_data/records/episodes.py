@@ -125,6 +125,13 @@ class Outcome:
     reach_opened: int | None = None
     """Number of these pushes after which the lattice is cut off no more; null where none does that,
     or it was not before."""
+    agrees: bool | None = None
+    """Whether another physics engine (`physics.other_engine`) gives the same `success` and
+    `opened`; null where none was asked: of a pick, of an obstacle that is not pushable, and in
+    datasets without `physics.cross_check`."""
+    other_pose: Pose | None = None
+    """Pose of the obstacle's asset afterwards by the other engine; null where it stays there, or
+    none was asked."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,6 +218,10 @@ class Physics:
     """Longest settle time of the episode's obstacles, simulated seconds."""
     penetration_m: float
     """Deepest contact of the episode's obstacles at rest, metres."""
+    other_engine: str | None = None
+    """Name of the engine that was asked for a second opinion on outcomes; null where none was."""
+    other_build: str | None = None
+    """Version of that engine; null where none was asked."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,6 +280,8 @@ class Episode:
     blind_expert: Expert | None = None
     """Actions of an agent that knows no object's mass, friction or fixedness and learns by failing,
     its failed interactions among them; null where none was asked for, or it missed the goal."""
+    agreed: bool | None = None
+    """Whether the two engines agree on all outcomes (`agrees`); null where one alone was asked."""
 
     def __repr__(self) -> str:
         return "\n".join(_lines(self))

@@ -26,6 +26,12 @@ class CheckedConfig:
     """Minimum distance of a spawned obstacle from everything else, metres."""
     solvable: bool = False
     """Whether every episode must have an expert."""
+    engine: str | None = None
+    """Physics engine that every episode names; None where the config names none."""
+    cross_check: bool = False
+    """Whether a second engine was asked for each outcome of a push."""
+    other_engine: str | None = None
+    """Engine to compare the outcomes with, in place of the replay; None to replay."""
     same_hardware: bool = True
     """Whether this machine's arithmetic made the data: then replays equal them to the last bit."""
 
@@ -59,7 +65,16 @@ def checked_config(config: Mapping[str, Any]) -> CheckedConfig:
             f"manifest.json: config.world.hands: expected free or real, got {hands!r}; generate "
             "the dataset again"
         )
+    physics = _section(config, "physics")
+    engine, cross_check = physics.get("engine"), physics.get("cross_check", False)
+    if not isinstance(engine, str | None) or not isinstance(cross_check, bool):
+        raise CorruptDataError(
+            "manifest.json: config.physics: expected an engine's name and cross_check true or "
+            f"false, got {engine!r} and {cross_check!r}; generate the dataset again"
+        )
     return CheckedConfig(
+        engine=engine,
+        cross_check=cross_check,
         push_model=model,
         hands=hands,
         force_n=float(force),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 from internav_data.records.errors import InternavError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Mapping
 
 Level = Literal["files", "schema", "geometry", "physics"]
 LEVELS: tuple[Level, ...] = ("files", "schema", "geometry", "physics")
@@ -50,6 +50,20 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
+class Agreement:
+    """Agreement of another engine with the stored outcomes of a group of pushes."""
+
+    agree: int
+    """Number of outcomes with the same success and opening."""
+    asked: int
+    """Number of outcomes that the engine was asked for."""
+
+    def __str__(self) -> str:
+        """Return share and counts: `99.5 % (597 of 600)`."""
+        return f"{self.agree / max(1, self.asked):.1%} ({self.agree} of {self.asked})"
+
+
+@dataclass(frozen=True, slots=True)
 class Findings:
     """Result of `validate`: counts and findings, in a fixed order."""
 
@@ -65,6 +79,9 @@ class Findings:
     notes: dict[str, int] = field(default_factory=dict)
     """Reasons why something was not checked, with numbers of episodes; not faults of the data."""
 
+    agreement: dict[str, Agreement] = field(default_factory=dict)
+    """Agreement with another engine by group of outcomes, where one was asked; no finding."""
+
     @property
     def ok(self) -> bool:
         """Whether there are no findings."""
@@ -74,6 +91,7 @@ class Findings:
         """Return a text for a terminal: the counts, then the first findings."""
         looked = ", ".join(f"{count} {name}" for name, count in self.checked.items())
         notes = [f"note: {count} x {text}" for text, count in self.notes.items()]
+        notes += [f"agreement, {group}: {share}" for group, share in self.agreement.items()]
         if self.ok:
             return "\n".join([f"valid at level {self.level}: {looked}", *notes])
         lines = [f"invalid at level {self.level}: {self.total} findings in {looked}"]
@@ -105,6 +123,8 @@ class FindingCollector:
         self.counts: Counter[str] = Counter()
         self.by_predicate: Counter[str] = Counter()
         self.notes: Counter[str] = Counter()
+        self.opinions: Counter[tuple[str, bool]] = Counter()
+        """Outcomes compared with another engine's, by group ("" is all) and whether it agrees."""
 
     def expect(
         self, holds: object, predicate: str, expected: object, got: object, episode: str = ""
@@ -165,6 +185,7 @@ class FindingCollector:
         self.counts += other.counts
         self.by_predicate += other.by_predicate
         self.notes += other.notes
+        self.opinions += other.opinions
 
     def findings(self, level: Level) -> Findings:
         """Return the result, in an order that does not depend on the number of workers."""
@@ -175,7 +196,19 @@ class FindingCollector:
             sum(self.by_predicate.values()),
             dict(sorted(self.by_predicate.items())),
             dict(sorted(self.notes.items())),
+            agreement_of(self.opinions),
         )
+
+
+def agreement_of(opinions: Mapping[tuple[str, bool], int]) -> dict[str, Agreement]:
+    """Return the agreement of each group, all of them first, as "all"."""
+    groups = sorted({group for group, _ in opinions})
+    return {
+        group or "all": Agreement(
+            agree := opinions.get((group, True), 0), agree + opinions.get((group, False), 0)
+        )
+        for group in groups
+    }
 
 
 def join(collectors: Iterable[FindingCollector]) -> FindingCollector:

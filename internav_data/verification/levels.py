@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     Progress = Callable[[str, int, int], None]
 
 UNTRUE = "schema not as stated: physics not checked"
+FIRST_ENGINE = "bullet"
+"""Engine of the datasets whose config names none."""
 MAX_STARTS = 3
 """Times that a validation begins, again each time that the dataset was extended under it."""
 CHECKABLE = "geometry.checkable"
@@ -74,6 +76,7 @@ def validate(
     sample: int | None = None,
     workers: int = 1,
     progress: Progress | None = None,
+    engine: str | None = None,
 ) -> Findings:
     """Check every statement of a dataset, up to a level.
 
@@ -93,6 +96,10 @@ def validate(
         Processes for geometry and physics.
     progress
         Called with the level, the number of units done and the total.
+    engine
+        Name of another physics engine than the dataset's: at the level `physics` it is asked for
+        the outcomes of all pushes, which are compared (`Findings.agreement`, no findings) and not
+        replayed. None, or the dataset's own: replay.
 
     Returns
     -------
@@ -102,7 +109,9 @@ def validate(
     Raises
     ------
     UsageError
-        No such folder, level, sample or number of workers.
+        No such folder, level, sample, number of workers or engine.
+    MissingEngineError
+        The engine is not installed.
     CorruptDataError
         The folder holds no finished dataset.
     InternavError
@@ -112,10 +121,14 @@ def validate(
 
     """
     _check_arguments(level, sample, workers)
+    if engine is not None:
+        _check_engine(engine, level)
     for _ in range(MAX_STARTS):
         before = _version(path)
         try:
-            findings = _validate_once(path, level, sample, workers, progress or (lambda *_: None))
+            findings = _validate_once(
+                *(path, level, sample, workers, progress or (lambda *_: None), engine)
+            )
         except (InternavError, OSError):
             if before == _version(path):
                 raise
@@ -138,7 +151,12 @@ def _version(path: Path) -> tuple[int, int, int] | None:
 
 
 def _validate_once(
-    path: Path, level: Level, sample: int | None, workers: int, progress_callback: Progress
+    path: Path,
+    level: Level,
+    sample: int | None,
+    workers: int,
+    progress_callback: Progress,
+    engine: str | None,
 ) -> Findings:
     whole = FindingCollector()
     manifest = check_manifest(path, whole)
@@ -162,10 +180,7 @@ def _validate_once(
         if WITHOUT_SOLID & set(tables.by_predicate):
             damaged |= {file.path for file in manifest.of("assets")}
     if level in {"geometry", "physics"}:
-        physics = None
-        if level == "physics":
-            here = manifest.hardware == (hardware(),)
-            physics = replace(checked_config(manifest.config), same_hardware=here)
+        physics = _physics_of(manifest, engine) if level == "physics" else None
         if physics is not None and tables.by_predicate:
             # The engine must not receive values that may not be numbers at all.
             physics = None
@@ -176,6 +191,13 @@ def _validate_once(
     found = whole.findings(level)
     _account_for(manifest, found, sample, path)
     return found
+
+
+def _physics_of(manifest: Manifest, engine: str | None) -> CheckedConfig:
+    """Return the settings of the level `physics`; `engine` as in `validate`."""
+    config, here = checked_config(manifest.config), manifest.hardware == (hardware(),)
+    other = None if engine == (config.engine or FIRST_ENGINE) else engine
+    return replace(config, same_hardware=here or other is not None, other_engine=other)
 
 
 def _account_for(manifest: Manifest, found: Findings, sample: int | None, path: Path) -> None:
@@ -213,6 +235,14 @@ def _check_arguments(level: str, sample: int | None, workers: int) -> None:
         raise UsageError(f"sample: expected at least 1 scene, got {sample}")
     if workers < 1:
         raise UsageError(f"workers: expected at least 1, got {workers}")
+
+
+def _check_engine(engine: str, level: str) -> None:
+    if level != "physics":
+        raise UsageError(f"engine {engine!r}: only the level physics asks one, got level {level!r}")
+    from internav_data.verification.replay.comparison import check_engine  # noqa: PLC0415 - engines
+
+    check_engine(engine)
 
 
 def _check_scenes(

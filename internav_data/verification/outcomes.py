@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, Literal
 from scipy.spatial.transform import Rotation
 
 from internav_data.verification.checked_path import CheckedPath
-from internav_data.verification.interactions import PICK_OUTCOME
+from internav_data.verification.interactions import PICK_OUTCOME, PUSHED_M
 from internav_data.verification.shapes import rotate
 
 if TYPE_CHECKING:
@@ -50,6 +50,8 @@ def check_outcomes(
         for outcome in obstacle.outcomes or ():
             if outcome.success:
                 check.poses(number, obstacle, outcome)
+            if outcome.other_pose is not None:
+                check.other_end(number, obstacle, outcome)
     # What is not there cannot be moved away.
     if scope != "poses" and sum(report.by_predicate.values()) == before:
         check.distances(scope)
@@ -87,6 +89,17 @@ class _OutcomeCheck:
         for other in outcome.moved or ():
             if self.expect(self._can_move(other), "moved", f"{what}: objects that can move", other):
                 self.expect(self._has_moved(other), "moved", f"{what}: objects that moved", other)
+
+    def other_end(self, number: int, obstacle: Obstacle, outcome: Outcome) -> None:
+        """Check that the other engine moved the obstacle as far as its success says."""
+        if outcome.other_pose is not None:
+            found = self._displacement_m(obstacle, outcome.other_pose)
+            self.expect(
+                found >= PUSHED_M - DISPLACED_M,
+                "other-displacement",
+                f"{_name(number, obstacle, outcome)}: {PUSHED_M} m or more by the other engine",
+                f"{found:.4f} m",
+            )
 
     def _displacement_m(self, obstacle: Obstacle, end: Pose) -> float:
         middle = self.layout.shapes.centre_of_mass(obstacle.asset_id)[None]

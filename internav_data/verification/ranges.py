@@ -66,6 +66,8 @@ POSE_RULES: Mapping[str, Rule] = {
     **{f"quaternion.{axis}": TURN for axis in "xyz"},
     "quaternion.w": Rule(0.0, 1.0, digits=TURNS),
 }
+POSES = ("pose", "other_pose")
+"""Columns of an outcome that hold where the obstacle ends, by either engine."""
 OUTCOME_RULES: Mapping[str, Rule] = {
     "action": Rule(choices=OUTCOMES),
     "displacement_m": Rule(0.0, 1e4, digits=METRES),
@@ -73,7 +75,7 @@ OUTCOME_RULES: Mapping[str, Rule] = {
     "path_m_after": Rule(0.0, 1e4, digits=METRES),
     "seconds": Rule(0.0, MAX_PUSH_S),
     "reason": Rule(choices=tuple(sorted({*PUSH_REASONS, *PICK_REASONS}))),
-    **{f"pose.{n}": rule for n, rule in POSE_RULES.items()},
+    **{f"{pose}.{n}": rule for pose in POSES for n, rule in POSE_RULES.items()},
     "reach_m.element": Rule(0.0, 1e4, digits=METRES),
     "reach_opened": Rule(1, MAX_REACH),
     "moved.element.obstacle": ID,
@@ -125,6 +127,8 @@ EPISODE_RULES: Mapping[str, Rule] = {
     "physics.build": WORDS,
     "physics.settle_s": FROM_ZERO,
     "physics.penetration_m": FROM_ZERO,
+    "physics.other_engine": NAME,
+    "physics.other_build": WORDS,
 }
 SCENE_RULES: Mapping[str, Rule] = {
     "scene_id": SCENE,

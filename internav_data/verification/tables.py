@@ -12,6 +12,7 @@ from internav_data.dataset import ASSETS, EPISODES, SCENES, from_table, read_tab
 from internav_data.dataset.tables import SPECS
 from internav_data.records import OUTSIDE
 from internav_data.records.errors import InternavError
+from internav_data.verification.agreement import check_agreement
 from internav_data.verification.attributes import AttributeCheck
 from internav_data.verification.checked_config import checked_config
 from internav_data.verification.episode_config import check_episode_config, episode_request
@@ -270,6 +271,7 @@ def _check_references(
             continue
         report.scene = episode.scene_id
         check_interactions(episode, report, solvable=solvable)
+        check_agreement(episode, report)
         if keys.attributes is not None:
             for number, obstacle in enumerate(episode.obstacles):
                 keys.attributes.obstacle(obstacle, number, report, episode.episode_id)

@@ -384,6 +384,12 @@ class World:
             setattr(other, name, getattr(self, name))
         return other
 
+    def asking(self, engine: str) -> World:
+        """Return a copy whose physics is that of another engine, of the given name."""
+        other = self.copy()
+        other.engine = engine
+        return other
+
     def step(self, action: int) -> StepResult:
         """Carry out an action. One that fails changes nothing; its result gives the reason.
 

@@ -33,7 +33,7 @@ def settled(one):
     )
 
 
-def played(house, episode, config=DEFAULT_WORLD):
+def played(house, episode, config=DEFAULT_WORLD, other_engine=None):
     """An episode with settled obstacles, outcomes and expert."""
     engine = get_solver()
     resting = tuple(settled(one) for one in episode.obstacles)
@@ -44,6 +44,8 @@ def played(house, episode, config=DEFAULT_WORLD):
             episode.physics,
             engine=engine.name,
             build=engine.build,
+            other_engine=other_engine,
+            other_build=None if other_engine is None else get_solver(other_engine).build,
             settle_s=max(o.settle_s for o in resting),
             penetration_m=max(o.settle_penetration_m for o in resting),
         ),
@@ -56,13 +58,18 @@ def played(house, episode, config=DEFAULT_WORLD):
         obstructed_path_steps=world.path_steps(),
         obstructed_path_m=world.obstructed_path_m(),
     )
-    outcomes = outcomes_of(world)
+    outcomes = outcomes_of(world, other_engine=other_engine)
     return replace(
         episode,
         obstacles=tuple(
             replace(o, outcomes=five) for o, five in zip(resting, outcomes, strict=True)
         ),
         expert=expert_of_episode(stage, episode, ASSETS, config),
+        agreed=(
+            None
+            if other_engine is None
+            else all(o.agrees is not False for five in outcomes for o in five)
+        ),
     )
 
 
@@ -88,7 +95,10 @@ def crowded():
     return house, [shut, longer]
 
 
-def physical_scenes(config=DEFAULT_WORLD):
+def physical_scenes(config=DEFAULT_WORLD, other_engine=None):
     """Three scenes: a bar in a door, a box on the way, and `crowded`."""
     raw = [*small_scenes()[:2], crowded()]
-    return [(house, [played(house, e, config) for e in episodes]) for house, episodes in raw]
+    return [
+        (house, [played(house, e, config, other_engine) for e in episodes])
+        for house, episodes in raw
+    ]

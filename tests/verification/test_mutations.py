@@ -239,6 +239,7 @@ EPISODE_CHANGES = {
     "scene id": ({"scene_id": "scene-000044"}, "schema.episodes.scene_id"),
     "unrounded": ({"obstructed_path_m": 6.13181234}, "schema.episodes.obstructed_path_m"),
     "no obstacles": ({"obstacles": (), "obstacle_count": 0}, "episode.obstacle-count"),
+    "agreed": ({"agreed": True}, "schema.episodes.agreed"),
 }
 
 

@@ -6,7 +6,7 @@ lists its methods and the figures that it states.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal, get_args
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,3 +38,9 @@ The result cache believes no entry once a source file of physics has changed, or
 engine names. An engine from elsewhere must change its `build` with its results."""
 MODULES: Final = {"bullet": "pybullet", "mujoco": "mujoco"}
 """Module that an engine is built on, by the engine's name."""
+
+
+def second_engine(name: str) -> EngineName:
+    """Return the name of the engine that is asked for a second opinion beside another one."""
+    names: tuple[EngineName, ...] = get_args(EngineName)
+    return next(other for other in names if other != name)

@@ -45,10 +45,12 @@ class CheckedScene:
         self._footprints: dict[tuple[str, Pose], tuple[Geometry, ...]] = {}
         self._slabs: dict[tuple[str, Pose], list[Slab]] = {}
 
-    def world(self, episode: Episode) -> World:
-        """Return the world of an episode at its start."""
+    def world(self, episode: Episode, engine: str | None = None) -> World:
+        """Return the world of an episode at its start, by its own engine or the one named."""
         config = WorldConfig(self.config.push_model, self.config.force_n, self.config.hands)
-        return World.of_episode(self.model, episode, self.assets, config, self.engine(episode))
+        return World.of_episode(
+            self.model, episode, self.assets, config, engine or self.engine(episode)
+        )
 
     def engine(self, episode: Episode) -> str:
         """Return the name of the physics engine that checks an episode: its own, if known here."""

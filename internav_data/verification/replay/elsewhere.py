@@ -20,11 +20,13 @@ MEASURES: Final = frozenset((
     *("physics.outcome-path-steps-after", "physics.outcome-path-m-after"),
     *("physics.outcome-pose", "physics.outcome-moved", "physics.outcome-at-rest"),
     *("physics.outcome-reach", "physics.outcome-reach-opened"),
+    "physics.outcome-other-pose",
 ))  # fmt: skip
 """Predicates of numbers that follow from poses: on other hardware they need not hold."""
 KINDS: Final = frozenset((
     "physics.settle-refused",
     *("physics.outcome-reason", "physics.outcome-success", "physics.outcome-opened"),
+    "physics.outcome-agrees",
 ))  # fmt: skip
 """Predicates of kinds of results, beside all those of experts."""
 _EXPERTS: Final = ("physics.expert-", "physics.blind-expert-")

@@ -36,9 +36,23 @@ SUNK_M = 0.005
 """Maximum depth in the floor or in anything else of an object that a push has moved."""
 
 
-def check_outcomes(scene: CheckedScene, episode: Episode, expect: Expect) -> None:
-    """Check the outcomes of all obstacles that have any."""
+def check_outcomes(
+    scene: CheckedScene, episode: Episode, expect: Expect, other_engine: str | None = None
+) -> None:
+    """Check the outcomes of all obstacles that have any.
+
+    Parameters
+    ----------
+    scene, episode
+        Scene and episode to check.
+    expect
+        Function that counts a predicate.
+    other_engine
+        Name of the engine whose second opinions are stored; None not to ask it.
+
+    """
     world = scene.world(episode)
+    other = None if other_engine is None else scene.world(episode, other_engine)
     first = len(scene.model.items)
     for number, obstacle in enumerate(episode.obstacles):
         for outcome in obstacle.outcomes or ():
@@ -49,6 +63,8 @@ def check_outcomes(scene: CheckedScene, episode: Episode, expect: Expect) -> Non
                 check.pick(world, first + number)
             elif outcome.action in PUSH_OUTCOMES:
                 check.push(world, first + number)
+                if other is not None and obstacle.pushable:
+                    check.second_opinion(other, first + number)
 
 
 class OutcomeCheck:
@@ -101,6 +117,25 @@ class OutcomeCheck:
             self._reach(world, index, pushed)
         else:
             self._poses(None, (), at_rest=pushed.at_rest)
+
+    def second_opinion(self, other: World, index: int) -> None:
+        """Push an obstacle again by the other engine, and compare with what it said."""
+        success, opened, pose = self.ask(other, index)
+        agrees = (success, opened) == (self.outcome.success, self.outcome.opened)
+        self.expect("agrees", agrees, self.outcome.agrees)
+        self.expect("other-pose", pose, self.outcome.other_pose)
+
+    def ask(self, world: World, index: int) -> tuple[bool, bool, Pose | None]:
+        """Return whether a push of an obstacle succeeds and opens, and where it ends if it does."""
+        heading = PUSH_OUTCOMES.index(self.outcome.action)
+        pushed = world.simulate_push(index, heading, agent=False)
+        if not pushed.success:
+            return False, False, None
+        opened = False
+        if self.episode.obstructed_path_steps is None:
+            ends: dict[int, Pose | None] = {index: pushed.pose, **dict(pushed.moved)}
+            opened = math.isfinite(self._steps(world.items, ends))
+        return True, opened, pushed.pose
 
     def _reach(self, world: World, index: int, pushed: PushResult) -> None:
         """Push on where pushes end after a step, and compare how far and what it opens."""
