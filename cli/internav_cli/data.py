@@ -71,7 +71,7 @@ def demo(*, out: Path, scenes: int) -> int:
     """Make a small dataset, prove it right, draw it and film it: about three minutes."""
     from internav_cli.main import cli as internav_gen
 
-    for words in _steps(out, scenes):
+    for words in _steps(out, scenes, _engine()):
         click.echo(f"$ {shlex.join(['internav-gen', *words])}", err=True)
         code = internav_gen.main(words, prog_name="internav-gen", standalone_mode=False)
         if code:
@@ -82,10 +82,26 @@ def demo(*, out: Path, scenes: int) -> int:
     return 0
 
 
-def _steps(out: Path, scenes: int) -> Iterator[Sequence[str]]:
+def _engine() -> Sequence[str]:
+    """Return the option that names another physics engine where the default one is missing."""
+    from internav_data.physics.engines import DEFAULT_ENGINE
+    from internav_data.physics.engines.installed import available_engines
+
+    known = available_engines()
+    if DEFAULT_ENGINE in known or not known:
+        return ()
+    click.echo(
+        f"the default physics engine, {DEFAULT_ENGINE}, is not installed: {known[0]} takes its "
+        "place, and makes other data",
+        err=True,
+    )
+    return ("--physics", known[0])
+
+
+def _steps(out: Path, scenes: int, engine: Sequence[str]) -> Iterator[Sequence[str]]:
     """Yield the command lines of `internav-gen` that make up the demo."""
-    dataset = str(out / "dataset")
-    yield "generate", "--out", dataset, "--scenes", str(scenes), "--episodes-per-scene", "5"
+    dataset, size = str(out / "dataset"), ("--scenes", str(scenes), "--episodes-per-scene", "5")
+    yield "generate", "--out", dataset, *size, *engine
     yield "validate", dataset, "--level", "physics"
     yield "stats", dataset
     yield "show", dataset, "--scene", "6", "--out", str(out / "house.png")

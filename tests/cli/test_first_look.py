@@ -77,6 +77,24 @@ def test_the_demo_goes_through_its_commands(tmp_path, monkeypatch):
     assert f"$ internav-gen validate {tmp_path}/dataset" in done.output
 
 
+@pytest.mark.parametrize("others", [("mujoco",), ()])
+def test_the_demo_takes_another_engine_where_the_default_one_is_missing(
+    tmp_path, monkeypatch, others
+):
+    from internav_cli import main
+    from internav_cli.data import cli
+
+    called = []
+    monkeypatch.setattr("internav_data.physics.engines.DEFAULT_ENGINE", "bullet")
+    monkeypatch.setattr("internav_data.physics.engines.installed.available_engines", lambda: others)
+    monkeypatch.setattr(main.cli, "main", lambda words, **_: called.append(words) or 1)
+    done = CliRunner().invoke(cli, ["demo", "--out", str(tmp_path)])
+    (words,) = called
+    # Without any engine, `generate` says in a line what to install.
+    assert words[-2:] == (("--physics", *others) if others else ("--episodes-per-scene", "5"))
+    assert ("bullet, is not installed: mujoco takes its place" in done.output) == bool(others)
+
+
 def test_the_demo_ends_where_a_command_fails(tmp_path, monkeypatch):
     from internav_cli import main
     from internav_cli.data import cli
