@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from internav_data.core.locks import ThreadLock, once_per_process
 from internav_data.physics.engines.mujoco_scene import (
+    FAST,
     MARGIN_M,
     ModelBuilder,
     mujoco,
@@ -67,7 +68,16 @@ class MuJoCo:
 class MuJoCoSimulation:
     """A scene in motion in MuJoCo. Bodies go by their index in the scene."""
 
-    __slots__ = ("_forces", "_geoms", "_model_and_data", "_positions", "_pushed", "_velocities")
+    __slots__ = (
+        "_fast",
+        "_forces",
+        "_geoms",
+        "_model_and_data",
+        "_positions",
+        "_pushed",
+        "_speeds",
+        "_velocities",
+    )
 
     def __init__(self, made: CompiledScene) -> None:
         data = made.data
@@ -75,6 +85,9 @@ class MuJoCoSimulation:
         self._positions = {k: data.qpos[7 * n : 7 * n + 7] for k, n in made.movers.items()}
         self._velocities = {k: data.qvel[6 * n : 6 * n + 6] for k, n in made.movers.items()}
         self._forces = {k: data.qfrc_applied[6 * n : 6 * n + 3] for k, n in made.movers.items()}
+        self._speeds = data.qvel
+        self._fast: bool | None = None
+        """Whether something was fast before the last step; None before the first."""
         self._pushed: list[int] = []
         """Bodies on which a force acts during the next step."""
 
@@ -82,7 +95,10 @@ class MuJoCoSimulation:
         """Advance by a number of time steps."""
         model, data = self._model_and_data
         for _ in range(count):
-            set_friction_solver(model, data)
+            fast = max(map(abs, self._speeds.tolist())) > FAST
+            if fast is not self._fast:
+                set_friction_solver(model, fast=fast)
+                self._fast = fast
             mujoco.mj_step(model, data)
             for body in self._pushed:
                 self._forces[body][:] = 0.0

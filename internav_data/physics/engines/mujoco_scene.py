@@ -319,19 +319,16 @@ def _set_dynamics(model: MjModel, row: int, mover: int, body: Body) -> None:
     model.dof_solimp[spin] = IMPEDANCE
 
 
-def set_friction_solver(model: MjModel, data: MjData) -> None:
-    """Choose how friction is solved in the next step: by what is fast.
+def set_friction_solver(model: MjModel, *, fast: bool) -> None:
+    """Choose how friction is solved in the next steps: by whether something is fast (`FAST`).
 
     MuJoCo solves normal forces and friction as one convex problem. It is exact for what stands, but
     what slides is lifted by friction times its speed: at 1 m/s a crate hops 1 cm high, a chair
     turns. Friction of next to no impedance does not lift; a second solver then finds friction by
     the normal forces, as other engines do. Of what is pushed and stands that one lets parts slip.
     """
-    fast = max(map(abs, data.qvel.tolist())) > FAST
-    model.opt.impratio, model.opt.noslip_iterations = (
-        FRICTION_IMPEDANCE[fast],
-        NO_SLIP_ITERATIONS[fast],
-    )
+    model.opt.impratio = FRICTION_IMPEDANCE[fast]
+    model.opt.noslip_iterations = NO_SLIP_ITERATIONS[fast]
 
 
 def _set_agent(model: MjModel, agent: AgentCollider) -> None:
