@@ -6,7 +6,9 @@ There the tests' default is MuJoCo, and what is about Bullet itself is skipped: 
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
+from pathlib import Path
 
 import pytest
 
@@ -17,8 +19,10 @@ HAS_BULLET = "bullet" in available_engines()
 NO_BULLET = "Bullet is not installed: pybullet has no wheel for this Python"
 bullet_only = pytest.mark.skipif(not HAS_BULLET, reason=NO_BULLET)
 
-if not HAS_BULLET:  # before anybody else has imported it
+if not HAS_BULLET:  # in this process before anybody else has imported it, and in those it starts
     engines.DEFAULT_ENGINE = "mujoco"
+    paths = [str(Path(__file__).parent / "without_bullet"), os.environ.get("PYTHONPATH")]
+    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, paths))
 
 
 def of_bullet(name):

@@ -22,18 +22,33 @@ from internav_data.records.errors import UsageError
 
 NO_POSIX = """
 import os, signal, sys
-import tempfile, subprocess, multiprocessing.connection, socket, click
+import ctypes, mmap, multiprocessing.connection, socket, sqlite3, subprocess, tempfile, uuid
+import click
+from types import SimpleNamespace
 for module, names in (
     (os, "sched_getaffinity geteuid getuid sysconf major minor register_at_fork memfd_create "
-         "O_NOFOLLOW O_NONBLOCK O_NOCTTY fork"),
+         "O_NOFOLLOW O_NONBLOCK O_NOCTTY fork setsid killpg"),
     (signal, "SIGHUP SIGKILL pthread_sigmask SIG_BLOCK SIG_UNBLOCK SIG_SETMASK"),
 ):
     for name in names.split():
         if hasattr(module, name):
             delattr(module, name)
 sys.modules["fcntl"] = sys.modules["resource"] = None
+sys.modules["msvcrt"] = SimpleNamespace(locking=lambda *_: None, LK_NBLCK=2)
+real = os.open
+def opened(path, *given, **named):
+    if os.path.isdir(path):
+        raise PermissionError(13, "Permission denied", str(path))
+    return real(path, *given, **named)
+os.open = opened
+from internav_data.core import machine
+machine.WINDOWS = True
+from internav_cli.main import main
+main()
 """
-"""Takes from a process what Windows lacks."""
+"""Commands on a system that lacks what Windows lacks."""
+HEAVY = "import cv2, numba, platformdirs, pyarrow.parquet, scipy.spatial"
+"""Packages that ask for POSIX where they are imported, as this is no Windows after all."""
 
 
 @pytest.fixture
@@ -112,15 +127,34 @@ def test_what_a_system_does_not_tell_is_done_without(monkeypatch, tmp_path):
         assert lock_holder(file.fileno()) == ""
 
 
-def test_commands_run_without_what_posix_alone_has(tmp_path):
-    code = f"{NO_POSIX}\nfrom internav_cli.main import main; main()"
-    for words, code_expected in ((["--help"], 0), (["schema"], 0), (["stats", "nothing"], 5)):
-        done = subprocess.run(
-            [sys.executable, "-c", code, *words], capture_output=True, text=True, check=False,
-            cwd=tmp_path,
-        )  # fmt: skip
-        assert done.returncode == code_expected, done.stderr
-        assert len(done.stderr.splitlines()) <= 2, done.stderr
+def command(folder, *words, code=NO_POSIX):
+    return subprocess.run(
+        [sys.executable, "-c", code, *words], capture_output=True, text=True, check=False,
+        cwd=folder,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("words", "code"), [(["--help"], 0), (["schema"], 0), (["stats"], 5)])
+def test_commands_run_without_what_posix_alone_has(tmp_path, words, code):
+    done = command(tmp_path, *words)
+    assert done.returncode == code, done.stderr
+    assert len(done.stderr.splitlines()) <= 2, done.stderr
+
+
+@pytest.mark.slow
+def test_a_dataset_has_the_bytes_that_it_has_elsewhere(tmp_path):
+    words = ["generate", "--scenes", "2", "--episodes-per-scene", "2", "--rooms", "1", "--out"]
+    here = [sys.executable, "-c", "from internav_cli.main import main; main()", *words, "here"]
+    subprocess.run(here, cwd=tmp_path, check=True, capture_output=True)
+    code = HEAVY + NO_POSIX
+    there = command(tmp_path, *words, "there", code=code)
+    assert there.returncode == 0, there.stderr
+    names = [{p.relative_to(f): p.read_bytes() for p in f.rglob("*") if p.is_file()}
+             for f in (tmp_path / "here", tmp_path / "there")]  # fmt: skip
+    assert names[0] == names[1]
+    for name in ("validate", "stats"):
+        said = command(tmp_path, name, "there", code=code)
+        assert said.returncode == 0, said.stderr
 
 
 def test_signals_that_end_a_command_are_those_that_there_are():
