@@ -40,7 +40,9 @@ WIDTHS: dict[str, str] = {
 UNITS = {"m": "m", "m2": "m^2", "kg": "kg", "s": "s", "deg": "deg", "seconds": "s"}
 """Unit by the last word of a field's name."""
 
-METRES = frozenset({"x", "y", "z", "centre", "size", "corners", "polygon", "outline", "points"})
+METRES = frozenset(
+    {"x", "y", "z", "centre", "size", "corners", "polygon", "outline", "points", "swept"}
+)
 """Fields in metres whose names state no unit."""
 
 Kind = Literal["string", "bool", "float64", "int8", "uint8", "int16", "int32", "int64"]

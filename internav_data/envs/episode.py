@@ -105,10 +105,14 @@ class EpisodeRun:
         config: TaskConfig,
         start: Sequence[int] | None = None,
         task: type[Task] = InteractiveNavigation,
+        *,
+        stored_outcomes: bool = False,
     ) -> None:
         episode = task.prepare(episode)
         self.episode, self.loaded_house, self._config = episode, loaded_house, config
-        self.world = World.of_episode(loaded_house.model, episode, assets, config.world)
+        self.world = World.of_episode(
+            *(loaded_house.model, episode, assets, config.world), stored_outcomes=stored_outcomes
+        )
         if start is not None:
             self._place_agent(start)
         self.start = None if start is None else (start[0], start[1], start[2] % 4)

@@ -233,7 +233,10 @@ class EnvSlot:
             number, start = self._next()
         episode, assets = self.source.episode(number), self.source.dataset.assets
         loaded_house = self.source.loaded_house(episode)
-        run = EpisodeRun(episode, loaded_house, assets, self._config, start, self._task)
+        run = EpisodeRun(
+            *(episode, loaded_house, assets, self._config, start, self._task),
+            stored_outcomes=self.source.outcomes_hold(self._config.world),
+        )
         for action in actions:
             run.step(int(action))
         self._current = run

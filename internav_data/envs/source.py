@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from internav_data.core.files import read_file
+from internav_data.core.hardware import hardware
 from internav_data.core.lru import LRUCache
 from internav_data.dataset import load_dataset, read_manifest
 from internav_data.dataset.location import folder_to_read
@@ -141,6 +142,14 @@ class Source:
     def world_config(self) -> WorldConfig:
         """Settings of the world that the dataset's outcomes and experts were made with."""
         return WorldConfig.of_dataset(self.dataset.manifest.config)
+
+    @cached_property
+    def _same_arithmetic(self) -> bool:
+        return self.dataset.manifest.hardware == (hardware(),)
+
+    def outcomes_hold(self, config: WorldConfig) -> bool:
+        """Return whether this machine finds the stored outcomes, too, with a world's settings."""
+        return self._same_arithmetic and config.push_spec == self.world_config.push_spec
 
     @cached_property
     def bounds(self) -> NDArray[np.int64]:

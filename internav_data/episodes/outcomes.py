@@ -7,6 +7,7 @@ way.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Final
@@ -149,6 +150,7 @@ def _pushed(world: World, index: int, heading: int, before: Distances, lifted: _
         at_rest=pushed.at_rest,
         reach_m=reach_m,
         reach_opened=reach_opened,
+        swept=_swept(world, index, pushed),
     )
 
 
@@ -170,6 +172,16 @@ def _compared(
         agrees=(pushed.success, opened) == (outcome.success, outcome.opened),
         other_pose=pushed.pose if pushed.success else None,
     )
+
+
+def _swept(world: World, index: int, pushed: PushResult) -> tuple[float, ...] | None:
+    """Return the distances of the sides of a push's box from the object, rounded up to 1 cm."""
+    if pushed.swept is None:
+        return None
+    start, (x_min, y_min, x_max, y_max) = world.body(index).pose, pushed.swept
+    sides = (start.x - x_min, start.y - y_min, x_max - start.x, y_max - start.y)
+    # 10 nm beyond a centimetre are of the arithmetic, not of the push.
+    return tuple(math.ceil(100.0 * side - 1e-6) / 100.0 for side in sides)
 
 
 def _reach(

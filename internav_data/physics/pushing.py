@@ -41,6 +41,8 @@ if TYPE_CHECKING:
     Near = Callable[[Dop8], Sequence[tuple[int, Body]]]
     """Function from an 8-DOP of the house to the bodies that reach into it, with their keys,
     ascending. The pushed object is not among them."""
+    Box = tuple[float, float, float, float]
+    """Rectangle along the axes of the house: x_min, y_min, x_max, y_max, metres."""
     Movers = tuple[tuple[int, Body], ...]
     """Bodies that move besides the pushed one, with their keys."""
 
@@ -68,6 +70,8 @@ _START_DIGITS: Final = 4
 """Orientations of a free push are rounded to 0.1 mrad, which moves a corner by less than the 0.1 mm
 of stored positions: nearly equal ones share their solution."""
 
+ROUNDED_M: Final = 0.001
+"""Bound of what rounding does to the agent's position and to a recorded path, metres."""
 _OWN: Final = Frame(0.0, 0.0, 0)
 
 Failure = Literal["", "too heavy", "something is in the way", "the agent is in the way"]
@@ -92,6 +96,9 @@ class PushResult:
     reason: Failure
     at_rest: bool
     """False when something still moved 10 s after the release: the poses are of that moment."""
+    swept: Box | None = None
+    """Box in the plane of everything that the bodies that can move covered on the way, unrounded;
+    None for a body that does not move."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -331,7 +338,42 @@ def _judged(
         success=success,
         reason="" if success else failure,
         at_rest=solution.at_rest,
+        swept=_swept(frame, solution),
     )
+
+
+def _swept(frame: Frame, solution: PushSolution) -> Box:
+    """Return the box around all sweeps of a solution, in the house."""
+    sweeps = [frame.leave_dop8(sweep) for sweep in solution.sweeps]
+    east, north = max(sweep[0] for sweep in sweeps), max(sweep[2] for sweep in sweeps)
+    west, south = max(sweep[4] for sweep in sweeps), max(sweep[6] for sweep in sweeps)
+    return -west, -south, east, north
+
+
+def stays_clear(swept: Box, agent: Vec2, engine: str = DEFAULT_ENGINE) -> bool:
+    """Return whether a push that covers a box is the same with an agent as without.
+
+    False where it may not be.
+
+    Parameters
+    ----------
+    swept
+        Box of everything that the push covers without the agent.
+    agent
+        Position of the agent, metres.
+    engine
+        Name of the physics engine.
+
+    Raises
+    ------
+    UsageError
+        No engine has this name.
+
+    """
+    # `_meets` asks boxes first, that of the agent's collider and those of a body on its way.
+    keep = AGENT_M + SWEEP_GAP_M + get_solver(engine).contact_margin_m + ROUNDED_M
+    (x, y), (x_min, y_min, x_max, y_max) = agent, swept
+    return max(x_min - x, x - x_max, y_min - y, y - y_max) > keep
 
 
 def _coarse(quaternion: Quaternion) -> Quaternion:

@@ -132,6 +132,10 @@ class Outcome:
     other_pose: Pose | None = None
     """Pose of the obstacle's asset afterwards by the other engine; null where it stays there, or
     none was asked."""
+    swept: tuple[float, ...] | None = None
+    """Box in the plane of all that moved in a successful push, wherever it was on the way: how far
+    its sides are to the west (-x), south (-y), east and north of the obstacle's position before,
+    metres, rounded up to 1 cm; null of other interactions, and in datasets of earlier releases."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,8 @@ PUSHED_M = 0.05
 
 MAX_REACH = 4
 """Maximum number of pushes in a row of an outcome."""
+BOX_SIDES = 4
+"""Number of sides of a box in the plane."""
 
 ACTIONS = 12
 MOVE, ROTATE_LEFT, ROTATE_RIGHT = 0, 1, 2
@@ -109,6 +111,12 @@ class _InteractionCheck:
             "outcomes.pose",
             f"{what}: {'a pose' if stored and pushed else 'null'}",
             outcome.pose,
+        )
+        self.expect(
+            outcome.swept is None or (pushed and len(outcome.swept) == BOX_SIDES),
+            "outcomes.swept",
+            f"{what}: {BOX_SIDES} distances of a successful push, else null",
+            outcome.swept,
         )
         resting = (False, True) if outcome.seconds else (True,)
         self.expect(

@@ -6,18 +6,19 @@ import math
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, Literal
 
+import numpy as np
 from scipy.spatial.transform import Rotation
 
 from internav_data.verification.checked_path import CheckedPath
-from internav_data.verification.interactions import PICK_OUTCOME, PUSHED_M
+from internav_data.verification.interactions import BOX_SIDES, PICK_OUTCOME, PUSHED_M
 from internav_data.verification.shapes import rotate
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from shapely import Geometry
 
-    from internav_data.records import Episode, MovedObject, Obstacle, Outcome, Pose
+    from internav_data.records import Episode, MovedObject, Obstacle, Outcome, Pose, SceneObject
     from internav_data.verification.checked_layout import CheckedLayout
     from internav_data.verification.findings import FindingCollector
 
@@ -33,6 +34,8 @@ MOVED_M: Final = 5e-4
 """Distance from which another object counts as moved, metres."""
 MOVED_RAD: Final = 1e-3
 """Angle from which another object counts as moved, radians."""
+SWEPT_M: Final = 5e-4
+"""Tolerance of a swept box: it is of poses before they are rounded."""
 TIE: Final = 1e-9
 """Difference that arithmetic alone can make, metres and radians."""
 
@@ -86,9 +89,34 @@ class _OutcomeCheck:
                 f"{what}: {found:.4f} m",
                 outcome.displacement_m,
             )
+        ends = [(obstacle.asset_id, obstacle.pose, outcome.pose)]
         for other in outcome.moved or ():
             if self.expect(self._can_move(other), "moved", f"{what}: objects that can move", other):
                 self.expect(self._has_moved(other), "moved", f"{what}: objects that moved", other)
+                before = self._before(other)
+                ends.append((before.asset_id, before.pose, other.pose))
+        self._swept(obstacle, outcome, what, ends)
+
+    def _swept(
+        self,
+        obstacle: Obstacle,
+        outcome: Outcome,
+        what: str,
+        ends: Sequence[tuple[str, Pose, Pose | None]],
+    ) -> None:
+        """Check that the box of a push holds what moved where it began and where it ended."""
+        if outcome.swept is None or len(outcome.swept) != BOX_SIDES:
+            return
+        corners = self.layout.shapes.corners
+        points = np.vstack([corners(name, p)[:, :2] for name, *at in ends for p in at if p])
+        (x_min, y_min), (x_max, y_max) = points.min(axis=0), points.max(axis=0)
+        found = (obstacle.x - x_min, obstacle.y - y_min, x_max - obstacle.x, y_max - obstacle.y)
+        self.expect(
+            all(far <= side + SWEPT_M for far, side in zip(found, outcome.swept, strict=True)),
+            "swept",
+            f"{what}: at least {', '.join(f'{far:.4f}' for far in found)} m",
+            outcome.swept,
+        )
 
     def other_end(self, number: int, obstacle: Obstacle, outcome: Outcome) -> None:
         """Check that the other engine moved the obstacle as far as its success says."""
@@ -122,12 +150,14 @@ class _OutcomeCheck:
         of_obstacles = asset.spawnable or placed.affordance is not None
         return of_obstacles and not own.fixed
 
-    def _has_moved(self, other: MovedObject) -> bool:
+    def _before(self, other: MovedObject) -> Obstacle | SceneObject:
+        """Return what an object that moved was before."""
         if other.obstacle is not None:
-            before = self.episode.obstacles[other.obstacle].pose
-        else:
-            before = self._objects[-1 if other.object_id is None else other.object_id].pose
-        after = other.pose
+            return self.episode.obstacles[other.obstacle]
+        return self._objects[-1 if other.object_id is None else other.object_id]
+
+    def _has_moved(self, other: MovedObject) -> bool:
+        before, after = self._before(other).pose, other.pose
         far = math.dist((before.x, before.y, before.z), (after.x, after.y, after.z))
         turn = Rotation.from_quat(before.quaternion).inv() * Rotation.from_quat(after.quaternion)
         return far >= MOVED_M - TIE or float(turn.magnitude()) >= MOVED_RAD - TIE

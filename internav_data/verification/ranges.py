@@ -78,6 +78,7 @@ OUTCOME_RULES: Mapping[str, Rule] = {
     **{f"{pose}.{n}": rule for pose in POSES for n, rule in POSE_RULES.items()},
     "reach_m.element": Rule(0.0, 1e4, digits=METRES),
     "reach_opened": Rule(1, MAX_REACH),
+    "swept.element": Rule(0.0, 1e3, digits=2),
     "moved.element.obstacle": ID,
     "moved.element.object_id": ID,
     **{f"moved.element.pose.{n}": rule for n, rule in POSE_RULES.items()},

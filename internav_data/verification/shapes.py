@@ -223,6 +223,10 @@ class Shapes:
         moved += (pose.x, pose.y, pose.z)
         return [(moved[ends[k] : ends[k + 1]], s.edges) for k, s in enumerate(solids)]
 
+    def corners(self, asset_id: str, pose: Pose) -> Floats:
+        """Return the corners of all parts of an asset at a pose, (n, 3), metres."""
+        return np.vstack([corners for corners, _ in self._placed(asset_id, pose)])
+
     def footprint(self, asset_id: str, pose: Pose) -> list[Geometry]:
         """Return the footprint of an asset at a pose: convex plans, one a part."""
         if not self.assets[asset_id].blocks:

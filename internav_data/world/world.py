@@ -33,6 +33,7 @@ from internav_data.world.config import DEFAULT_WORLD
 from internav_data.world.drop import DropObstructions, drop
 from internav_data.world.house_model import HouseModel, MovableObject, dop8_rows
 from internav_data.world.occlusion import placed_occlusion_shape
+from internav_data.world.stored_pushes import StoredPushes
 from internav_data.world.visibility import REACH_M, Occluders, axis_distance, camera_pose
 
 if TYPE_CHECKING:
@@ -106,7 +107,9 @@ def _push(world: World, action: Action) -> StepResult:
     if not world.items[target].dynamics.pushable:
         return _refused(world, action, target, "not pushable")
     # The four pushes are relative to the agent's heading, physics knows those of the house.
-    pushed = world.simulate_push(target, (world.quarter + action.quarter_turns) % 4)
+    heading = (world.quarter + action.quarter_turns) % 4
+    stored = world.stored_pushes and world.stored_pushes.result(world, target, heading)
+    pushed = stored or world.simulate_push(target, heading)
     if not pushed.success:
         return _refused(world, action, target, pushed.reason, pushed.seconds)
     # An object may fall over the agent's collider, or come to rest over its disc after rounding.
@@ -255,6 +258,8 @@ class World:
         Settings of pushes and hands.
     engine : str
         Name of the physics engine.
+    stored_pushes : StoredPushes or None
+        Pushes whose results are known from the episode; None to solve them all.
     interaction : Interaction or None
         Interaction in progress, begun by an earlier step and not yet ended. All of today's
         actions end in the step that begins them.
@@ -275,6 +280,7 @@ class World:
         "lattice",
         "model",
         "quarter",
+        "stored_pushes",
     )
 
     model: HouseModel
@@ -326,6 +332,7 @@ class World:
         self.goal = goal
         self.config = config
         self.engine = engine
+        self.stored_pushes: StoredPushes | None = None
         self.interaction: Interaction | None = None
 
     @staticmethod
@@ -335,6 +342,8 @@ class World:
         assets: Mapping[str, Asset],
         config: WorldConfig = DEFAULT_WORLD,
         engine: str | None = None,
+        *,
+        stored_outcomes: bool = False,
     ) -> World:
         """Set up an episode at its start, its obstacles with their stored dynamics.
 
@@ -350,6 +359,9 @@ class World:
             Settings of the world.
         engine
             Name of the physics engine; None for the one that the episode was made with.
+        stored_outcomes
+            Whether the episode's outcomes may stand for solving its first push. They must have been
+            made with this config and this machine's arithmetic; engine and rules are compared here.
 
         Raises
         ------
@@ -363,7 +375,7 @@ class World:
                 f"got the house {model.house.scene_id}; build the model of its own house"
             )
         start, goal = episode.start, episode.goal
-        return World(
+        world = World(
             model,
             [Body.of_obstacle(obstacle, assets) for obstacle in episode.obstacles],
             (start.i, start.j, start.yaw_deg // 90),
@@ -372,6 +384,9 @@ class World:
             engine or episode.physics.engine,
             [obstacle.affordance for obstacle in episode.obstacles],
         )
+        if stored_outcomes:
+            world.stored_pushes = StoredPushes.of(world, episode)
+        return world
 
     def copy(self) -> World:
         """Return an independent world in the same state.

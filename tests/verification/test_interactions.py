@@ -157,6 +157,15 @@ def test_outcomes_of_some_obstacles_only(scenes):
     assert judged(replace(episode, obstacles=some)) == {"outcomes.all"}
 
 
+@pytest.mark.parametrize("swept", [(1.0, 1.0, 1.0), (1.0,) * 5, ()])
+def test_boxes_have_four_sides(scenes, swept):
+    episode = scenes[0][1][0]
+    pushed = next(k for k, o in enumerate(episode.obstacles[0].outcomes) if o.success)
+    assert judged(with_outcome(episode, pushed, swept=swept)) == {"outcomes.swept"}
+    pick = len(episode.obstacles[0].outcomes) - 1
+    assert "outcomes.swept" in judged(with_outcome(episode, pick, swept=(1.0,) * 4))
+
+
 REACHES = {
     "of another first push": ({"reach_m": (0.31, 0.5)}, "reach_m"),
     "of none": ({"reach_m": ()}, "reach_m"),

@@ -65,6 +65,11 @@ CHANGES = {
     "more steps once picked": ((2, 0, "pick", 1, {"path_steps_after": 26}), "path-steps-after"),
     "more steps round furniture": ((*PUSHED, {"path_steps_after": 28}), "path-steps-after"),
     "a longer way round it": ((*PUSHED, {"path_m_after": 6.03}), "path-m-after"),
+    "a box around the start alone": ((*PUSHED, {"swept": (0.4, 0.4, 0.4, 0.4)}), "swept"),
+    "a box without what it met": (
+        (0, 1, "push_north", 0, {"swept": (9.0, 9.0, 9.0, 0.0)}),
+        "swept",
+    ),
     "furniture that never moves": ((*PUSHED, {"moved": (0, None)}), "moved"),
     "furniture that is not there": ((*PUSHED, {"moved": (7, None)}), "moved"),
     "an obstacle that is not there": ((*PUSHED, {"moved": (None, 5)}), "moved"),
@@ -112,7 +117,8 @@ def test_an_end_as_far_away_but_elsewhere(scenes, layouts):
     west = bar.outcomes[2]
     assert west.opened
     end = Pose(bar.x, round(bar.y + west.displacement_m, 4), bar.z, bar.quaternion)
-    wrong = outcome_changed(scenes, 0, 0, "push_west", 0, pose=end)[0][1][0]
+    changes = {"pose": end, "swept": (9.0,) * 4}
+    wrong = outcome_changed(scenes, 0, 0, "push_west", 0, **changes)[0][1][0]
     assert (
         {"outcome.path-m-after"}
         <= found_in(layouts[0], wrong)

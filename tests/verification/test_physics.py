@@ -316,6 +316,7 @@ OUTCOMES = {
         "outcome.path-steps-after",
     ),
     "never at rest": ((0, 0, "push_west", 0, {"at_rest": False}), "physics.outcome-at-rest"),
+    "a box too wide": ((0, 0, "push_west", 0, {"swept": (9.0,) * 4}), "physics.outcome-swept"),
     "furniture stays": ((2, 0, "push_north", 1, {"moved": ()}), "physics.outcome-moved"),
 }
 

@@ -32,6 +32,10 @@ REST_M = 0.01
 """A rests on B if A's bottom is more than this above B's bottom and not above B's top."""
 TOUCH_M = 0.005
 """Maximum distance of touching objects."""
+TIE_M = 1e-7
+"""Difference that arithmetic alone can make."""
+CENTIMETRE = 0.01
+"""Step to which sides of swept boxes are rounded up, metres."""
 SUNK_M = 0.005
 """Maximum depth in the floor or in anything else of an object that a push has moved."""
 
@@ -110,6 +114,7 @@ class OutcomeCheck:
         if self._ends(pushed.reason, far, pushed.seconds) and pushed.success:
             ends: dict[int, Pose | None] = {index: pushed.pose, **dict(pushed.moved)}
             self._poses(pushed.pose, pushed.moved, at_rest=pushed.at_rest)
+            self._swept(world.items[index].pose, pushed)
             self._not_sunk(world, ends)
             if outcome.moved is None or not self.scene.config.same_hardware:
                 # Else the stored poses are these, and give the distances without physics.
@@ -136,6 +141,17 @@ class OutcomeCheck:
             ends: dict[int, Pose | None] = {index: pushed.pose, **dict(pushed.moved)}
             opened = math.isfinite(self._steps(world.items, ends))
         return True, opened, pushed.pose
+
+    def _swept(self, start: Pose | None, pushed: PushResult) -> None:
+        """Check that the box holds all of the way, and is wider by less than 1 cm on each side."""
+        stored = self.outcome.swept
+        if stored is None or start is None or pushed.swept is None:
+            return
+        (x_min, y_min, x_max, y_max), (x, y) = pushed.swept, (start.x, start.y)
+        found = (x - x_min, y - y_min, x_max - x, y_max - y)
+        wider = [side - far for side, far in zip(stored, found, strict=True)]
+        near = all(-TIE_M <= more < CENTIMETRE + TIE_M for more in wider)
+        self.expect("swept", tuple(round(far, 4) for far in found), stored, holds=near)
 
     def _reach(self, world: World, index: int, pushed: PushResult) -> None:
         """Push on where pushes end after a step, and compare how far and what it opens."""
