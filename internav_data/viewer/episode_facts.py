@@ -174,7 +174,12 @@ def _moved(
 
 
 def outcome_text(episode: Episode, outcome: Outcome) -> str:
-    """Return an outcome in words: what moves, and what becomes of the path."""
+    """Return an outcome in words: what moves, what becomes of the path, and who disagrees."""
+    differs = f"; {episode.physics.other_engine} disagrees" if outcome.agrees is False else ""
+    return f"{_moved_text(episode, outcome)}{differs}"
+
+
+def _moved_text(episode: Episode, outcome: Outcome) -> str:
     words = outcome.action.replace("_", " ")
     if not outcome.success:
         return f"{words}: {outcome.reason or 'nothing moves'}"

@@ -12,6 +12,8 @@ import pytest
 from builders import bounds_of
 
 from internav_data.catalog import catalogue, load_user_assets, split_of_asset, user_assets
+from internav_data.generation.run import check_standing
+from internav_data.physics.engines.installed import available_engines
 from internav_data.records.errors import UsageError
 
 pybullet_data = pytest.importorskip("pybullet_data")
@@ -303,3 +305,20 @@ def test_an_obj_of_many_groups_is_refused(tmp_path):
     many = b"".join(b"\nusemtl m%d" % k for k in range(2000))
     with pytest.raises(UsageError, match="2000 groups, at most 1000"):
         load_user_assets(folder(tmp_path, mesh=many))
+
+
+@pytest.mark.slow  # 330,000 triangles are cut into convex parts
+def test_the_thinnest_and_the_densest_mesh_rest_in_every_engine(tmp_path):
+    """MuJoCo refuses what is flat or has 200,000 faces: no part of ours is the one or the other."""
+    import trimesh
+
+    sphere = trimesh.creation.icosphere(7, 0.2)
+    sphere.apply_scale((1.0, 1.0, 0.4))
+    assert len(sphere.faces) > 200_000
+    folder(tmp_path, "dense.stl", mesh=sphere)
+    folder(tmp_path, "thin.stl", mesh=trimesh.creation.box((0.4, 0.3, 0.0011)))
+    with pytest.warns(UserWarning, match="convex parts have"):
+        assets = load_user_assets(tmp_path)
+    assert len(assets) == 2
+    for engine in available_engines():
+        check_standing(assets, engine)

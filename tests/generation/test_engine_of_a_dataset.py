@@ -5,13 +5,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from scene_stubs import CATALOGUE, InProcess, stub
+from scene_stubs import ASSET, CATALOGUE, InProcess, stub
 
 from internav_data.dataset import held_config, load_dataset, read_manifest, write_manifest
 from internav_data.generation.config import GenerationConfig, load_config
-from internav_data.generation.run import generate, with_held_engine
+from internav_data.generation.run import check_standing, generate, with_held_engine
 from internav_data.physics.config import PhysicsConfig
 from internav_data.physics.engines import ENGINES, MODULES
+from internav_data.physics.settling import SettleResult
 from internav_data.records.errors import (
     CorruptDataError,
     InternavError,
@@ -139,3 +140,23 @@ def test_the_engine_is_part_of_the_config_whose_default_is_stated_once():
         load_config(overrides=["physics.engine=havok"])
     with pytest.raises(UsageError, match=r"physics.engine: expected one of .*, got 'havok'"):
         replace(GenerationConfig(), physics=PhysicsConfig("havok")).check()
+
+
+def test_a_missing_second_engine_is_named_before_anything_is_made(tmp_path, monkeypatch):
+    config = replace(BULLET, physics=PhysicsConfig("bullet", cross_check=True))
+    monkeypatch.setitem(MODULES, "mujoco", "nowhere_to_be_found")
+    with pytest.raises(MissingEngineError, match=r"^cross-check: the physics engine mujoco is not"):
+        made(tmp_path / "d", 3, config)
+    assert not (tmp_path / "d").exists()
+
+
+def test_meshes_of_users_fall_in_the_engine_that_is_chosen(monkeypatch):
+    asked = []
+
+    def fall(body, gap_m, near, engine):
+        asked.append(engine)
+        return SettleResult(body.pose, 0.1, 0.0, "")
+
+    monkeypatch.setattr("internav_data.physics.settle", fall, raising=False)
+    check_standing([ASSET], "mujoco")
+    assert asked == ["mujoco"]

@@ -1,6 +1,7 @@
 import json
 import shutil
 import sys
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -8,8 +9,10 @@ import pytest
 
 from internav_data.dataset import load_dataset
 from internav_data.geometry import part_corners, transform
+from internav_data.records import Outcome
 from internav_data.records.errors import CorruptDataError
 from internav_data.viewer import ViewedDataset, respond
+from internav_data.viewer.episode_facts import outcome_text
 
 FULL = "/api/episode/scene-000001/1"  # two obstacles: number 13 of the hand-written ones
 
@@ -209,3 +212,12 @@ def test_a_file_cut_short_behind_the_page_is_named_where_the_picture_would_be(fo
 def test_a_fault_of_ours_is_one_picture_less(viewed, monkeypatch):
     monkeypatch.setattr(ViewedDataset, "floor", lambda *_: 1 / 0)
     assert "ZeroDivisionError" in error(viewed, f"{FULL}/floor", 500)
+
+
+def test_an_outcome_names_the_engine_that_disagrees(hand_episode):
+    asked = replace(hand_episode.physics, other_engine="mujoco", other_build="mujoco 4")
+    episode = replace(hand_episode, physics=asked)
+    heavy = Outcome("push_east", False, 0.0, None, None, False, 0.0, "too heavy", agrees=False)
+    assert outcome_text(episode, heavy) == "push east: too heavy; mujoco disagrees"
+    for agrees in (True, None):
+        assert outcome_text(episode, replace(heavy, agrees=agrees)) == "push east: too heavy"
