@@ -99,7 +99,7 @@ def test_none_of_3000_obstacles_is_in_anything(monkeypatch):
     monkeypatch.setattr("internav_data.episodes.build.solve", lambda _: None)
     monkeypatch.setattr(
         "internav_data.episodes.build.outcomes_of",
-        lambda world, _: ((),) * len(world.obstacles),
+        lambda world, *_: ((),) * len(world.obstacles),
     )
     shapes, count = Shapes(catalogue().assets), 0
     for scene in range(100):
