@@ -2,8 +2,9 @@
 
     python benchmarks/balance.py --scenes 300 --episodes-per-scene 8 --rounds 3
 
-Obstacles are spawned and the expert solves, as `generate` does, without outcomes. Each round
-divides a type's weight by the ratio of its share of what stands to its share of the catalogue.
+Obstacles are spawned and the expert solves, as `generate` does, without outcomes. A type's weight is
+the inverse of its survival: how often it stands for each time that it is drawn, over all rounds so
+far, so that chance in one round is not handed on by the next.
 """
 
 from __future__ import annotations
@@ -70,6 +71,8 @@ def main() -> None:
     counts = Counter(asset.type for asset in assets)
     listed = {kind: count / len(assets) for kind, count in sorted(counts.items())}
     weights = dict.fromkeys(listed, 1.0) | ({} if args.anew else dict(BALANCE_WEIGHTS))
+    stood: Counter[str] = Counter()
+    drawn = dict.fromkeys(listed, 0.0)
     for number in range(args.rounds):
         text = ", ".join(f"{kind} = {weight:.6g}" for kind, weight in weights.items())
         weighed = [f"episodes.asset_weights={{{text}}}", "episodes.balance=false"]
@@ -84,10 +87,13 @@ def main() -> None:
         )
         print("  " + ", ".join(f"{k} {r:.2f}" for k, r in found.items()), file=sys.stderr)
         print(f"  {table}", file=sys.stderr)
-        for kind, ratio in found.items():
-            weights[kind] /= max(ratio, 0.05)
+        stood += types
         mean = sum(weights[kind] * share for kind, share in listed.items())
-        weights = {kind: round(weight / mean, 3) for kind, weight in weights.items()}
+        for kind, share in listed.items():
+            drawn[kind] += types.total() * weights[kind] * share / mean
+        weights = {kind: drawn[kind] / max(1, stood[kind]) for kind in listed}
+        mean = sum(weights[kind] * share for kind, share in listed.items())
+        weights = {kind: float(f"{weight / mean:.4g}") for kind, weight in weights.items()}
         print("\n".join(f'    "{k}": {w},' for k, w in weights.items()), file=sys.stderr)
     json.dump({"weights": weights, "ratios": found, "table2": table}, sys.stdout, indent=1)
     print()

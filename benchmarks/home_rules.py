@@ -32,6 +32,14 @@ RUG_M = 0.004
 """Height of a rug that nothing on it seems sunk into."""
 SEEN_M2 = 1e-4
 """Area of an overhang that counts."""
+LONGEST_BEDROOM = 2.2
+"""Largest ratio of a bedroom's sides, between wall faces."""
+WALL_M = 0.12
+"""Thickness of walls."""
+SEATS = {"ArmChair", "Bed", "Bench", "Chair", "OfficeChair", "Sofa"}
+"""Furniture from which somebody watches."""
+WATCHED_M, WATCHED_DEG = 6.0, 50.0
+"""Largest distance of a watched television, and angle of it and of the seat to the line between."""
 
 
 def _count(answers: Iterable[bool]) -> Count:
@@ -67,9 +75,72 @@ def _every(room: str, *wanted: str) -> Callable[[House], Count]:
 
 
 def kitchenette(house: House) -> Count:
-    """Studios without a kitchen beside them have stove, sink and counter."""
+    """Studios without a kitchen beside them have stove, sink, counter and fridge."""
     studios = [] if _rooms(house, "kitchen") else _rooms(house, "studio")
-    return _count({"Stove", "Sink", "CounterTop"} <= _types(house, k).keys() for k in studios)
+    wanted = {"Stove", "Sink", "CounterTop", "Fridge"}
+    return _count(wanted <= _types(house, k).keys() for k in studios)
+
+
+def clothes_in_a_studio(house: House) -> Count:
+    """Studios have a wardrobe or a dresser."""
+    return _count(
+        bool({"Wardrobe", "Dresser"} & _types(house, k).keys()) for k in _rooms(house, "studio")
+    )
+
+
+def public_rooms_together(house: House) -> Count:
+    """Kitchen, living room, dining room and hall are joined without a private room between."""
+    public = _rooms(house, *PUBLIC, "kitchen")
+    graph = nx.Graph()
+    graph.add_nodes_from(public)
+    graph.add_edges_from(edge for edge in house.room_graph if {*edge} <= {*public})
+    return _count([nx.is_connected(graph)] if len(public) > 1 else [])
+
+
+def chairs_at_tables(house: House) -> Count:
+    """Dining tables have two chairs or more."""
+    chairs = Counter(t.group for t in house.objects if t.type == "Chair" and t.group >= 0)
+    return _count(chairs[t.group] > 1 for t in house.objects if t.type == "DiningTable")
+
+
+def _front(thing: SceneObject) -> tuple[float, float]:
+    """Return the unit vector of the direction in which a thing faces: its own -y."""
+    z, w = thing.quaternion[2:]
+    return 2.0 * z * w, z * z - w * w
+
+
+def _angle_deg(first: tuple[float, float], second: tuple[float, float]) -> float:
+    lengths = np.hypot(*first) * np.hypot(*second)
+    return float(np.degrees(np.arccos(np.clip(np.dot(first, second) / lengths, -1.0, 1.0))))
+
+
+def televisions_are_watched(house: House) -> Count:
+    """Televisions are faced by a seat or a bed, and face it."""
+
+    def watches(seat: SceneObject, screen: SceneObject) -> bool:
+        line = screen.x - seat.x, screen.y - seat.y
+        back = -line[0], -line[1]
+        return (
+            float(np.hypot(*line)) < WATCHED_M
+            and _angle_deg(_front(seat), line) < WATCHED_DEG
+            and _angle_deg(_front(screen), back) < WATCHED_DEG
+        )
+
+    return _count(
+        any(t.room == screen.room and t.type in SEATS and watches(t, screen) for t in house.objects)
+        for screen in house.objects
+        if screen.type == "Television"
+    )
+
+
+def bedrooms_are_no_corridors(house: House) -> Count:
+    """Bedrooms are at most `LONGEST_BEDROOM` times as long as wide."""
+    answers = []
+    for room in _rooms(house, "bedroom"):
+        x0, y0, x1, y1 = Polygon(house.rooms[room].polygon).bounds
+        short, long = sorted((x1 - x0 - WALL_M, y1 - y0 - WALL_M))
+        answers.append(long <= LONGEST_BEDROOM * short)
+    return _count(answers)
 
 
 def _reaches(house: House, bath: int, without: set[str]) -> bool:
@@ -188,7 +259,13 @@ RULES: dict[str, Callable[[House], Count]] = {
     "toilet": _has("Toilet"),
     "stove": _has("Stove"),
     "counter": _has("CounterTop"),
+    "fridge": _has("Fridge"),
     "kitchenette in a studio": kitchenette,
+    "wardrobe or dresser in a studio": clothes_in_a_studio,
+    "kitchen and living room not behind a private room": public_rooms_together,
+    "two chairs at a dining table": chairs_at_tables,
+    "television that somebody faces": televisions_are_watched,
+    "bedroom no longer than 2.2 to 1": bedrooms_are_no_corridors,
     "bathroom not only through the kitchen": bathroom_beside_the_kitchen,
     "a bathroom not behind a private room": bathroom_for_all,
     "window in a living room with an outer wall": living_rooms_have_windows,

@@ -36,6 +36,8 @@ MAX_TRIES_HOME = 4
 """The same while the best one has one of the faults of `MUST_NOT`."""
 MUST_NOT = (
     "habitable rooms without daylight",
+    "public rooms apart",
+    "long bedrooms",
     "bathrooms behind a kitchen",
     "no bathroom for all",
 )

@@ -12,6 +12,7 @@ from internav_data.houses.groups import RoomContext
 from internav_data.houses.pieces import Picker, consistent
 from internav_data.houses.plan import clear_area_m2
 from internav_data.houses.room_types import ROOM_TYPES
+from internav_data.houses.sitting import watched_poses
 from internav_data.records import Purpose, SceneObject
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from internav_data.houses.room_types import FurnitureRule
     from internav_data.records import SceneKey
 
-COOKING = ("Stove", "Sink", "CounterTop")
+COOKING = ("Stove", "Sink", "CounterTop", "Fridge")
 """Types of asset that a kitchenette needs."""
 CERTAIN = 1.0
 """Share from which on a rule is indispensable: its group is tried at any furnishing."""
@@ -166,6 +167,8 @@ def _try_rule(
             if rule.placement == "open"
             else state.along_walls(group, picker.rng, rule.placement)
         )
+        if rule.watched:
+            poses = watched_poses(poses, group, state.placed)
         if state.place(group, poses):
             return True
     return False

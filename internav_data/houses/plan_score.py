@@ -13,6 +13,7 @@ from internav_data.core.arithmetic import plain_sum
 from internav_data.houses.access import door_cost
 from internav_data.houses.plan import clear_area_m2, clear_size_m
 from internav_data.houses.room_types import ROOM_PAIRS, ROOM_TYPES, type_pair
+from internav_data.houses.standards import WALL_CM
 from internav_data.records import OUTSIDE
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 SLIVER = 2.9
 """Rooms whose longer side is more than this times the shorter one are corridors."""
+LONG_BEDROOM = 2.2
+"""Ratio of a bedroom's sides from which on it looks like a corridor."""
 DAYLIGHT_CM = 130
 """Length of outer wall that a habitable room wants."""
 SLENDER_HOUSE = 1.8
@@ -104,6 +107,25 @@ def _slender_rooms(plan: PlanCandidate, _: Sequence[RoomEdge]) -> float:
     return plain_sum(
         max(0.0, room.long_m / room.short_m - room.spec.standard.aspect) ** 2 for room in plan.rooms
     )
+
+
+def _long_bedrooms(plan: PlanCandidate, _: Sequence[RoomEdge]) -> float:
+    """Count the bedrooms that are longer than a bed and a passage at its foot need."""
+    return float(
+        plain_sum(
+            room.spec.type == "bedroom" and _bounds_ratio(plan.grid, k) > LONG_BEDROOM
+            for k, room in enumerate(plan.rooms)
+        )
+    )
+
+
+def _bounds_ratio(grid: FloorGrid, room: int) -> float:
+    """Return the longer side of a room's bounding box over the shorter one, between wall faces."""
+    columns, rows = zip(*grid.cells[room], strict=True)
+    width = grid.xs[max(columns) + 1] - grid.xs[min(columns)] - WALL_CM
+    depth = grid.ys[max(rows) + 1] - grid.ys[min(rows)] - WALL_CM
+    ratio: float = max(width, depth) / min(width, depth)
+    return ratio
 
 
 def _large_rooms(plan: PlanCandidate, _: Sequence[RoomEdge]) -> float:
@@ -208,6 +230,14 @@ def _reaches_all(plan: PlanCandidate, tree: Sequence[RoomEdge], bath: int, avoid
     return not goals or bool(goals & seen)
 
 
+def _public_apart(plan: PlanCandidate, tree: Sequence[RoomEdge]) -> float:
+    """Count the groups of public rooms that only private rooms join to the others."""
+    public = {k for k, name in enumerate(plan.types) if not ROOM_TYPES[name].private}
+    # Within a tree, joined rooms are one group fewer for each door between them.
+    doors = plain_sum(a in public and b in public for a, b in tree)
+    return float(max(0, len(public) - doors - 1))
+
+
 def _bathrooms(plan: PlanCandidate) -> list[int]:
     return [k for k, name in enumerate(plan.types) if name == "bathroom"]
 
@@ -269,15 +299,17 @@ TREE_SCORE: tuple[ScoreTerm, ...] = (
     ScoreTerm("doors between private rooms", 3.0, _private_doors),
     ScoreTerm("paths through private rooms", 4.0, _private_passages),
     ScoreTerm("paths through bathrooms", 12.0, _through_bathroom),
+    ScoreTerm("public rooms apart", 15.0, _public_apart),
     ScoreTerm("bathrooms behind a kitchen", 15.0, _behind_kitchen),
     ScoreTerm("no bathroom for all", 15.0, _none_for_all),
-    ScoreTerm("rooms on a path, from the aim", 10.0, _depth_error),
+    ScoreTerm("rooms on a path, from the aim", 20.0, _depth_error),
 )
 """Penalties that decide between the door trees of one candidate."""
 
 PLAN_SCORE: tuple[ScoreTerm, ...] = (
     ScoreTerm("areas, from the programme", 3.0, _area_error),
     ScoreTerm("slender rooms", 2.0, _slender_rooms),
+    ScoreTerm("long bedrooms", 4.0, _long_bedrooms),
     ScoreTerm("rooms too large", 1.5, _large_rooms),
     ScoreTerm("nooks", 1.5, _nooks),
     ScoreTerm("habitable rooms without daylight", 12.0, _dark_rooms),

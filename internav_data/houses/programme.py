@@ -25,8 +25,11 @@ PAPER_AREA_M2 = 25.0
 SIZE_SPREAD: Mapping[HousePreset, float] = {"paper": 0.45, "realistic": 0.2}
 """Standard deviation of the logarithm of a house's area, given the number of its rooms. ProcTHOR's
 houses of the 95 % quantile are 2.9 to 5.2 times as large as those of the 5 % quantile."""
+ONE_ROOM_SPREAD: Mapping[HousePreset, float] = {"paper": 0.65, "realistic": 0.2}
+"""The same for houses of one room: what is drawn too small for a home is as small as one can be,
+so that less of the spread remains."""
 ROOM_SPREAD = 0.16
-"""The same for the area of one room beside the others."""
+"""Standard deviation of the logarithm of a room's area beside the others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +67,13 @@ _WITH_HALL = {
     4: "hall living bedroom bathroom",
 }
 """Small homes with a hall, which `HouseConfig.hall_from` may ask for."""
+_FIVE_WITH_HALL = (
+    (0.5, "hall living kitchen bedroom bathroom"),
+    (0.25, "hall living bedroom bedroom bathroom"),
+    (0.15, "hall living bedroom office bathroom"),
+    (0.1, "hall studio kitchen bedroom bathroom"),
+)
+"""Homes of five rooms with a hall: (share, rooms). Beside the core nothing is left to draw."""
 _CORE = "living kitchen bedroom bathroom"
 """Rooms of every home of five rooms or more."""
 
@@ -86,6 +96,8 @@ def _room_types(rng: Generator, count: int, hall_from: int) -> list[str]:
     if count in _HOMES:
         drawn = _choose(rng, list(_HOMES[count]))
         return (_WITH_HALL[count] if count >= hall_from else drawn).split()
+    if count == len(_CORE.split()) + 1 >= hall_from:
+        return _choose(rng, list(_FIVE_WITH_HALL)).split()
     types = _CORE.split()
     if count >= hall_from:
         types.insert(0, "hall")
@@ -124,7 +136,7 @@ def _areas(
     `size` is the house's own, a normal deviate.
     """
     # Log-normal, so that no area is negative; the paper preset then fits the house to its total.
-    share = SIZE_SPREAD[config.preset]
+    share = (SIZE_SPREAD if len(standards) > 1 else ONE_ROOM_SPREAD)[config.preset]
     larger = math.exp(share * size - share * share / 2.0)
     areas = [s.area_m2 * math.exp(ROOM_SPREAD * float(rng.standard_normal())) for s in standards]
     # Somewhat above the smallest allowed area, which not every candidate keeps; by how much is

@@ -89,6 +89,8 @@ class FurnitureRule:
     """Type of room: only houses without it have the group here."""
     lacking: str = ""
     """Type of asset: only a room that has none of it yet has the group."""
+    watched: bool = False
+    """Whether it stands only where a bed or a seat that is there already faces it."""
     one_a_house: bool = False
     """Whether one room of a house has the group: drawn from those whose rules say so."""
 
@@ -181,7 +183,7 @@ ROOM_TYPES: Mapping[str, RoomType] = {
             FurnitureRule("dresser", "any", 0.6),
             FurnitureRule("desk", "sun", 0.45, min_m2=10.0),
             FurnitureRule("vanity", "sun", 0.3, min_m2=12.0),
-            FurnitureRule("television", "any", 0.2, min_m2=16.0),
+            FurnitureRule("television", "any", 0.2, min_m2=16.0, watched=True),
             FurnitureRule("bookshelf", "corner", 0.3, 0.01),
             FurnitureRule("armchair", "corner", 0.35, min_m2=14.0),
             FurnitureRule("hamper", "corner", 0.3),
@@ -366,7 +368,7 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         window=WindowSize(120, 112, 100),
         floor="tiles",
         wall="paint",
-        needs=("Stove", "Sink", "CounterTop"),
+        needs=("Stove", "Sink", "CounterTop", "Fridge"),
         cooks=False,
         pairs={
             "bathroom": RoomPair(9.0),
@@ -489,7 +491,7 @@ ROOM_TYPES: Mapping[str, RoomType] = {
         window=WindowSize(140, 112, 100),
         floor="planks",
         wall="bricks",
-        needs=("Bed",),
+        needs=("Bed", "Wardrobe"),
         cooks=True,
         pairs={
             "bathroom": RoomPair(2.0),

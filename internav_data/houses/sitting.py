@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from internav_data.houses.groups import narrow, within
 from internav_data.houses.pieces import (
     BACK_GAP_M,
     FACING_LEFT,
     FACING_RIGHT,
+    FACING_ROOM,
     FACING_WALL,
     Group,
     Picker,
@@ -19,8 +23,20 @@ from internav_data.houses.pieces import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from internav_data.core.typing import Floats
     from internav_data.houses.groups import RoomContext
     from internav_data.records import Asset
+
+WATCHING = frozenset({"ArmChair", "Bed", "Sofa"})
+"""Types of asset from which somebody watches television."""
+MIN_WATCHED_M, MAX_WATCHED_M = 1.2, 5.5
+"""Distances at which a television is watched, metres."""
+WATCHED_COSINE = math.cos(math.radians(45.0))
+"""Cosine of the largest angle between the line of sight and the fronts of seat and television."""
+_SINES = np.array([0.0, 1.0, 0.0, -1.0])
+"""Sines of the quarter turns; the cosine of q is the sine of q + 1, at index q - 3."""
 
 
 def seating(p: Picker, room: RoomContext) -> list[Group]:
@@ -34,7 +50,6 @@ def seating(p: Picker, room: RoomContext) -> list[Group]:
         screen = _screen(p, stand)
         for distance in _viewing_distances(room, stand, sofa):
             out += _around(p, screen, sofa, distance)
-        out.append(screen.with_clearance(in_front(screen.items[0], 0.5)))
     return out
 
 
@@ -113,6 +128,56 @@ def television(p: Picker, room: RoomContext) -> list[Group]:
     return [screen.with_clearance(in_front(screen.items[0], 0.5))]
 
 
+def watched_poses(
+    poses: Floats, group: Group, placed: Sequence[tuple[Group, float, float, int]]
+) -> Floats:
+    """Return the poses at which a group along a wall is faced by a bed or a seat, and faces it.
+
+    Parameters
+    ----------
+    poses
+        (m, 3) float64: x and y in metres, quarter turns; the group's wall is behind it.
+    group
+        Group with what is watched in its first item.
+    placed
+        Groups in the room with x, y and quarter turns.
+
+    """
+    watched = np.zeros(len(poses), dtype=bool)
+    middle = _moved(group.items[0], poses[:, 0], poses[:, 1], poses[:, 2])
+    front = _direction(poses[:, 2] + FACING_ROOM)
+    for other, x, y, turn in placed:
+        for item in other.items:
+            if item.asset.type in WATCHING:
+                seat = _moved(item, x, y, np.array([turn]))
+                line = middle - seat
+                metres = np.hypot(*line.T)
+                ahead = _dot(line, _direction(np.array([item.turn + turn])))
+                back = -_dot(line, front)
+                near = (metres >= MIN_WATCHED_M) & (metres <= MAX_WATCHED_M)
+                watched |= near & (np.minimum(ahead, back) >= WATCHED_COSINE * metres)
+    return poses[watched]
+
+
+def _dot(first: Floats, second: Floats) -> Floats:
+    """Return the dot products (n,) of vectors (n, 2) of the plane, equal on every machine."""
+    found: Floats = first[:, 0] * second[:, 0] + first[:, 1] * second[:, 1]
+    return found
+
+
+def _direction(turns: Floats) -> Floats:
+    """Return the unit vectors (n, 2) in which assets of some quarter turns face."""
+    quarters = turns.astype(np.int64) % 4
+    return np.column_stack([_SINES[quarters], -_SINES[quarters - 3]])
+
+
+def _moved(item: PlacedAsset, x: Floats | float, y: Floats | float, turns: Floats) -> Floats:
+    """Return the places (n, 2) of an item of a group at some poses of the group."""
+    quarters = turns.astype(np.int64) % 4
+    sin, cos = _SINES[quarters], _SINES[quarters - 3]
+    return np.column_stack([x + cos * item.x - sin * item.y, y + sin * item.x + cos * item.y])
+
+
 def dining(p: Picker, room: RoomContext) -> list[Group]:
     """Make a table with chairs pushed in, as large as the room allows."""
     largest = 1.1 if room.area_m2 < 12 else 1.6 if room.area_m2 < 18 else 2.9  # noqa: PLR2004
@@ -123,12 +188,12 @@ def dining(p: Picker, room: RoomContext) -> list[Group]:
         if asset is not None and limit <= largest:
             out.append(_seated(p, PlacedAsset(asset, 0.0, 0.0, FACING_WALL), chair))
     # A smaller table with all its chairs comes before a large one with few.
-    many = [group for table in out for group in table[:-2]]
-    return many + [group for table in out for group in table[-2:]]
+    many = [group for table in out for group in table[:-1]]
+    return many + [group for table in out for group in table[-1:]]
 
 
 def _seated(p: Picker, table: PlacedAsset, chair: Asset | None) -> list[Group]:
-    """Make a table with six, four, two chairs and one."""
+    """Make a table with six, four and two chairs; without any only where there are none."""
     plain = Group((table,))
     if chair is None:
         return [plain]
@@ -148,4 +213,4 @@ def _seated(p: Picker, table: PlacedAsset, chair: Asset | None) -> list[Group]:
     four = laid.with_items(*long_sides)
     two = laid.with_items(*long_sides[:1], *long_sides[seats : seats + 1])
     six = [four.with_items(*ends)] if p.chance(0.5) else []
-    return [*six, four, two, laid.with_items(*long_sides[:1])]
+    return [*six, four, two]

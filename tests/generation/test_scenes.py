@@ -18,7 +18,10 @@ from internav_data.generation.scenes import ATTEMPTS, build_scene, obstacle_pool
 from internav_data.records.errors import QuarantineError, UsageError, ValidationError
 
 CONFIG = load_config(
-    overrides=["episodes_per_scene=2", "house.rooms=1-2", "episodes.blind_expert=true"]
+    overrides=[
+        *("episodes_per_scene=2", "house.rooms=1-2", "episodes.blind_expert=true"),
+        "episodes.refuse_facing_wall=true",  # so that some starts are drawn again
+    ]
 )
 
 

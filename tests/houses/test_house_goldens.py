@@ -16,10 +16,10 @@ SCENES = 33
 ALL_TYPES = "hall,living,dining,kitchen,laundry,office,storage,studio,bathroom,bedroom"
 
 GOLDEN = {
-    "paper": "b3f22dd35a33f634c5f536acdca9a684f6f0fb271f1c5975d439d0adadb6d23a",
-    "paper, every type": "5951052b92a500b594a9af75044cb54134c76896e5386a61a72245c27cc2b435",
-    "realistic": "d1b3780eea61427536b4660c7d33fb28c84cb0a4c19d5cdcf0330ddd3063cc33",
-    "realistic, every type": "4f587de007bcc6c43edb3c404a0bd1502d401a2f9232afd1949cc647729d637b",
+    "paper": "5d7cbfb0b9d43ac603ec00f0669183ad53c4342157b658e844f74dce10507862",
+    "paper, every type": "f953480da3e402c4bc50a9850f20ec7c5226aeaab1a221c52771e53f7e92f9b9",
+    "realistic": "b669efd270c42ab33fe756fdeab53651d2218284ddaae5535683987b3a07b89f",
+    "realistic, every type": "0b6e8876a9d2acc7e39bd756a203497e98f9af286f5721140d44d3737c2a9b54",
 }
 
 
