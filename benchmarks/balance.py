@@ -2,9 +2,9 @@
 
     python benchmarks/balance.py --scenes 300 --episodes-per-scene 8 --rounds 3
 
-Obstacles are spawned and the expert solves, as `generate` does, without outcomes. A type's weight is
-the inverse of its survival: how often it stands for each time that it is drawn, over all rounds so
-far, so that chance in one round is not handed on by the next.
+Obstacles are spawned and the expert solves, as `generate` does, without outcomes. A type's weight
+is the inverse of its survival: how often it stands for each time that it is drawn, over all rounds
+so far, so that chance in one round is not handed on by the next.
 """
 
 from __future__ import annotations
