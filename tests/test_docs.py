@@ -53,6 +53,19 @@ def test_links_lead_somewhere(page):
         assert (page.parent / target).exists(), target
 
 
+def slug(heading):
+    """A heading's anchor, as GitHub and the site make it."""
+    return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_anchors_of_links_are_headings(page):
+    for target, anchor in re.findall(r"\]\(([^)#:]*)#([^)]+)\)", page.read_text()):
+        text = (page.parent / target).read_text() if target else page.read_text()
+        headings = {slug(heading) for heading in re.findall(r"(?m)^#+ (.+)$", text)}
+        assert anchor in headings, f"{target}#{anchor}"
+
+
 @pytest.mark.parametrize("page", [p for p in PAGES if SNIPPET.search(p.read_text())], ids=str)
 def test_python_in_the_docs_runs(page, small_dataset, small_run, monkeypatch):
     monkeypatch.setenv("INTERNAV_DATASET", str(small_dataset))
