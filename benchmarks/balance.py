@@ -66,7 +66,7 @@ def main() -> None:
     parser.add_argument("--episode-preset", default="balanced", help="as of internav-gen generate")
     parser.add_argument("--set", action="append", default=[], help="a config value, as a.b=c")
     args = parser.parse_args()
-    build.outcomes_of = lambda world, _: ((),) * len(world.obstacles)
+    build.outcomes_of = lambda world, *_: ((),) * len(world.obstacles)
     assets = catalogue().spawnable
     counts = Counter(asset.type for asset in assets)
     listed = {kind: count / len(assets) for kind, count in sorted(counts.items())}
