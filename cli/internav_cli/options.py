@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
 import click
 
-from internav_data.physics.engines import DEFAULT_ENGINE
+from internav_data.physics.engines import DEFAULT_ENGINE, EngineName
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -55,7 +55,7 @@ _CONFIG = (
     ),
     click.option(
         "--physics",
-        type=click.Choice(["bullet", "mujoco"]),
+        type=click.Choice(get_args(EngineName)),
         help=f"Engine that settles and pushes.  [default: the dataset's, else {DEFAULT_ENGINE}]",
     ),
     click.option("--floor-plan", metavar="FILE", help="A floor plan of your own (TOML or JSON)."),

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
 from internav_cli.options import DATASET, JSON, dataset_to_read, positive
+from internav_data.physics.engines import EngineName
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -49,7 +50,7 @@ Exit code 3 when something in the dataset is not true, 5 when it cannot be read.
 )
 @click.option(
     "--physics",
-    type=click.Choice(["bullet", "mujoco"]),
+    type=click.Choice(get_args(EngineName)),
     help="At level physics: replay by this engine; another than the dataset's is asked for all "
     "pushes, and the share is told on which it agrees.  [default: the dataset's]",
 )

@@ -5,8 +5,10 @@ import shutil
 import pytest
 from stderr_lines import beside_the_dataset
 
-from internav_data.physics.engines import ENGINES, MODULES
+from internav_data.physics.engines import DEFAULT_ENGINE, ENGINES, MODULES, second_engine
 from internav_data.records.errors import MissingEngineError
+
+OWN, OTHER = DEFAULT_ENGINE, second_engine(DEFAULT_ENGINE)
 
 
 @pytest.fixture
@@ -38,19 +40,19 @@ SOLVING = [
 
 @pytest.mark.parametrize("words", SOLVING, ids=lambda words: words[1])
 def test_a_dataset_whose_engine_is_missing_is_one_line(call, mine, monkeypatch, words):
-    monkeypatch.setitem(MODULES, "bullet", "nowhere_to_be_found")
-    monkeypatch.setitem(ENGINES, "mujoco", object)
-    monkeypatch.setitem(MODULES, "mujoco", "json")
+    monkeypatch.setitem(MODULES, OWN, "nowhere_to_be_found")
+    monkeypatch.setitem(ENGINES, OTHER, object)
+    monkeypatch.setitem(MODULES, OTHER, "json")
     code, out, err = call(*words)
     assert (code, out) == (1, "")
     first, line = err.splitlines()
-    assert first == "dataset: mine; physics: bullet"
-    assert "mine: the physics engine bullet is not installed: pip install nowhere" in line
+    assert first == f"dataset: mine; physics: {OWN}"
+    assert f"mine: the physics engine {OWN} is not installed: pip install nowhere" in line
     assert "--physics" not in line, "the dataset is of this engine"
 
 
 def test_what_solves_nothing_needs_no_engine(call, mine, monkeypatch):
-    monkeypatch.setitem(MODULES, "bullet", "nowhere_to_be_found")
+    monkeypatch.setitem(MODULES, OWN, "nowhere_to_be_found")
     for words in (("validate", "mine"), ("stats", "mine"), ("show", "mine", "--scene", 2)):
         code, _, err = call("internav-gen", *words)
         assert (code, err.splitlines()[0]) == (0, "dataset: mine"), err
@@ -59,42 +61,39 @@ def test_what_solves_nothing_needs_no_engine(call, mine, monkeypatch):
 def test_environments_name_what_to_install(mine, monkeypatch):
     from internav_data.envs import InterNavVectorEnv
 
-    monkeypatch.setitem(MODULES, "bullet", "nowhere_to_be_found")
-    with pytest.raises(
-        MissingEngineError, match=r"mine: .*physics engine .*bullet.*: pip install nowh"
-    ):
+    monkeypatch.setitem(MODULES, OWN, "nowhere_to_be_found")
+    with pytest.raises(MissingEngineError, match=r"mine: .*: pip install nowhere"):
         InterNavVectorEnv(1, mine)
 
 
 def test_generate_names_the_engine_first_and_keeps_that_of_the_dataset(call, mine, monkeypatch):
-    monkeypatch.setattr("internav_data.physics.config.DEFAULT_ENGINE", "mujoco")
-    monkeypatch.setitem(ENGINES, "mujoco", object)
-    monkeypatch.setitem(MODULES, "mujoco", "json")
+    monkeypatch.setitem(ENGINES, OTHER, object)
+    monkeypatch.setitem(MODULES, OTHER, "json")
     code, _, err = call("internav-gen", "generate", "--out", "mine", "--scenes", 3, *SAME)
     assert code == 0, err
-    assert err.splitlines()[0] == "dataset: mine; physics: bullet"
+    assert err.splitlines()[0] == f"dataset: mine; physics: {OWN}"
     assert "holds 3 scenes" in err
     before = (mine / "manifest.json").read_bytes()
-    for named in (("--physics", "mujoco"), ("--set", "physics.engine=mujoco")):
+    for named in (("--physics", OTHER), ("--set", f"physics.engine={OTHER}")):
         words = ("--out", "mine", "--scenes", 3, *SAME, *named)
         code, _, err = call("internav-gen", "generate", *words)
         (line,) = beside_the_dataset(err)
         assert code == 2
-        assert "physics.engine: there 'bullet', asked for 'mujoco'" in line
+        assert f"physics.engine: there '{OWN}', asked for '{OTHER}'" in line
     assert (mine / "manifest.json").read_bytes() == before
 
 
 def test_generate_says_what_to_install_and_which_engine_would_run(call, monkeypatch, tmp_path):
-    monkeypatch.setitem(ENGINES, "mujoco", object)
-    monkeypatch.setitem(MODULES, "mujoco", "nowhere_to_be_found")
-    words = ("--out", "new", "--scenes", 1, *SAME, "--physics", "mujoco")
+    monkeypatch.setitem(ENGINES, OTHER, object)
+    monkeypatch.setitem(MODULES, OTHER, "nowhere_to_be_found")
+    words = ("--out", "new", "--scenes", 1, *SAME, "--physics", OTHER)
     for more in ((), ("--dry-run",)):
         code, _, err = call("internav-gen", "generate", *words, *more)
         (line,) = beside_the_dataset(err)
         assert code == 1
-        assert "the physics engine mujoco is not installed: pip install nowhere" in line
-        assert "--physics bullet is installed here" in line
-    monkeypatch.setitem(MODULES, "bullet", "nowhere_to_be_found")
+        assert f"the physics engine {OTHER} is not installed: pip install nowhere" in line
+        assert f"--physics {OWN} is installed here" in line
+    monkeypatch.setitem(MODULES, OWN, "nowhere_to_be_found")
     code, _, err = call("internav-gen", "generate", *words)
     (line,) = beside_the_dataset(err)
     assert (code, "no physics engine is installed" in line) == (1, True)

@@ -46,7 +46,8 @@ def test_true_ones_are_valid(scenes):
         for index, episode in enumerate(episodes):
             assert by_row(episode) == set()
             report = by_asking(scenes, scene, index)
-            assert (report.by_predicate, report.notes) == ({}, {})
+            assert not report.by_predicate
+            assert not any("opinions" in note for note in report.notes)
 
 
 OPENS = (0, 0, "push_west", 0)
@@ -126,7 +127,8 @@ def test_second_opinions_that_cannot_be_asked_here_are_a_note(scenes, monkeypatc
 
 def test_another_engine_is_asked_for_a_dataset_that_is_there(tmp_path, scenes):
     """The share is that of `agrees`; nothing is written, and a difference is no finding."""
-    write_dataset(tmp_path / "ds", scenes)
+    config = {"physics": {"engine": DEFAULT_ENGINE, "cross_check": True}}
+    write_dataset(tmp_path / "ds", scenes, config=config)
     before = {p: p.read_bytes() for p in (tmp_path / "ds").rglob("*") if p.is_file()}
     findings = validate(tmp_path / "ds", "physics", engine=OTHER)
     assert findings.ok, findings.summary()
