@@ -129,7 +129,7 @@ def test_the_agent_does_not_lever_what_has_low_feet(heading, side, push):
         Body.of(telly, pose), heading, among(), agent=agent, agent_gap_m=axis_distance(*agent, plan)
     )
     assert pushed.at_rest
-    assert pushed.seconds < 2.5
+    assert pushed.seconds < 3.5
     assert axis_distance(*agent, footprint(telly, pushed.pose)) > 0.2 - 2e-3
 
 

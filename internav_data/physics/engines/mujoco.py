@@ -6,6 +6,7 @@ shapes are written into one compiled model.
 
 from __future__ import annotations
 
+import math
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.metadata import version
@@ -15,6 +16,7 @@ from internav_data.core.locks import ThreadLock, once_per_process
 from internav_data.physics.engines.mujoco_scene import (
     FAST,
     MARGIN_M,
+    SUBSTEPS,
     ModelBuilder,
     mujoco,
     set_friction_solver,
@@ -71,11 +73,14 @@ class MuJoCoSimulation:
     __slots__ = (
         "_fast",
         "_forces",
+        "_gain",
         "_geoms",
+        "_masses",
         "_model_and_data",
         "_positions",
         "_pushed",
         "_speeds",
+        "_step_s",
         "_velocities",
     )
 
@@ -88,6 +93,10 @@ class MuJoCoSimulation:
         self._speeds = data.qvel
         self._fast: bool | None = None
         """Whether something was fast before the last step; None before the first."""
+        self._masses = {k: float(made.model.body_mass[made.rows[k]]) for k in made.movers}
+        self._step_s = SUBSTEPS * float(made.model.opt.timestep)
+        self._gain = 0.0
+        """Speed that the force of the next step alone would give, m/s."""
         self._pushed: list[int] = []
         """Bodies on which a force acts during the next step."""
 
@@ -95,14 +104,15 @@ class MuJoCoSimulation:
         """Advance by a number of time steps."""
         model, data = self._model_and_data
         for _ in range(count):
-            fast = max(map(abs, self._speeds.tolist())) > FAST
+            fast = max(map(abs, self._speeds.tolist())) + self._gain > FAST
             if fast is not self._fast:
                 set_friction_solver(model, fast=fast)
                 self._fast = fast
-            mujoco.mj_step(model, data)
+            mujoco.mj_step(model, data, SUBSTEPS)
             for body in self._pushed:
                 self._forces[body][:] = 0.0
             self._pushed.clear()
+            self._gain = 0.0
 
     def placement(self, body: int) -> tuple[Vec3, Quaternion]:
         """Return a body's centre of mass, metres, and its orientation."""
@@ -124,6 +134,7 @@ class MuJoCoSimulation:
         """Apply a force, newtons, at a body's centre of mass during the next step."""
         self._forces[body][:] = force
         self._pushed.append(body)
+        self._gain = math.hypot(*force) / self._masses[body] * self._step_s
 
     def penetration_m(self, body: int) -> float:
         """Return the depth of a body's deepest contact, metres; 0 without any."""
