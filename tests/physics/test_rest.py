@@ -155,7 +155,7 @@ def test_poses_after_pushes_hold_on_the_engine_that_found_them(engine):
     """What moved comes first in a scene: there it may not sleep."""
     house = build_house(12, 1, HouseConfig(), catalogue())
     model, count = HouseModel.of(house), 0
-    episodes = build_episodes(house, 4, catalogue().spawnable, physics=PhysicsConfig(engine))
+    episodes = build_episodes(house, 8, catalogue().spawnable, physics=PhysicsConfig(engine))
     for episode in episodes:
         world = World.of_episode(model, episode, catalogue().assets)
         for index in world.obstacles:

@@ -80,8 +80,8 @@ ROLLING_FRICTION: Final = 0.01
 """Rolling and spinning friction of a body, metres. On the floor each has its own times the other's
 coefficient of friction, as in Bullet: here as a torque that resists all turning."""
 CONTACT_STEPS: Final = 2.0
-"""Time constant of contacts, steps of MuJoCo: the shortest that is stable. They are damped critically.
-At MuJoCo's default of 20 ms what hits a wall at 2 m/s sinks in by 15 mm."""
+"""Time constant of contacts, steps of MuJoCo: the shortest that is stable. They are damped
+critically. At MuJoCo's default of 20 ms what hits a wall at 2 m/s sinks in by 15 mm."""
 IMPEDANCE: Final = (0.95, 0.99, 0.001, 0.5, 2.0)
 """MuJoCo's `solimp` of contacts."""
 FAST: Final = 0.05
