@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 SHEET_HOUSES = 12
 """Number of houses in the demo's contact sheet."""
+SAMPLE_EPISODES = "6"
+"""Number of episodes in the demo's page, about 1 MB each."""
 
 
 @click.group(
@@ -110,6 +112,8 @@ def _steps(out: Path, scenes: int, engine: Sequence[str]) -> Iterator[Sequence[s
         yield "show", dataset, *chosen, "--out", str(out / name)
     films = ("--out", str(out / "replay.mp4"), "--out", str(out / "replay.gif"))
     yield "replay", dataset, "9/1", "--force", *films
+    page = str(out / "page.html")
+    yield "view", dataset, "--html", page, "--sample", SAMPLE_EPISODES, "--force"
 
 
 def _draw_houses(dataset: Path, picture: Path) -> None:
@@ -132,7 +136,8 @@ def _advice(out: Path) -> Iterator[str]:
         f"Watch     {out / 'replay.gif'} in a browser, {out / 'replay.mp4'} in a player: "
         "things moved out of the way"
     )
-    yield f"Browse    internav-gen view {shlex.quote(str(out / 'dataset'))}"
+    yield f"Browse    {out / 'page.html'}: six episodes, what pushes do, the expert step by step"
+    yield f"          internav-gen view {shlex.quote(str(out / 'dataset'))}: all of them"
     yield f"The data  {out / 'dataset'} (begin with its README.md)"
     loading = f"load_dataset({str(out / 'dataset')!r})"
     yield f"Load it   from internav_data import load_dataset; {loading}[0]"

@@ -30,6 +30,7 @@ def summary_html(name: str, store: Store, manifest: Manifest) -> str:
     settings = {
         "seed": manifest.seed,
         "houses": config.get("house", {}).get("preset"),
+        "engine": config.get("physics", {}).get("engine"),
         "attributes": config.get("catalog", {}).get("attributes"),
         "generator": f"{manifest.generator} {manifest.generator_version}",
     }

@@ -73,7 +73,7 @@ def test_the_demo_goes_through_its_commands(tmp_path, monkeypatch):
     monkeypatch.setattr(main.cli, "main", stand_in)
     done = CliRunner().invoke(cli, ["demo", "--out", str(tmp_path)])
     assert done.exit_code == 0, done.output
-    assert called == ["generate", "validate", "stats", "show", "show", "show", "replay"]
+    assert called == ["generate", "validate", "stats", "show", "show", "show", "replay", "view"]
     assert (tmp_path / "houses.png").stat().st_size > 10_000
     assert f"$ internav-gen validate {tmp_path}/dataset" in done.output
 
@@ -121,5 +121,5 @@ def test_the_demo_makes_pictures_and_films(tmp_path):
     done = run("demo", "--out", tmp_path, "--scenes", 10)
     assert done.returncode == 0, done.stderr
     made = {path.name for path in Path(tmp_path).iterdir()}
-    names = ("house.png", "blocked.png", "lengthened.png", "houses.png", "replay.gif", "replay.mp4")
-    assert made == {"dataset", *names}
+    pictures = {"house.png", "blocked.png", "lengthened.png", "houses.png"}
+    assert made == {"dataset", "page.html", "replay.gif", "replay.mp4", *pictures}
