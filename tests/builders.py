@@ -7,6 +7,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from internav_data.physics import engines
 from internav_data.records import (
     Asset,
     Door,
@@ -339,6 +340,6 @@ def episode(
         node_paths_truncated=False,
         obstacles=obstacles,
         expert=None,
-        physics=Physics("bullet", "3.2.7", 0.1, 0.0),
+        physics=Physics(engines.DEFAULT_ENGINE, "3.2.7", 0.1, 0.0),
     )
     return replace(made, **changes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 
 import pyarrow.parquet as pq
 import pytest
@@ -61,7 +62,7 @@ def test_poses_of_outcomes_alone_have_no_dictionary(dataset_folder):
     group = pq.read_metadata(next(dataset_folder.glob("data/episodes/*"))).row_group(0)
     chunks = [group.column(k) for k in range(group.num_columns)]
     plain = {c.path_in_schema for c in chunks if "RLE_DICTIONARY" not in c.encodings}
-    poses = {c.path_in_schema for c in chunks if ".pose." in c.path_in_schema}
+    poses = {c.path_in_schema for c in chunks if re.search(r"[._]pose\.", c.path_in_schema)}
     flags = {c.path_in_schema for c in chunks if c.physical_type == "BOOLEAN"}
     assert poses
     assert plain == poses | flags

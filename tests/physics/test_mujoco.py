@@ -96,3 +96,15 @@ def test_a_forked_process_has_models_of_its_own():
     if child == 0:
         os._exit(0 if mujoco_engine() is not here else 1)
     assert os.waitpid(child, 0)[1] == 0
+
+
+def test_there_is_memory_for_the_contacts_of_chairs_in_each_other():
+    chairs = [crate_of_legs(0.02 * k) for k in range(3)]
+    assert solve_push(mujoco_engine(), PhysicsScene(tuple(chairs)), PUSH_SPECS["force"])
+
+
+def crate_of_legs(x):
+    legs = [
+        part("box", (0.1 * i, 0.1 * j, 0.2), (0.04, 0.04, 0.4)) for i in range(4) for j in range(4)
+    ]
+    return Body.of(asset("Chair_9", *legs, mass_kg=4.0), Pose(x, 0.0, 0.001, UPRIGHT))

@@ -12,6 +12,7 @@ from builders import WALL_HALF_M as HALF_WALL
 from builders import crate, part
 
 from internav_data.dataset import Identity, assemble, open_staging, stage_scene
+from internav_data.physics.engines import DEFAULT_ENGINE
 from internav_data.records import Asset, NodePath, Physics, Pose
 
 ASSETS = builders.by_id(
@@ -245,7 +246,7 @@ def episode(house, index, start, goal, obstacles, *, shortest_path_m, obstructed
         obstructed_path_steps=brute_steps(house, start, goal, obstacles),
         room_paths=paths,
         node_paths=tuple(node_paths),
-        physics=Physics("bullet", "3.2.7", 0.1, 0.0001),
+        physics=Physics(DEFAULT_ENGINE, "3.2.7", 0.1, 0.0001),
     )
 
 
