@@ -194,6 +194,23 @@ class Dataset(Generic[E]):
     def _row(self, number: int) -> int:
         return number if self._index is None else int(self._index[number])
 
+    def limit_caches(self, row_group_bytes: float, files: int, houses: int) -> None:
+        """Bound what stays in memory for the next reader: for a server, or many workers.
+
+        Parameters
+        ----------
+        row_group_bytes
+            Bytes of decoded row groups, of each table.
+        files
+            Number of open files, of each table; the footer of one takes 2 MB.
+        houses
+            Number of houses.
+        """
+        self.row_group_cache.limit(row_group_bytes, files)
+        if "_scenes" in self.__dict__:
+            self._scenes[0].limit(row_group_bytes, files)
+        self._houses.capacity = houses
+
     def select(self, split: str | None = None, filters: Filters | None = None) -> Dataset[E]:
         """Return the episodes among these that are of a split and for which filters hold.
 
@@ -280,7 +297,14 @@ class Dataset(Generic[E]):
     @functools.cached_property
     def _scenes(self) -> tuple[RowGroupCache, dict[str, int]]:
         files = self.manifest.of("scenes", self.split)
-        cache = RowGroupCache(self.store, files, SCENES, extra=lambda: {"assets": self.assets})
+        cache = RowGroupCache(
+            self.store,
+            files,
+            SCENES,
+            extra=lambda: {"assets": self.assets},
+            max_bytes=self.row_group_cache.max_bytes,
+            max_files=self.row_group_cache.max_files,
+        )
         ids = read_columns(self.store, files, SCENES, ["scene_id"])["scene_id"].to_pylist()
         return cache, {scene_id: row for row, scene_id in enumerate(ids)}
 

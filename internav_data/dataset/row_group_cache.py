@@ -35,7 +35,7 @@ MAX_CACHED_BYTES = 96 << 20
 class RowGroupCache:
     """The rows of one table in several files, numbered through, read a row group at a time.
 
-    Holds `MAX_OPEN_FILES` files and `MAX_CACHED_BYTES` of row groups. After a fork (a DataLoader's
+    Holds `max_files` files and `max_bytes` of row groups. After a fork (a DataLoader's
     worker) it drops both and opens the files again.
 
     Parameters
@@ -50,6 +50,10 @@ class RowGroupCache:
         Columns of the rows, which are then dictionaries; None: rows are records.
     extra
         Values of a record's fields that the table does not hold, read with the first row group.
+    max_bytes
+        Bytes of decoded row groups in memory.
+    max_files
+        Number of open files; the footer of one takes 2 MB.
 
     """
 
@@ -60,7 +64,10 @@ class RowGroupCache:
         spec: TableSpec[Any],
         columns: Sequence[str] | None = None,
         extra: Callable[[], Mapping[str, Any]] | None = None,
+        max_bytes: float = MAX_CACHED_BYTES,
+        max_files: float = MAX_OPEN_FILES,
     ) -> None:
+        self.max_bytes, self.max_files = max_bytes, max_files
         self._store, self._files, self._spec = store, tuple(files), spec
         self._columns, self._extra = columns, extra
         self.starts: NDArray[np.int64] = np.cumsum([0, *[file.rows for file in files]])
@@ -77,16 +84,22 @@ class RowGroupCache:
         # A forked process shares file positions with its parent: nothing of it may be used.
         self._process = os.getpid()
         self._open: LRUCache[int, TableFile] = LRUCache(
-            MAX_OPEN_FILES, on_evict=lambda file: file.close()
+            self.max_files, on_evict=lambda file: file.close()
         )
         self._groups: LRUCache[int, tuple[int, Reader]] = LRUCache(
-            MAX_CACHED_BYTES, weigh=lambda held: held[0]
+            self.max_bytes, weigh=lambda held: held[0]
         )
 
     @property
     def groups_held(self) -> int:
         """Number of row groups in memory."""
         return len(self._groups)
+
+    def limit(self, max_bytes: float, max_files: int) -> None:
+        """Hold fewer or more bytes of row groups, and open files, from now on."""
+        with self._lock:
+            self.max_bytes = self._groups.capacity = max_bytes
+            self.max_files = self._open.capacity = max_files
 
     def clear(self) -> None:
         """Drop the row groups in memory; files stay open."""

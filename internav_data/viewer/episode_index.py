@@ -6,15 +6,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import pyarrow as pa
 
 from internav_data.dataset.snapshot import read_shard
 from internav_data.dataset.tables import EPISODES
 from internav_data.viewer.episode_filter import MODES, SPLITS, EpisodeFilter
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
+    import pyarrow as pa
     from numpy.typing import NDArray
 
     from internav_data.core.storage import Store
@@ -55,7 +55,7 @@ class EpisodeIndex:
     distances_m: NDArray[np.float64]
     """Euclidean distance from start to goal without obstacles, metres, (n,)."""
     type_names: tuple[str, ...]
-    """Types of obstacles, ascending."""
+    """Types of obstacles, in the order of their bits."""
     types: NDArray[np.uint64]
     """Bit t of word w: an obstacle is of type 64 w + t of `type_names`, (n, words)."""
 
@@ -71,7 +71,7 @@ class EpisodeIndex:
         CorruptDataError
             A file is missing, truncated or damaged.
         """
-        return _Reader(store).read(manifest.of("episodes"))
+        return _Reader(store, manifest.of("episodes")).read()
 
     def row_of(self, scene_id: str, number: int) -> int | None:
         """Return the row of an episode by its scene and number; None where there is none."""
@@ -129,11 +129,11 @@ class EpisodeIndex:
             "sealed": bool(self.sealed[row]),
             "obstacles": int(self.obstacles[row]),
             "distance": round(float(self.distances_m[row]), 4),
-            "types": [
+            "types": sorted(
                 name
                 for t, name in enumerate(self.type_names)
                 if int(self.types[row, t // _WORD]) >> (t % _WORD) & 1
-            ],
+            ),
         }
 
     def _masks(self, chosen: EpisodeFilter) -> Iterator[tuple[str, Mask]]:
@@ -165,10 +165,11 @@ class EpisodeIndex:
 
     def _type_counts(self, kept: Mask) -> dict[str, int]:
         types = self.types[kept]
-        return {
+        counts = {
             name: int(np.count_nonzero(types[:, t // _WORD] & np.uint64(1 << t % _WORD)))
             for t, name in enumerate(self.type_names)
         }
+        return dict(sorted(counts.items()))
 
 
 def _numbers(values: NDArray[Any]) -> dict[str, int]:
@@ -185,67 +186,6 @@ def _histogram(values: NDArray[np.float64]) -> dict[str, int]:
     return _numbers(np.floor(values).astype(np.int64))
 
 
-class _Reader:
-    """Reader of the columns, file by file: no more than one file's are in memory twice."""
-
-    def __init__(self, store: Store) -> None:
-        self._store = store
-        self._scenes: dict[str, int] = {}
-        self._types: dict[str, int] = {}
-
-    def read(self, files: tuple[DataFile, ...]) -> EpisodeIndex:
-        parts = [self._part(file) for file in files]
-        columns = {
-            name: np.concatenate([part[name] for part in parts] or [np.zeros(0, kind)])
-            for name, kind in _KINDS.items()
-        }
-        names = sorted(self._types)
-        return EpisodeIndex(
-            scene_names=tuple(self._scenes),
-            type_names=tuple(names),
-            types=self._joined([part["types"] for part in parts], names),
-            **columns,
-        )
-
-    def _part(self, file: DataFile) -> dict[str, NDArray[Any]]:
-        table = read_shard(self._store, file, EPISODES, _NAMES)
-        return {
-            "scenes": _codes(table["scene_id"], self._scenes),
-            "numbers": _values(table["index"], np.int32),
-            "splits": _codes(table["split"], {word: k for k, word in enumerate(SPLITS)}),
-            "rooms": _values(table["room_count"], np.int16),
-            "modes": _codes(table["mode"], {word: k for k, word in enumerate(MODES)}),
-            "sealed": _values(table["sealed"], np.bool_),
-            "obstacles": _values(table["obstacle_count"], np.int16),
-            "distances_m": _values(table["shortest_path_m"], np.float64),
-            "types": self._type_bits(table["obstacles"]),
-        }
-
-    def _type_bits(self, column: pa.ChunkedArray) -> NDArray[np.uint64]:
-        """Return a bit for each type that is there, numbered as they are met: (n, words)."""
-        parts = []
-        for chunk in column.chunks:
-            counts = chunk.value_lengths().to_numpy(zero_copy_only=False)
-            names = chunk.flatten().field("type")
-            codes = _codes(pa.chunked_array([names]), self._types)
-            owners = np.repeat(np.arange(len(counts)), counts)
-            bits = np.zeros((len(counts), max(1, -(-len(self._types) // _WORD))), np.uint64)
-            one = np.uint64(1) << (codes % _WORD).astype(np.uint64)
-            np.bitwise_or.at(bits, (owners, codes // _WORD), one)
-            parts.append(bits)
-        return _stacked(parts)
-
-    def _joined(self, parts: list[NDArray[np.uint64]], names: list[str]) -> NDArray[np.uint64]:
-        """Return the bits of all files, renumbered by the sorted names: (n, words)."""
-        met = _stacked(parts)
-        bits = np.zeros((len(met), max(1, -(-len(names) // _WORD))), np.uint64)
-        for t, name in enumerate(names):
-            word, bit = divmod(self._types[name], _WORD)
-            there = (met[:, word] >> np.uint64(bit)) & np.uint64(1)
-            bits[:, t // _WORD] |= there << np.uint64(t % _WORD)
-        return bits
-
-
 _KINDS: Final[dict[str, type[np.generic]]] = {
     "scenes": np.int32,
     "numbers": np.int32,
@@ -258,22 +198,66 @@ _KINDS: Final[dict[str, type[np.generic]]] = {
 }
 
 
-def _stacked(parts: list[NDArray[np.uint64]]) -> NDArray[np.uint64]:
-    """Return bits of several tables below each other, padded to the most words."""
-    words = max((part.shape[1] for part in parts), default=1)
-    padded = [np.pad(part, ((0, 0), (0, words - part.shape[1]))) for part in parts]
-    return np.concatenate(padded or [np.zeros((0, words), np.uint64)])
+class _Reader:
+    """Reader of the columns, file by file, into arrays for all episodes."""
+
+    def __init__(self, store: Store, files: tuple[DataFile, ...]) -> None:
+        self._store, self._files = store, files
+        total = sum(file.rows for file in files)
+        self._columns = {name: np.zeros(total, kind) for name, kind in _KINDS.items()}
+        self._types = np.zeros((total, 1), np.uint64)
+        self._scene_codes: dict[str, int] = {}
+        self._type_codes: dict[str, int] = {}
+
+    def read(self) -> EpisodeIndex:
+        first = 0
+        for file in self._files:
+            self._read_file(file, first)
+            first += file.rows
+        return EpisodeIndex(
+            scene_names=tuple(self._scene_codes),
+            type_names=tuple(self._type_codes),
+            types=self._types,
+            **self._columns,
+        )
+
+    def _read_file(self, file: DataFile, first: int) -> None:
+        table = read_shard(self._store, file, EPISODES, _NAMES)
+        rows = slice(first, first + file.rows)
+        for name, column in (
+            ("numbers", "index"),
+            ("rooms", "room_count"),
+            ("sealed", "sealed"),
+            ("obstacles", "obstacle_count"),
+            ("distances_m", "shortest_path_m"),
+        ):
+            self._columns[name][rows] = table[column].to_numpy()
+        for name, column, known in (
+            ("scenes", "scene_id", self._scene_codes),
+            ("splits", "split", {word: number for number, word in enumerate(SPLITS)}),
+            ("modes", "mode", {word: number for number, word in enumerate(MODES)}),
+        ):
+            self._columns[name][rows] = _codes(table[column].chunks, known)
+        for chunk in table["obstacles"].chunks:
+            self._read_types(chunk, first)
+            first += len(chunk)
+
+    def _read_types(self, chunk: pa.ListArray, first: int) -> None:
+        """Set a bit for each type that is there, numbered as they are met."""
+        counts = chunk.value_lengths().to_numpy(zero_copy_only=False)
+        codes = _codes([chunk.flatten().field("type")], self._type_codes)
+        missing = -(-len(self._type_codes) // _WORD) - self._types.shape[1]
+        if missing > 0:
+            self._types = np.pad(self._types, ((0, 0), (0, missing)))
+        owners = first + np.repeat(np.arange(len(counts)), counts)
+        bits = np.uint64(1) << (codes % _WORD).astype(np.uint64)
+        np.bitwise_or.at(self._types, (owners, codes // _WORD), bits)
 
 
-def _values(column: pa.ChunkedArray, kind: type[np.generic]) -> NDArray[Any]:
-    values: NDArray[Any] = column.to_numpy()
-    return values.astype(kind)
-
-
-def _codes(column: pa.ChunkedArray, known: dict[str, int]) -> NDArray[Any]:
-    """Return the number of each word, (n,) int32 (int8 for few); new words take the next one."""
+def _codes(chunks: Sequence[pa.Array], known: dict[str, int]) -> NDArray[np.int32]:
+    """Return the number of each word, (n,); new words take the next one."""
     parts = []
-    for chunk in column.chunks:
+    for chunk in chunks:
         encoded = chunk.dictionary_encode()
         words = [known.setdefault(word, len(known)) for word in encoded.dictionary.to_pylist()]
         numbers = np.array(words, np.int32)

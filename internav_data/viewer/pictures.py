@@ -51,7 +51,7 @@ class ThumbnailPainter:
     """Painter of episodes from above; the house below them is painted once."""
 
     def __init__(self) -> None:
-        self._houses: LRUCache[str, Image] = LRUCache(16)
+        self._houses: LRUCache[str, Image] = LRUCache(4)
 
     def draw(self, house: House, episode: Episode, assets: Mapping[str, Asset]) -> bytes:
         """Return an episode's picture without words: `THUMBNAIL_PX` wide or high, WebP."""

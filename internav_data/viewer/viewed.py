@@ -26,9 +26,12 @@ if TYPE_CHECKING:
     from internav_data.viewer.outcome_video import OutcomeVideo
     from internav_data.viewer.pictures import ThumbnailPainter
 
-PICTURE_BYTES: Final = 48 << 20
-"""Bytes of finished pictures in memory: some 2,000 thumbnails."""
-_PLAYS: Final = 6
+PICTURE_BYTES: Final = 12 << 20
+"""Bytes of finished pictures in memory: some 700 thumbnails."""
+_ROW_GROUP_BYTES: Final = 8 << 20
+_FILES: Final = 3
+_HOUSES: Final = 12
+_PLAYS: Final = 2
 """Played experts, and videos of outcomes, in memory."""
 
 
@@ -52,7 +55,10 @@ class ViewedDataset:
 
     def __init__(self, path: Path) -> None:
         self.dataset = load_dataset(path)
+        self.dataset.limit_caches(_ROW_GROUP_BYTES, _FILES, _HOUSES)
         self._index: EpisodeIndex | None = None
+        self._reading = ThreadLock()
+        """Held while the columns are read: the first page does not wait for it."""
         self._lock = ThreadLock()
         self._drawing = ThreadLock()
         self._pictures: LRUCache[tuple[Any, ...], bytes] = LRUCache(PICTURE_BYTES, weigh=len)
@@ -62,7 +68,7 @@ class ViewedDataset:
     @property
     def index(self) -> EpisodeIndex:
         """Columns to filter by, read at the first use."""
-        with self._lock:
+        with self._reading:
             if self._index is None:
                 self._index = EpisodeIndex.read(self.dataset.store, self.dataset.manifest)
             return self._index
@@ -268,8 +274,8 @@ class ViewedDataset:
         CorruptDataError
             A file is damaged, or its rows are others than its columns said.
         """
+        row = self._row(scene_id, number)
         with self._lock:
-            row = self._row(scene_id, number)
             episode: Episode = self.dataset[row]
             if (episode.scene_id, episode.index) != (scene_id, number):
                 raise CorruptDataError(
