@@ -97,8 +97,8 @@ CONTACT_DIMENSIONS: Final = 3
 """Contacts resist slipping. Contacts that resist rolling too took four times as long to solve: that
 is a torque of each body here, for all its weight."""
 ARENA_BYTES: Final = 64 << 20
-"""Memory for the contacts of a scene. Most take up to 0.15 MB, a chair pushed among others at a table
-some 16 MB; pages that are not touched cost nothing."""
+"""Memory for the contacts of a scene. Most take up to 0.15 MB, a chair pushed among others some 16
+MB; pages that are not touched cost nothing."""
 MODELS: Final = 64
 """Number of compiled models that are kept, 0.7 MB each."""
 _FLOOR_GEOMS: Final = 1
