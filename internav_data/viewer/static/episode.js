@@ -377,7 +377,7 @@ class ObstacleCard {
     const pairs = [
       ["mass", `${figure(known.mass_kg)} kg`], ["friction", figure(known.friction)],
       ["pushable", yes(known.pushable)], ["pickable", yes(known.pickable)],
-      ["moves when pushed", yes(known.movable)], ["relevant", yes(known.relevant)],
+      ["movable", yes(known.movable)], ["relevant", yes(known.relevant)],
     ];
     this.hidden.replaceChildren(
       ...(on ? pairs.map(([name, value]) => h("div", {}, h("dt", {}, name), h("dd", {}, value))) : []),

@@ -173,6 +173,9 @@ class Gallery {
   choice(key, title, counts, single = false) {
     const set = (this.query.get(key) ?? "").split(",").filter(Boolean);
     const values = [...new Set([...Object.keys(counts), ...set])];
+    if (key === "rooms") {
+      values.sort((a, b) => a - b);
+    }
     const toggle = (value, on) => {
       const kept = single ? [] : set.filter((other) => other !== value);
       this.set(key, (on ? [...kept, value] : kept).join(","));
