@@ -180,7 +180,7 @@ export class ExpertPlayer {
     this.caption.replaceChildren(
       h("b", {}, `${this.step}/${last}`),
       ` ${moment.text}`,
-      h("span", { class: "left" }, left),
+      h("span", { class: "togo" }, left),
     );
     this.caption.classList.toggle("bad", !moment.success);
     this.slider.value = String(this.step);
