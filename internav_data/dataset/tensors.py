@@ -40,6 +40,8 @@ def _numbers(column: pa.ChunkedArray, leaf: Leaf) -> np.ndarray[Any, Any] | None
         coded = array.dictionary_encode()
         numbers = [leaf.choices.index(word) for word in coded.dictionary.to_pylist()]
         return np.array([numbers[k] for k in coded.indices.to_pylist()], dtype=np.int8)
+    if array.null_count and leaf.kind == "bool":
+        array = array.cast("int8")  # 1, 0, and -1 for null
     if array.null_count:
         array = array.fill_null(float("nan") if leaf.kind == "float64" else -1)
     return np.array(array.to_numpy(zero_copy_only=False))

@@ -16,8 +16,8 @@ SCENES = 33
 ALL_TYPES = "hall,living,dining,kitchen,laundry,office,storage,studio,bathroom,bedroom"
 
 GOLDEN = {
-    "paper": "5d7cbfb0b9d43ac603ec00f0669183ad53c4342157b658e844f74dce10507862",
-    "paper, every type": "f953480da3e402c4bc50a9850f20ec7c5226aeaab1a221c52771e53f7e92f9b9",
+    "paper": "86dd7b9b81cd1eed1f789b1facf1cd48e9d8d4b17e2dc32e42dc3c80ee087475",
+    "paper, every type": "c5ea6832fff096b1f8ee294b2cd75cb0d5bb9daad6d037d00e0674fb4d8d0d87",
     "realistic": "b669efd270c42ab33fe756fdeab53651d2218284ddaae5535683987b3a07b89f",
     "realistic, every type": "0b6e8876a9d2acc7e39bd756a203497e98f9af286f5721140d44d3737c2a9b54",
 }

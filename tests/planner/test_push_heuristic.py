@@ -60,12 +60,14 @@ def test_most_guesses_are_right(worlds):
 
 
 def test_a_field_that_stops_early_knows_the_way_down(worlds):
-    world = worlds[1]
-    problem = PlanningProblem.of(world)
-    masks, prices = problem.masks(world), problem.prices(world)
-    goals = problem.goals
-    whole = bucket_dijkstra(problem.fixed, masks, 0, prices, problem.ny, goals, -1)
-    poses = np.flatnonzero(whole < FAR)
+    for world in worlds:  # the first whose goal has much room around it
+        problem = PlanningProblem.of(world)
+        masks, prices = problem.masks(world), problem.prices(world)
+        goals = problem.goals
+        whole = bucket_dijkstra(problem.fixed, masks, 0, prices, problem.ny, goals, -1)
+        poses = np.flatnonzero(whole < FAR)
+        if len(poses) > 100:
+            break
     assert len(poses) > 100
     for pose in poses[:: len(poses) // 40].tolist():
         part = bucket_dijkstra(problem.fixed, masks, 0, prices, problem.ny, goals, pose)
