@@ -16,8 +16,8 @@ SCENES = 33
 ALL_TYPES = "hall,living,dining,kitchen,laundry,office,storage,studio,bathroom,bedroom"
 
 GOLDEN = {
-    "paper": "86dd7b9b81cd1eed1f789b1facf1cd48e9d8d4b17e2dc32e42dc3c80ee087475",
-    "paper, every type": "c5ea6832fff096b1f8ee294b2cd75cb0d5bb9daad6d037d00e0674fb4d8d0d87",
+    "paper": "12c840c5ccb3ba5d906ad989ccffd6b93fccb0cc84c660e44d3e2be18c66385c",
+    "paper, every type": "3cfe6fe63184c60fa02b373b419ec06c19d087f16b81de1c3c270fb059bb948a",
     "realistic": "b669efd270c42ab33fe756fdeab53651d2218284ddaae5535683987b3a07b89f",
     "realistic, every type": "0b6e8876a9d2acc7e39bd756a203497e98f9af286f5721140d44d3737c2a9b54",
 }

@@ -192,7 +192,8 @@ def test_settled_otherwise(scenes, case):
     changes, predicate = SETTLING[case]
     found = found_in(obstacle_changed(scenes, 0, 0, **changes), 0, 0)
     assert predicate in found
-    assert all(name.startswith("physics.") for name in found - {"outcome.displacement", "outcome.swept"})
+    follow = {"outcome.displacement", "outcome.swept"}
+    assert all(name.startswith("physics.") for name in found - follow)
 
 
 @cache

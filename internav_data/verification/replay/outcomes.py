@@ -36,7 +36,7 @@ TIE_M = 1e-7
 """Difference that arithmetic alone can make."""
 CENTIMETRE = 0.01
 """Step to which sides of swept boxes are rounded up, metres."""
-SWEPT_ELSEWHERE_M: Final = 0.03
+SWEPT_ELSEWHERE_M = 0.03
 """Distance by which sides of swept boxes may differ on other hardware, metres."""
 SUNK_M = 0.005
 """Maximum depth in the floor or in anything else of an object that a push has moved."""
