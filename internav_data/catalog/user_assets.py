@@ -185,6 +185,8 @@ def _read(path: Path) -> tuple[Floats, NDArray[np.int64], RGB]:
     import trimesh  # noqa: PLC0415 - only for users with meshes
 
     try:
+        if suffix == "stl":
+            _check_stl(content)
         # From memory and without a resolver: nothing that the file refers to is opened.
         loaded: Any = trimesh.load(
             io.BytesIO(content), file_type=suffix, resolver=None, process=False
@@ -196,7 +198,7 @@ def _read(path: Path) -> tuple[Floats, NDArray[np.int64], RGB]:
     except Exception as error:
         # Readers of broken files fail in every way there is: all mean the same to the user.
         raise UsageError(
-            f"{path}: cannot be read as a mesh ({_reason(error, suffix, content)}); "
+            f"{path}: cannot be read as a mesh ({_reason(error)}); "
             "export it again as GLB, OBJ or STL"
         ) from error
     if len(faces) == 0 or len(vertices) == 0:
@@ -243,20 +245,30 @@ def _processed(loaded: Any, suffix: str) -> bool:  # noqa: ANN401 - trimesh is i
     return finite
 
 
-def _reason(error: Exception, suffix: str, content: bytes) -> str:
+def _reason(error: Exception) -> str:
     """Return the reason why a file cannot be read, in one line."""
-    if suffix == "stl" and content.lstrip()[:5].lower() != b"solid":
-        # trimesh reads a binary STL of the wrong length as text, and fails on that.
-        if len(content) < _STL_HEADER:
-            return f"{len(content)} bytes, a binary STL has {_STL_HEADER} at least"
-        count = int.from_bytes(content[_STL_HEADER - 4 : _STL_HEADER], "little")
-        expected = _STL_HEADER + _STL_TRIANGLE * count
-        if len(content) != expected:
-            return f"{len(content)} bytes, its header of {count} triangles means {expected}"
     if isinstance(error, ModuleNotFoundError):
         # For text that is no UTF-8, trimesh looks for a library that guesses encodings.
         return "not UTF-8 text" if error.name not in EXTRAS else str(missing(error.name))
     return str(error).splitlines()[0][:120] if str(error) else type(error).__name__
+
+
+def _check_stl(content: bytes) -> None:
+    """Check the length of a binary STL: trimesh reads one of the wrong length as text.
+
+    Raises
+    ------
+    ValueError
+        The file has another length than its header says.
+    """
+    if content.lstrip()[:5].lower() == b"solid":
+        return
+    if len(content) < _STL_HEADER:
+        raise ValueError(f"{len(content)} bytes, a binary STL has {_STL_HEADER} at least")
+    count = int.from_bytes(content[_STL_HEADER - 4 : _STL_HEADER], "little")
+    expected = _STL_HEADER + _STL_TRIANGLE * count
+    if len(content) != expected:
+        raise ValueError(f"{len(content)} bytes, its header of {count} triangles means {expected}")
 
 
 def _mean_colour(mesh: Any) -> RGB:  # noqa: ANN401 - trimesh is imported when used

@@ -47,7 +47,7 @@ class HouseConfig:
     """Further factor for houses of 1-2 rooms."""
     scale_medium: Annotated[float, Bounds(0.7, 2.0)] = 0.95
     """Further factor for houses of 3-5 rooms."""
-    scale_large: Annotated[float, Bounds(0.7, 2.0)] = 1.0
+    scale_large: Annotated[float, Bounds(0.7, 2.0)] = 0.975
     """Further factor for houses of 6-10 rooms."""
     furnishing: Annotated[float, Bounds(0.0, 2.0)] = 1.0
     """Amount of furniture beyond the indispensable: 0 bare, 1 lived in, 2 crowded."""
@@ -62,7 +62,7 @@ class HouseConfig:
     """Share of drawn plans whose living room leads to rooms of its own: longer room paths."""
     rooms_on_path_medium: Annotated[float, Bounds(2.0, 5.0)] = 2.7
     """Mean number of rooms on a path, at which plans of 3-5 rooms aim. `paper` only."""
-    rooms_on_path_large: Annotated[float, Bounds(2.0, 6.0)] = 4.5
+    rooms_on_path_large: Annotated[float, Bounds(2.0, 6.0)] = 4.2
     """The same for 6-10 rooms. Doors of loops shorten paths again."""
     hall_from: Annotated[int, Bounds(0, 11)] = 0
     """Houses of this many rooms and more have a hall; 0 for the preset's own: 7 in `paper`, as

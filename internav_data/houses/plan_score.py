@@ -302,7 +302,7 @@ TREE_SCORE: tuple[ScoreTerm, ...] = (
     ScoreTerm("public rooms apart", 15.0, _public_apart),
     ScoreTerm("bathrooms behind a kitchen", 15.0, _behind_kitchen),
     ScoreTerm("no bathroom for all", 15.0, _none_for_all),
-    ScoreTerm("rooms on a path, from the aim", 40.0, _depth_error),
+    ScoreTerm("rooms on a path, from the aim", 20.0, _depth_error),
 )
 """Penalties that decide between the door trees of one candidate."""
 

@@ -74,8 +74,11 @@ class ViewedDataset:
             return self._index
 
     def warm(self) -> None:
-        """Read the columns and import what draws pictures, in a thread of its own."""
-        threading.Thread(target=self._warm, name="viewer-warm", daemon=True).start()
+        """Read the columns and import what draws pictures, in a thread of its own.
+
+        The process waits for it at its end: a thread that is stopped within arrow aborts it.
+        """
+        threading.Thread(target=self._warm, name="viewer-warm").start()
 
     def _warm(self) -> None:
         try:

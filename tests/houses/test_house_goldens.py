@@ -16,8 +16,8 @@ SCENES = 33
 ALL_TYPES = "hall,living,dining,kitchen,laundry,office,storage,studio,bathroom,bedroom"
 
 GOLDEN = {
-    "paper": "12c840c5ccb3ba5d906ad989ccffd6b93fccb0cc84c660e44d3e2be18c66385c",
-    "paper, every type": "3cfe6fe63184c60fa02b373b419ec06c19d087f16b81de1c3c270fb059bb948a",
+    "paper": "5d7cbfb0b9d43ac603ec00f0669183ad53c4342157b658e844f74dce10507862",
+    "paper, every type": "f953480da3e402c4bc50a9850f20ec7c5226aeaab1a221c52771e53f7e92f9b9",
     "realistic": "b669efd270c42ab33fe756fdeab53651d2218284ddaae5535683987b3a07b89f",
     "realistic, every type": "0b6e8876a9d2acc7e39bd756a203497e98f9af286f5721140d44d3737c2a9b54",
 }
