@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from internav_data.core.config import from_mapping
+from internav_data.core.config import of_dataset
 from internav_data.physics.engines import DEFAULT_ENGINE, ENGINES, EngineName, second_engine
-from internav_data.records.errors import CorruptDataError, UsageError
+from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -64,15 +64,7 @@ class PhysicsConfig:
             A value that no generator writes.
 
         """
-        given, names = config.get("physics"), PhysicsConfig.__dataclass_fields__
-        values = given if isinstance(given, dict) else {}
-        known = {name: value for name, value in values.items() if name in names}
-        try:
-            made = from_mapping(FIRST_PHYSICS, known, "manifest.json", prefix="physics.")
-            made.check()
-        except UsageError as error:
-            raise CorruptDataError(f"config: {error}; generate the dataset again") from error
-        return made
+        return of_dataset(FIRST_PHYSICS, config, "physics")
 
 
 DEFAULT_PHYSICS: Final = PhysicsConfig()
