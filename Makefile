@@ -160,6 +160,7 @@ wheels: $(STAMP) ## ask the package index for wheels, each platform and Python; 
 
 .PHONY: docs
 docs: $(STAMP) ## build the documentation's site into build/docs; a warning is an error
+	rm -rf build/docs docs/reference # Sphinx repeats no warning of a page that it does not read again
 	$(BIN)/python -m sphinx -b html -W --keep-going -q docs build/docs
 	@echo "Look at   build/docs/index.html"
 
@@ -207,5 +208,5 @@ format: $(STAMP) ## mend what ruff can mend
 
 .PHONY: clean
 clean: ## remove what was built here (not .venv)
-	rm -rf build dist bench-results $(DEMO) .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf build dist docs/reference bench-results $(DEMO) .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find internav_data cli tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -28,6 +28,11 @@ settings.load_profile("any machine")
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
+# Commands that tests start in folders of their own import the same code as the tests.
+if os.environ.get("PYTHONPATH"):
+    places = os.environ["PYTHONPATH"].split(os.pathsep)
+    os.environ["PYTHONPATH"] = os.pathsep.join(os.path.realpath(place) for place in places)
+
 # Tests ask the engine itself: an answer from disk would be right even if the engine no longer were.
 os.environ["INTERNAV_CACHE_DIR"] = ""
 

@@ -185,8 +185,7 @@ def _read(path: Path) -> tuple[Floats, NDArray[np.int64], RGB]:
     import trimesh  # noqa: PLC0415 - only for users with meshes
 
     try:
-        if suffix == "stl":
-            _check_stl(content)
+        _check_encoding(suffix, content)
         # From memory and without a resolver: nothing that the file refers to is opened.
         loaded: Any = trimesh.load(
             io.BytesIO(content), file_type=suffix, resolver=None, process=False
@@ -247,22 +246,32 @@ def _processed(loaded: Any, suffix: str) -> bool:  # noqa: ANN401 - trimesh is i
 
 def _reason(error: Exception) -> str:
     """Return the reason why a file cannot be read, in one line."""
-    if isinstance(error, ModuleNotFoundError):
-        # For text that is no UTF-8, trimesh looks for a library that guesses encodings.
-        return "not UTF-8 text" if error.name not in EXTRAS else str(missing(error.name))
+    if isinstance(error, ModuleNotFoundError) and error.name in EXTRAS:
+        return str(missing(error.name))
     return str(error).splitlines()[0][:120] if str(error) else type(error).__name__
 
 
-def _check_stl(content: bytes) -> None:
-    """Check the length of a binary STL: trimesh reads one of the wrong length as text.
+def _check_encoding(suffix: str, content: bytes) -> None:
+    """Check that text is UTF-8 and that a binary STL is as long as its header says.
+
+    trimesh reads a binary STL of another length as text, and text of another encoding as the
+    library `charset_normalizer` guesses: which files it takes depends on what else is installed.
 
     Raises
     ------
     ValueError
-        The file has another length than its header says.
+        The text is no UTF-8, or the binary STL has another length.
     """
-    if content.lstrip()[:5].lower() == b"solid":
-        return
+    if suffix == "stl" and (b"\0" in content or content.lstrip()[:5].lower() != b"solid"):
+        _check_binary_stl(content)
+    elif suffix in {"obj", "off", "stl"}:
+        try:
+            content.decode()
+        except UnicodeDecodeError as error:
+            raise ValueError("not UTF-8 text") from error
+
+
+def _check_binary_stl(content: bytes) -> None:
     if len(content) < _STL_HEADER:
         raise ValueError(f"{len(content)} bytes, a binary STL has {_STL_HEADER} at least")
     count = int.from_bytes(content[_STL_HEADER - 4 : _STL_HEADER], "little")

@@ -378,7 +378,8 @@ class Dataset(Generic[E]):
         """Return scalar columns as torch tensors by name.
 
         Words of a fixed choice become their number (mode: 0 blocked, 1 lengthened; split: 0
-        train, 1 val, 2 test), other words are left out. Missing floats are NaN, integers -1.
+        train, 1 val, 2 test), other words are left out. Missing floats are NaN, integers -1; truth
+        values that can be missing (agreed) are 1, 0 and -1, int8.
         """
         from internav_data.dataset.tensors import tensors  # noqa: PLC0415 - torch when used
 

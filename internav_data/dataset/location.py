@@ -11,7 +11,7 @@ DEFAULT_FOLDER = "internav-dataset"
 FOLDER_VARIABLE = "INTERNAV_DATASET"
 """Environment variable that names another default folder; empty counts as unset."""
 MINI = "mini"
-"""Name of the dataset that ships with the package: 40 scenes x 10 episodes of the defaults."""
+"""Name of the dataset that ships with the package: 40 scenes, up to 10 episodes each."""
 MINI_FOLDER = Path(__file__).with_name(MINI)
 """Folder of the dataset `MINI`; nothing writes there but `make mini`."""
 

@@ -290,7 +290,7 @@ class TableFile:
 
     def _verify(self, groups: Sequence[int], names: Sequence[str] | None) -> None:
         """Check the column chunks that are about to be read."""
-        if self._checksums is None:
+        if self._checksums is None or not groups:
             return
         columns = range(self.metadata.num_columns) if names is None else self._leaves(names)
         for group in groups:
@@ -298,13 +298,10 @@ class TableFile:
 
     def _leaves(self, names: Sequence[str]) -> list[int]:
         """Return the numbers of the leaf columns that are named, or lie below one that is."""
-        # Not from `schema`: pyarrow ties it and the footer, some 2 MB, in a cycle that the garbage
-        # collector takes for small.
-        if self.metadata.num_row_groups:
-            group = self.metadata.row_group(0)
-            paths = [group.column(k).path_in_schema for k in range(group.num_columns)]
-        else:
-            paths = [self._file.schema.column(k).path for k in range(self.metadata.num_columns)]
+        # Of a row group, not from `schema`: pyarrow ties it and the footer, some 2 MB, in a cycle
+        # that the garbage collector takes for small.
+        group = self.metadata.row_group(0)
+        paths = [group.column(k).path_in_schema for k in range(group.num_columns)]
         wanted = {*names}, tuple(f"{name}." for name in names)
         return [k for k, p in enumerate(paths) if p in wanted[0] or p.startswith(wanted[1])]
 

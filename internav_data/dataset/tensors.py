@@ -27,12 +27,18 @@ def tensors(table: pa.Table) -> dict[str, Any]:
     require("torch")
     import torch  # type: ignore[import-not-found,unused-ignore]  # noqa: PLC0415 - optional
 
-    leaves = {f.name: f.node for f in EPISODES.node.fields if isinstance(f.node, Leaf)}
-    arrays = {name: _numbers(table.column(name), leaves[name]) for name in table.column_names}
+    leaves = {
+        f.name: (f.node, f.nullable) for f in EPISODES.node.fields if isinstance(f.node, Leaf)
+    }
+    arrays = {name: _numbers(table.column(name), *leaves[name]) for name in table.column_names}
     return {name: torch.from_numpy(a) for name, a in arrays.items() if a is not None}
 
 
-def _numbers(column: pa.ChunkedArray, leaf: Leaf) -> np.ndarray[Any, Any] | None:
+def _numbers(
+    column: pa.ChunkedArray,
+    leaf: Leaf,
+    nullable: bool,
+) -> np.ndarray[Any, Any] | None:
     array = one_array(column)
     if leaf.kind == "string":
         if not leaf.choices:
@@ -40,8 +46,8 @@ def _numbers(column: pa.ChunkedArray, leaf: Leaf) -> np.ndarray[Any, Any] | None
         coded = array.dictionary_encode()
         numbers = [leaf.choices.index(word) for word in coded.dictionary.to_pylist()]
         return np.array([numbers[k] for k in coded.indices.to_pylist()], dtype=np.int8)
-    if array.null_count and leaf.kind == "bool":
-        array = array.cast("int8")  # 1, 0, and -1 for null
+    if nullable and leaf.kind == "bool":
+        array = array.cast("int8")  # 1, 0, and -1 for null, whether the rows have one or not
     if array.null_count:
         array = array.fill_null(float("nan") if leaf.kind == "float64" else -1)
     return np.array(array.to_numpy(zero_copy_only=False))

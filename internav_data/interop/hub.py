@@ -9,19 +9,20 @@ import os
 import re
 from collections import Counter
 from dataclasses import dataclass
-from hashlib import sha256
 from typing import TYPE_CHECKING, Any, Final
 
 from internav_data.core.extras import require
+from internav_data.core.storage import store_of
 from internav_data.dataset.location import folder_to_read
-from internav_data.dataset.manifest import DataFile, check_file, read_manifest
+from internav_data.dataset.manifest import read_manifest
 from internav_data.dataset.metadata_files import METADATA
+from internav_data.dataset.repair import find_damage
 from internav_data.records.errors import CorruptDataError, UsageError
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from internav_data.dataset.manifest import Manifest, MetadataFile
+    from internav_data.dataset.manifest import Manifest
 
 ENDPOINT_VARIABLE: Final = "HF_ENDPOINT"
 """Environment variable by which huggingface_hub finds another hub."""
@@ -99,10 +100,13 @@ def plan_upload(
         raise UsageError(f"repository {repository!r}: expected USER/NAME, as in me/my-houses")
     folder = folder_to_read(dataset)
     manifest = read_manifest(folder)
-    listed: list[DataFile | MetadataFile] = [*manifest.files, *(manifest.metadata or ())]
-    for file in listed:
-        _check(folder, file)
-    names = {file.path for file in listed} | _unlisted(folder, manifest)
+    damage = find_damage(store_of(folder))
+    if damage is not None:
+        raise CorruptDataError(
+            f"{folder / damage.paths[0]}: edited or damaged since the dataset was made or missing: "
+            "nothing was uploaded; `internav-gen generate` with the same options writes it again"
+        )
+    names = manifest.paths() | _unlisted(folder, manifest)
     return UploadPlan(
         folder,
         repository,
@@ -113,28 +117,11 @@ def plan_upload(
     )
 
 
-def _check(folder: Path, file: DataFile | MetadataFile) -> None:
-    """Check a file's bytes: what is wrong here must not be spread."""
-    if isinstance(file, DataFile):
-        check_file(folder, file)
-    path = folder / file.path
-    try:
-        digest = sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise CorruptDataError(f"{path}: {error.strerror}: restore the file") from None
-    if digest != file.sha256:
-        raise CorruptDataError(
-            f"{path}: edited or damaged since the dataset was made: nothing was uploaded; "
-            "`internav-gen generate` with the same options writes the file again"
-        )
-
-
 def _unlisted(folder: Path, manifest: Manifest) -> set[str]:
-    """Return the manifest, and what an earlier release put beside data without listing it."""
-    names = {"manifest.json"}
-    if manifest.metadata is None:
-        names |= {name for name in METADATA if (folder / name).is_file()}
-    return names
+    """Return the files that an earlier release put beside data without listing them."""
+    if manifest.metadata is not None:
+        return set()
+    return {name for name in METADATA if (folder / name).is_file()}
 
 
 def _message(manifest: Manifest) -> str:

@@ -199,7 +199,8 @@ def count_movers(
 ) -> int:
     """Estimate how many objects a push may move besides the pushed one: its cost to solve.
 
-    Parameters as in `push`. Only the free push is solved; 0 where it does not move the object.
+    Parameters as in `push`. Only the free push is solved; 0 where it does not move the object. No
+    bound: what is met may stay, and what turns the pushed object may lead it to others.
 
     Raises
     ------

@@ -151,7 +151,8 @@ in 2/3 of the time; most time is spent on unsolvable episodes."""
 MAX_QUERIES: Final = 20
 """Maximum number of interactions asked in all, pushes that continue the last one included."""
 MAX_MOVERS: Final = 1
-"""Maximum number of further objects that a push may move; others cost most and seldom help."""
+"""Largest estimate (`World.count_movers`) of the further objects that a push moves, for it to be
+tried; others cost most and seldom help."""
 MAX_EXTRA_TRIES: Final = 2
 """Maximum number of tries once a plan is known: of 400 plans a third try shortens 2."""
 ACCEPT_RATIO: Final = 0.95

@@ -74,17 +74,19 @@ def _circle(radius_x: float, radius_y: float, z: float) -> list[tuple[float, flo
 
 
 def _local_corners(shape: str, size: tuple[float, float, float]) -> Floats:
-    """Corners (n, 3) of a box, cylinder or sphere of a size, in metres."""
+    """Return the corners (n, 3) of a box, cylinder or sphere of a size, metres."""
     a, b, c = (extent / 2.0 for extent in size)
     if shape == "box":
         corners = list(product((-a, a), (-b, b), (-c, c)))
     elif shape == "cylinder":
         corners = _circle(a, b, -c) + _circle(a, b, c)
-    else:
+    elif shape == "sphere":
         slant = math.sqrt(0.5)
         corners = [(0.0, 0.0, -c), (0.0, 0.0, c), *_circle(a, b, 0.0)]
         for side in (-1.0, 1.0):
             corners += _circle(slant * a, slant * b, side * slant * c)
+    else:
+        raise ValueError(f"no part has the shape {shape!r}")
     return np.array(corners, dtype=np.float64)
 
 
@@ -103,7 +105,7 @@ def _hull_edges(corners: Floats) -> Ints:
 
 @cache
 def _unit_edges(shape: str) -> Ints:
-    """Hull edges of a shape of size one: those of any size, as a stretched hull keeps its edges."""
+    """Return the hull edges of a shape of any size: a stretched hull keeps its edges."""
     return _hull_edges(_local_corners(shape, (1.0, 1.0, 1.0)))
 
 

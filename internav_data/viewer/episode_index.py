@@ -9,10 +9,11 @@ import numpy as np
 
 from internav_data.dataset.snapshot import read_shard
 from internav_data.dataset.tables import EPISODES
+from internav_data.records.errors import InternavError
 from internav_data.viewer.episode_filter import MODES, SPLITS, EpisodeFilter
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     import pyarrow as pa
     from numpy.typing import NDArray
@@ -63,15 +64,28 @@ class EpisodeIndex:
         return len(self.scenes)
 
     @staticmethod
-    def read(store: Store, manifest: Manifest) -> EpisodeIndex:
+    def read(
+        store: Store, manifest: Manifest, ended: Callable[[], bool] = lambda: False
+    ) -> EpisodeIndex:
         """Read the columns of all episodes that a manifest names.
+
+        Parameters
+        ----------
+        store
+            Folder of the dataset.
+        manifest
+            Manifest of the dataset.
+        ended
+            Function that says before each file whether the columns are needed no more.
 
         Raises
         ------
         CorruptDataError
             A file is missing, truncated or damaged.
+        InternavError
+            The columns are needed no more.
         """
-        return _Reader(store, manifest.of("episodes")).read()
+        return _Reader(store, manifest.of("episodes")).read(ended)
 
     def row_of(self, scene_id: str, number: int) -> int | None:
         """Return the row of an episode by its scene and number; None where there is none."""
@@ -209,9 +223,11 @@ class _Reader:
         self._scene_codes: dict[str, int] = {}
         self._type_codes: dict[str, int] = {}
 
-    def read(self) -> EpisodeIndex:
+    def read(self, ended: Callable[[], bool]) -> EpisodeIndex:
         first = 0
         for file in self._files:
+            if ended():
+                raise InternavError("the page was ended while the columns were read; start it anew")
             self._read_file(file, first)
             first += file.rows
         return EpisodeIndex(

@@ -36,8 +36,8 @@ class ExpertPlay:
     ------
     UsageError
         The episode has no expert.
-    ModuleNotFoundError
-        The physics engine is not installed.
+    MissingEngineError
+        An action needs the physics engine, which is not installed.
     """
 
     def __init__(

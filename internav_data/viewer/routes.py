@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import parse_qsl, unquote, urlsplit
 
 from internav_data.core.extras import missing
-from internav_data.records.errors import InternavError, UsageError
+from internav_data.records.errors import InternavError, MissingEngineError, UsageError
 from internav_data.viewer.viewed import NoSuchEpisodeError
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ MODULES: Final = (
     *("main", "data", "dom", "gallery", "episode", "map", "player", "statistics", "charts"),
 )
 """JavaScript modules of the page, in `static/`."""
+_MAX_FIELDS: Final = 32
 _JSON: Final = "application/json; charset=utf-8"
 _HTML: Final = "text/html; charset=utf-8"
 _WEBP: Final = "image/webp"
@@ -35,7 +36,8 @@ _FRAME: Final = "/view3d"
 _EPISODE: Final = r"/episode/(?P<scene>[\w.-]{1,64})/(?P<number>\d{1,9})"
 _FRAME_POLICY: Final = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
-    "img-src data: blob:; connect-src data: blob:"
+    "img-src data: blob:; connect-src data: blob:; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'self'"
 )
 
 
@@ -57,6 +59,8 @@ def respond(viewed: ViewedDataset, url: str) -> Response:
         return _respond(viewed, url)
     except ModuleNotFoundError as error:
         status, text = 501, str(missing(error.name))
+    except MissingEngineError as error:
+        status, text = 501, str(error)
     except NoSuchEpisodeError as error:
         status, text = 404, str(error)
     except UsageError as error:
@@ -65,7 +69,11 @@ def respond(viewed: ViewedDataset, url: str) -> Response:
         status, text = 500, str(error)
     except Exception as error:  # noqa: BLE001 - one picture's fault is no reason to end the server
         status, text = 500, f"{type(error).__name__}: {error}; this is a bug"
-    return failure(status, text, framed=url.startswith(_FRAME))
+    return failure(status, text, framed=_framed(url))
+
+
+def _framed(url: str) -> bool:
+    return url.startswith(_FRAME)
 
 
 def failure(status: int, text: str, *, framed: bool = False) -> Response:
@@ -80,9 +88,12 @@ def failure(status: int, text: str, *, framed: bool = False) -> Response:
 def _respond(viewed: ViewedDataset, url: str) -> Response:
     if len(url) > MAX_URL:
         return failure(414, f"the address is longer than {MAX_URL} characters")
-    parts = urlsplit(url)
+    try:
+        parts = urlsplit(url)
+        query = dict(parse_qsl(parts.query, keep_blank_values=False, max_num_fields=_MAX_FIELDS))
+    except ValueError as error:
+        return failure(400, f"the address {url[:200]} cannot be read: {error}", framed=_framed(url))
     path = unquote(parts.path)
-    query = dict(parse_qsl(parts.query, keep_blank_values=False, max_num_fields=32))
     for pattern, answer in _ROUTES:
         found = pattern.fullmatch(path)
         if found is not None:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import errno
+import socket
+import sys
 import threading
 import webbrowser
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import pyarrow as pa
 
+from internav_data.core.locks import ThreadLock
 from internav_data.records.errors import UsageError
 from internav_data.viewer.routes import Response, failure, respond
 
@@ -23,6 +26,7 @@ if TYPE_CHECKING:
 HOST: Final = "127.0.0.1"
 PORT: Final = 8437
 """Port where none is asked for; another free one if it is taken."""
+_HTTP_PORT: Final = 80
 _TIMEOUT_S: Final = 30.0
 """Longest wait for a request on a connection, seconds."""
 _HEADERS: Final = {
@@ -53,23 +57,58 @@ class ViewerServer(ThreadingHTTPServer):
         The port is taken, or may not be taken by this user.
     """
 
-    daemon_threads = True
+    daemon_threads = False
+    """Whoever closes the server waits for its threads: one that the interpreter ends within arrow
+    aborts the process."""
     allow_reuse_address = True
 
     def __init__(self, viewed: ViewedDataset, port: int = 0) -> None:
         self.viewed = viewed
+        self._connections: set[socket.socket] = set()
+        self._lock = ThreadLock()
         try:
             super().__init__((HOST, port), _Handler)
         except (OSError, OverflowError) as error:
             raise UsageError(_refusal(port, error)) from error
-        bound = self.server_address[1]
-        self.hosts = {f"{name}:{bound}" for name in (HOST, "localhost", "[::1]")}
+        self.hosts = host_names(self.server_address[1])
         """Values of the header Host that are answered."""
 
     @property
     def url(self) -> str:
         """Address of the page."""
         return f"http://{HOST}:{self.server_address[1]}/"
+
+    def process_request(self, request: Any, client_address: Any) -> None:  # noqa: ANN401 - as typed there
+        """Answer a connection in a thread of its own."""
+        with self._lock:
+            self._connections.add(request)
+        super().process_request(request, client_address)
+
+    def shutdown_request(self, request: Any) -> None:  # noqa: ANN401
+        """Close a connection."""
+        with self._lock:
+            self._connections.discard(request)
+        super().shutdown_request(request)
+
+    def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ANN401
+        """Say nothing of a connection that broke: the browser has closed a page."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
+
+    def server_close(self) -> None:
+        """Break all connections and wait for the threads: for none that waits for a request."""
+        with self._lock:
+            for connection in self._connections:
+                with contextlib.suppress(OSError):
+                    connection.shutdown(socket.SHUT_RDWR)
+        super().server_close()
+
+
+def host_names(port: int) -> frozenset[str]:
+    """Return the values of the header Host that name this machine; browsers leave port 80 out."""
+    names = (HOST, "localhost", "[::1]")
+    bare = names if port == _HTTP_PORT else ()
+    return frozenset([*(f"{name}:{port}" for name in names), *bare])
 
 
 def _refusal(port: int, error: Exception) -> str:
@@ -162,8 +201,7 @@ def serve(
         The port is taken.
     """
     _spare_memory()
-    with open_server(viewed, port) as server:
-        viewed.warm()
+    with open_server(viewed, port) as server, viewed.warming():
         say(f"{server.url} shows the dataset; Ctrl-C ends it")
         if browser:
             threading.Thread(target=_open, args=(server.url, say), daemon=True).start()

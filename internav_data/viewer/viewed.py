@@ -18,7 +18,7 @@ from internav_data.viewer.episode_filter import MAX_PAGE, EpisodeFilter, page_of
 from internav_data.viewer.episode_index import EpisodeIndex
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
     from internav_data.records import Episode, House
@@ -57,6 +57,8 @@ class ViewedDataset:
         self.dataset = load_dataset(path)
         self.dataset.limit_caches(_ROW_GROUP_BYTES, _FILES, _HOUSES)
         self._index: EpisodeIndex | None = None
+        self._ended = threading.Event()
+        """Set where nobody waits for the columns any more."""
         self._reading = ThreadLock()
         """Held while the columns are read: the first page does not wait for it."""
         self._lock = ThreadLock()
@@ -70,15 +72,25 @@ class ViewedDataset:
         """Columns to filter by, read at the first use."""
         with self._reading:
             if self._index is None:
-                self._index = EpisodeIndex.read(self.dataset.store, self.dataset.manifest)
+                dataset = self.dataset
+                self._index = EpisodeIndex.read(dataset.store, dataset.manifest, self._ended.is_set)
             return self._index
 
-    def warm(self) -> None:
-        """Read the columns and import what draws pictures, in a thread of its own.
+    @contextlib.contextmanager
+    def warming(self) -> Iterator[None]:
+        """Read the columns and import what draws pictures in a thread, while a block runs.
 
-        The process waits for it at its end: a thread that is stopped within arrow aborts it.
+        The block's end stops the reading, also that of a request, and waits for the thread: one
+        that the interpreter ends within arrow aborts the process.
         """
-        threading.Thread(target=self._warm, name="viewer-warm").start()
+        self._ended.clear()
+        thread = threading.Thread(target=self._warm, name="viewer-warm")
+        thread.start()
+        try:
+            yield
+        finally:
+            self._ended.set()
+            thread.join()
 
     def _warm(self) -> None:
         try:

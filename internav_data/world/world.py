@@ -402,7 +402,7 @@ class World:
     def asking(self, engine: str) -> World:
         """Return a copy whose physics is that of another engine, of the given name."""
         other = self.copy()
-        other.engine = engine
+        other.engine, other.stored_pushes = engine, None
         return other
 
     def step(self, action: int) -> StepResult:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import statistics
 from collections import Counter
+from functools import cache
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from internav_data.records import Dynamics, type_affordances
 from internav_data.records.errors import UsageError
 
 
+@cache
 def hidden(strength=1.0):
     found = hidden_attributes(CatalogConfig("hidden", strength), catalogue().spawnable)
     assert isinstance(found, HiddenAttributes)

@@ -6,6 +6,7 @@ import struct
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -144,12 +145,40 @@ def test_a_broken_file_is_named(tmp_path, name, content, words):
     assert words in str(caught.value)
 
 
-def test_text_in_another_encoding_is_called_so(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "charset_normalizer", None)  # as if it were not installed
-    with pytest.raises(
-        UsageError, match=r"latin\.obj: cannot be read as a mesh \(not UTF-8 text\)"
-    ):
-        load_user_assets(folder(tmp_path, "latin.obj", mesh=b"# St\xfcck\n" + FLAT))
+CUBE = (DATA / "cube.obj").read_bytes()
+NAMED_SOLID = b"solid St\xfcck\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
+CUT_SOLID = b"solid".ljust(80) + struct.pack("<I", 3) + b"\xff" * 100
+
+
+@pytest.mark.parametrize("guesses", [True, False], ids=["library that guesses", "no library"])
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("latin.obj", b"# St\xfcck\n" + CUBE, "(not UTF-8 text)"),
+        ("latin.stl", NAMED_SOLID, "(not UTF-8 text)"),
+        ("latin.off", b"OFF # St\xfcck\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "(not UTF-8 text)"),
+        ("cut.stl", CUT_SOLID, "(184 bytes, its header of 3 triangles means 234)"),
+    ],
+)
+def test_encodings_are_not_guessed(tmp_path, monkeypatch, name, content, words, guesses):
+    """trimesh guesses where `charset_normalizer` is installed, which is no dependency of ours."""
+    found = {"encoding": "latin-1", "confidence": 1.0}
+    library = SimpleNamespace(detect=lambda _: found) if guesses else None
+    monkeypatch.setitem(sys.modules, "charset_normalizer", library)
+    with pytest.raises(UsageError) as caught:
+        load_user_assets(folder(tmp_path, name, mesh=content))
+    assert f"{name}: cannot be read as a mesh {words}" in str(caught.value)
+
+
+@pytest.mark.parametrize("header", [b"", b"solid thing"])
+def test_a_binary_stl_may_say_solid(tmp_path, header):
+    import trimesh
+
+    content = trimesh.creation.box((0.2, 0.3, 0.4)).export(file_type="stl")
+    (asset,) = load_user_assets(
+        folder(tmp_path, "thing.stl", mesh=header.ljust(80, b"\0") + content[80:])
+    )
+    assert asset.size == (0.2, 0.3, 0.4)
 
 
 def test_a_large_file_is_refused_before_it_is_read(tmp_path, monkeypatch):

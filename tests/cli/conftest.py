@@ -29,3 +29,16 @@ def calling(capsys, monkeypatch, tmp_path):
         return run
 
     return command
+
+
+@pytest.fixture
+def call_program(calling):
+    """Return a command that takes a program's name and its words."""
+    from internav_cli import camp_eval, camp_train, main
+
+    runs = {
+        "internav-gen": calling(main.main),
+        "camp-eval": calling(camp_eval.main),
+        "camp-train": calling(camp_train.main),
+    }
+    return lambda program, *words: runs[program](*words)

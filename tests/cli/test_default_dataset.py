@@ -17,18 +17,6 @@ def unset(monkeypatch):
     monkeypatch.delenv("INTERNAV_DATASET", raising=False)
 
 
-@pytest.fixture
-def call(calling):
-    from internav_cli import camp_eval, camp_train, main
-
-    programs = {
-        "internav-gen": calling(main.main),
-        "camp-eval": calling(camp_eval.main),
-        "camp-train": calling(camp_train.main),
-    }
-    return lambda program, *words: programs[program](*words)
-
-
 READING = [
     ("internav-gen", "validate", "--level", "files"),
     ("internav-gen", "stats"),
@@ -42,17 +30,17 @@ READING = [
 
 
 @pytest.mark.parametrize("variable", [None, "elsewhere/houses"])
-def test_one_folder_for_all_commands(call, tmp_path, monkeypatch, three_houses, variable):
+def test_one_folder_for_all_commands(call_program, tmp_path, monkeypatch, three_houses, variable):
     name = variable or "internav-dataset"
     if variable:
         monkeypatch.setenv("INTERNAV_DATASET", variable)
-    code, out, err = call("internav-gen", "generate", *SMALL)
+    code, out, err = call_program("internav-gen", "generate", *SMALL)
     assert (code, out) == (0, ""), err
     assert err.splitlines()[0].startswith(f"dataset: {name} (")
     assert (tmp_path / name / "manifest.json").is_file()
     assert len(load_dataset()) == 5
     for program, *words in READING if variable is None else READING[:2]:
-        code, _, err = call(program, *words)
+        code, _, err = call_program(program, *words)
         assert code == 0, err
         assert err.splitlines()[0].startswith(f"dataset: {name} ("), words
         assert "INTERNAV_DATASET" in err.splitlines()[0]
@@ -60,14 +48,14 @@ def test_one_folder_for_all_commands(call, tmp_path, monkeypatch, three_houses, 
     pictures = {"scene-000002.png", "scene-000002-0001.png", "scene-000002-0001.gif"}
     assert {path.name for path in tmp_path.glob("scene-*")} == (set() if variable else pictures)
     # An argument wins.
-    code, out, err = call("internav-gen", "stats", three_houses, "--json")
+    code, out, err = call_program("internav-gen", "stats", three_houses, "--json")
     assert json.loads(out)["episodes"] == len(load_dataset(three_houses))
     assert err.splitlines() == [f"dataset: {three_houses}"]
 
 
 @pytest.mark.parametrize("words", READING, ids=lambda words: words[1])
-def test_nothing_there_is_one_line_with_the_command_that_makes_one(call, tmp_path, words):
-    code, out, err = call(*words)
+def test_nothing_there_is_one_line_with_the_command_that_makes_one(call_program, tmp_path, words):
+    code, out, err = call_program(*words)
     assert (code, out) == (5, "")
     (line,) = err.splitlines()
     assert "internav-dataset: no dataset here" in line
@@ -75,8 +63,8 @@ def test_nothing_there_is_one_line_with_the_command_that_makes_one(call, tmp_pat
     assert not list(tmp_path.iterdir())
 
 
-def test_the_command_names_the_folder_that_was_named(call):
-    _, _, err = call("internav-gen", "stats", "my houses")
+def test_the_command_names_the_folder_that_was_named(call_program):
+    _, _, err = call_program("internav-gen", "stats", "my houses")
     assert "`internav-gen generate --scenes 120 --out 'my houses'` makes one" in err
 
 
@@ -86,8 +74,8 @@ def test_an_empty_variable_names_nothing(monkeypatch):
     assert dataset_folder("there") == Path("there")
 
 
-def test_settings_draw_a_fresh_house_beside_any_dataset(call, tmp_path):
-    code, _, err = call("internav-gen", "show", "--seed", 0, "--rooms", 1)
+def test_settings_draw_a_fresh_house_beside_any_dataset(call_program, tmp_path):
+    code, _, err = call_program("internav-gen", "show", "--seed", 0, "--rooms", 1)
     assert code == 0, err
     assert "dataset" not in err
     assert (tmp_path / "scene-000000.png").is_file()

@@ -42,6 +42,12 @@ def flipped(data, at, bit):
     return data[:at] + bytes([data[at] ^ (1 << bit)]) + data[at + 1 :]
 
 
+def test_a_file_without_rows_is_read_by_columns(tmp_path):
+    (tmp_path / "none.parquet").write_bytes(parquet_bytes(EPISODES.schema.empty_table(), EPISODES))
+    table = read_table(tmp_path / "none.parquet", EPISODES, ["mode", "obstacles"])
+    assert (table.num_rows, table.column_names) == (0, ["mode", "obstacles"])
+
+
 def opened(file, data, spec=EPISODES):
     """Open a file's bytes as the manifest's file, without its size having been compared."""
     return open_file(MemoryStore({file.path: data}), file, spec)

@@ -8,6 +8,7 @@ from collections import Counter
 from itertools import pairwise
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -339,6 +340,16 @@ def test_torch_data_loader_without_workers_and_with_records(dataset_folder):
     ds = load_dataset(dataset_folder, "val")
     loader = data.DataLoader(ds.iterable(shuffle=False), batch_size=None, collate_fn=None)
     assert list(loader) == list(ds)
+
+
+@pytest.mark.parametrize("rows", [[True, None, False], [True, False]])
+def test_truth_values_that_can_be_missing_have_one_type(rows):
+    pytest.importorskip("torch")
+    from internav_data.dataset.tensors import tensors
+
+    tensor = tensors(pa.table({"agreed": rows}))["agreed"]
+    assert str(tensor.dtype) == "torch.int8"
+    assert tensor.tolist() == [-1 if row is None else int(row) for row in rows]
 
 
 def test_to_torch(dataset_folder):

@@ -120,6 +120,7 @@ def test_outcomes_of_other_physics_are_not_believed(dataset, world_of):
     older = replace(episode, physics=replace(episode.physics, build="another, rules 4"))
     assert world_of(older, stored=True).stored_pushes is None
     assert world_of(episode, stored=False).stored_pushes is None
+    assert world_of(episode, stored=True).asking("mujoco").stored_pushes is None
     obstacles = tuple(
         replace(one, outcomes=tuple(replace(o, swept=None) for o in one.outcomes))
         for one in episode.obstacles

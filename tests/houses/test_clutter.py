@@ -30,10 +30,16 @@ def test_clutter_is_added_to_the_furniture_and_can_be_moved(assets):
 
     assert keys(bare) < keys(full)
     added = [t for t in full.objects if (t.asset_id, t.x, t.y, t.z) not in keys(bare)]
-    assert 6 < len(added) / len(full.rooms) < 18
     assert {t.support >= 0 for t in added} == {False, True}
     dynamics = [full.assets[t.asset_id].dynamics for t in added]
     assert sum(d.pushable or d.pickable for d in dynamics) > len(added) / 2
+
+
+def test_clutter_adds_about_ten_things_a_room(assets):
+    def count(clutter):
+        return sum(len(built(assets, clutter, scene, rooms="3").objects) for scene in range(4))
+
+    assert 9 < (count(1.0) - count(0.0)) / (4 * 3) < 13
 
 
 def test_half_the_clutter_is_less(assets):

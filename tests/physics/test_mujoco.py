@@ -1,6 +1,7 @@
 """Compiled models serve many scenes, and none of them is told from a scene in a new model."""
 
 import os
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from scenes import THINGS, answer, scenes
 from internav_data.physics import Body, PhysicsScene
 from internav_data.physics.engines import mujoco_scene
 from internav_data.physics.engines.mujoco import MuJoCo, mujoco_engine
-from internav_data.physics.engines.mujoco_scene import mujoco
+from internav_data.physics.engines.mujoco_scene import ModelBuilder, mujoco
 from internav_data.physics.solving import solve_push
 from internav_data.records import PUSH_SPECS, Pose
 from internav_data.records.errors import UsageError
@@ -87,6 +88,39 @@ def test_a_scene_that_mujoco_loses_is_no_solution(monkeypatch, tmp_path):
     with pytest.raises(RuntimeError, match=r"MuJoCo lost a scene: .*mjWARN_BADQVEL"):
         solve_push(MuJoCo(), scene, PUSH_SPECS["force"])
     assert not list(tmp_path.iterdir()), "no log of MuJoCo's"
+
+
+def test_no_log_of_mujocos_is_written(monkeypatch, tmp_path):
+    """It has a warning for each scene of things that touch: where it is compiled, too."""
+    monkeypatch.chdir(tmp_path)
+    asked = scenes(8)
+    for scene, _ in asked:
+        ModelBuilder().build(scene)
+    assert not list(tmp_path.iterdir())
+    worker = Thread(target=lambda: [answer(MuJoCo(), *one) for one in asked[:3]])
+    worker.start()
+    worker.join()
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_handler_of_the_users_stays():
+    told = []
+    mujoco.set_mju_user_warning(told.append)
+    try:
+        mine = mujoco.get_mju_user_warning()
+        answer(MuJoCo(), *scenes(2)[1])
+        assert mujoco.get_mju_user_warning() == mine
+    finally:
+        mujoco.set_mju_user_warning(None)
+    assert told == []
+
+
+def test_too_little_memory_is_a_lost_scene_in_one_line(monkeypatch):
+    monkeypatch.setattr(mujoco_scene, "ARENA_BYTES", 3000)
+    scene, _ = scenes(1)[0]
+    with pytest.raises(RuntimeError, match=r"MuJoCo lost a scene: .*out of memory") as lost:
+        solve_push(MuJoCo(), scene, PUSH_SPECS["force"])
+    assert "\n" not in str(lost.value)
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")

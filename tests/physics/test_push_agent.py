@@ -111,9 +111,13 @@ def test_pulling_onto_the_agent_says_so_and_changes_nothing(hand_house):
     assert world.step(Action.PUSH_AHEAD).success
 
 
+LEVERED_S = {"bullet": 2.2, "mujoco": 3.3}
+"""More than what is toppled against an agent takes to come to rest, less than what creeps does."""
+
+
 @pytest.mark.parametrize("side", range(4))
 @pytest.mark.parametrize("heading", range(4))
-def test_the_agent_does_not_lever_what_has_low_feet(heading, side, push):
+def test_the_agent_does_not_lever_what_has_low_feet(heading, side, engine, push):
     # Its feet begin below 2 cm, where footprints leave them out: a column down to the floor stood
     # on them, and the thing crept on top of it for up to five seconds.
     telly = catalogue().assets["Television_05"]
@@ -129,7 +133,7 @@ def test_the_agent_does_not_lever_what_has_low_feet(heading, side, push):
         Body.of(telly, pose), heading, among(), agent=agent, agent_gap_m=axis_distance(*agent, plan)
     )
     assert pushed.at_rest
-    assert pushed.seconds < 3.5
+    assert pushed.seconds < LEVERED_S[engine]
     assert axis_distance(*agent, footprint(telly, pushed.pose)) > 0.2 - 2e-3
 
 
@@ -154,19 +158,6 @@ def crowd_of(pose, loose, wall, asset=CRATE):
     near = among(*loose, wall)
     body = Body.of(asset, pose)
     return count_movers(body, 0, near), count_movers(body, 2, near)
-
-
-def test_a_crowd_is_never_fewer_than_what_moves():
-    house = build_house(0, 6, HouseConfig(), catalogue())
-    model = HouseModel.of(house)
-    world = World(model, [], (4, 4, 0), (8, 8))
-    checked = 0
-    for index, heading in itertools.product(range(0, len(world.items), 2), range(4)):
-        if world.items[index].dynamics.pushable:
-            moved = world.simulate_push(index, heading, agent=False).moved
-            assert world.count_movers(index, heading) >= len(moved)
-            checked += bool(moved)
-    assert checked
 
 
 def test_the_graph_with_all_furniture_is_kept():

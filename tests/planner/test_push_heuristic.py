@@ -8,6 +8,7 @@ from internav_data.houses import HouseConfig, build_house
 from internav_data.planner.cost_to_go import FAR, bucket_dijkstra
 from internav_data.planner.problem import EVERYTHING, PlanningProblem
 from internav_data.planner.push_heuristic import path_marks, pushes_to_clear, slide_m
+from internav_data.planner.search import MAX_MOVERS
 from internav_data.world import HouseModel, World
 
 SIXES = range(0, 12, 3)
@@ -57,6 +58,22 @@ def test_most_guesses_are_right(worlds):
                 wrong += clears == blocks
     assert right + wrong > 100
     assert right > 4 * wrong
+
+
+def test_crowds_are_foreseen(worlds):
+    """The estimate is no bound, but the search seldom pushes a crowd, or forgoes what is none."""
+    tried, right, crowds, foreseen = 0, 0, 0, 0
+    for world in worlds:
+        for thing in pushables(world):
+            for heading in range(4):
+                moved = len(world.simulate_push(thing, heading, agent=False).moved) > MAX_MOVERS
+                expected = world.count_movers(thing, heading) > MAX_MOVERS
+                tried, right = tried + 1, right + (moved == expected)
+                crowds, foreseen = crowds + moved, foreseen + (moved and expected)
+    assert tried > 100
+    assert right > 0.9 * tried
+    assert crowds > 10
+    assert foreseen > 0.9 * crowds
 
 
 def test_a_field_that_stops_early_knows_the_way_down(worlds):

@@ -149,7 +149,7 @@ def test_hostile_numbers_are_found_and_end_no_validation(valid, tmp_path, table,
 
 @pytest.mark.parametrize(
     ("table", "path", "change"),
-    [("scenes", ("doors", 0, "rooms"), 0)],
+    [("scenes", ("doors", 0, "rooms"), 0), ("assets", ("parts", 0, "shape"), 5)],
 )
 def test_an_error_of_a_check_is_a_finding(valid, tmp_path, table, path, change):
     """Values of right types and ranges, for which a check was not written."""

@@ -64,6 +64,14 @@ def test_it_serves_until_ctrl_c_and_says_where_no_browser_is(started):
     assert rest.strip() == "internav-gen: interrupted"
 
 
+def test_ctrl_c_while_it_warms_up_is_a_line(started):
+    process, _ = started
+    process.send_signal(signal.SIGINT)
+    _, rest = process.communicate(timeout=60)
+    assert process.returncode == 130, rest
+    assert rest.splitlines()[-1] == "internav-gen: interrupted"
+
+
 def test_a_taken_port_is_one_line(folder):
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from internav_data.dataset import load_dataset
+from internav_data.dataset.location import MINI
 from internav_data.geometry import part_corners, transform
 from internav_data.records import Outcome
 from internav_data.records.errors import CorruptDataError
@@ -130,6 +131,15 @@ def test_outcomes_need_no_physics(folder, monkeypatch):
     got(viewed, f"{FULL}/obstacle/1/push_east/3")
 
 
+def test_an_expert_whose_engine_is_missing_is_a_line(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    viewed = ViewedDataset(MINI)
+    pushes = next(e for e in viewed.dataset if e.expert and e.expert.pushes)
+    scene, number = pushes.episode_id.split("/")
+    text = error(viewed, f"/api/episode/{scene}/{int(number)}/play", 501)
+    assert "bullet is not installed: pip install" in text
+
+
 def test_the_house_in_3d_holds_all_of_it(viewed, folder):
     import base64
     import io
@@ -188,6 +198,8 @@ def test_statistics_are_those_beside_the_data_and_computed_where_they_are_not(
         ("/manifest.json", 404, ["nothing at"]),
         ("//etc/passwd", 404, ["nothing at"]),
         ("/" + "x" * 5000, 414, ["4096"]),
+        ("//[etc/passwd", 400, ["cannot be read"]),
+        ("/api/episodes?" + "&".join(f"k{n}=1" for n in range(40)), 400, ["cannot be read"]),
     ],
 )
 def test_errors_are_a_line_with_what_to_do(viewed, url, status, words):

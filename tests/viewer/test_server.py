@@ -2,12 +2,15 @@ import http.client
 import json
 import socket
 import threading
+import time
 
 import pytest
 
-from internav_data.records.errors import UsageError
-from internav_data.viewer import ViewerServer
-from internav_data.viewer.server import open_server
+from internav_data.records.errors import InternavError, UsageError
+from internav_data.viewer import ViewedDataset, ViewerServer
+from internav_data.viewer.episode_index import EpisodeIndex
+from internav_data.viewer.routes import failure
+from internav_data.viewer.server import host_names, open_server
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +73,11 @@ def test_other_hosts_are_refused(server, host):
     assert "scenes" not in content.decode()
 
 
+def test_a_browser_names_port_80_by_leaving_it_out():
+    assert {"127.0.0.1", "localhost", "localhost:80"} < host_names(80)
+    assert "localhost" not in host_names(8437)
+
+
 def test_nobody_else_reaches_it(server):
     assert server.server_address[0] == "127.0.0.1"
     response, _ = ask(server)
@@ -106,6 +114,52 @@ def test_a_visitor_who_leaves_ends_nothing(server):
         with socket.create_connection(server.server_address) as connection:
             connection.sendall(b"GET /api/statistics HTTP/1.1\r\nHost: 127.0.0.1\r\n")
     assert ask(server)[0].status == 200
+
+
+def test_its_end_waits_for_answers_but_for_no_visitor(viewed, monkeypatch):
+    """A thread that the interpreter ends within arrow aborts the process."""
+    entered, ended = threading.Event(), threading.Event()
+
+    def slow(*_):
+        entered.set()
+        time.sleep(0.3)
+        ended.set()
+        return failure(404, "none")
+
+    monkeypatch.setattr("internav_data.viewer.server.respond", slow)
+    with ViewerServer(viewed) as server:
+        thread = threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True)
+        thread.start()
+        idle = socket.create_connection(server.server_address)
+        asks = socket.create_connection(server.server_address)
+        port = server.server_address[1]
+        asks.sendall(f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
+        assert entered.wait(20.0)
+        server.shutdown()
+        thread.join()
+        before = time.monotonic()
+    assert ended.is_set()
+    assert time.monotonic() - before < 10.0, "it waited for the idle visitor"
+    idle.close()
+    asks.close()
+
+
+def test_reading_ends_with_the_page(folder):
+    """At a million episodes the columns take a minute: Ctrl-C does not wait for them."""
+    viewed = ViewedDataset(folder)
+    asked = []
+
+    def ended():
+        asked.append(len(asked))
+        return len(asked) > 1
+
+    manifest = viewed.dataset.manifest
+    with pytest.raises(InternavError, match="the page was ended"):
+        EpisodeIndex.read(viewed.dataset.store, manifest, ended)
+    assert len(asked) == 2
+    with viewed.warming():
+        assert len(viewed.index) == 36
+    assert not [t for t in threading.enumerate() if t.name == "viewer-warm"]
 
 
 def test_a_taken_port_is_said_and_the_default_one_gives_way(server, viewed, monkeypatch):

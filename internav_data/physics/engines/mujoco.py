@@ -20,6 +20,7 @@ from internav_data.physics.engines.mujoco_scene import (
     ModelBuilder,
     mujoco,
     set_friction_solver,
+    warnings_unlogged,
 )
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ class MuJoCo:
     """Engine on MuJoCo's library, without graphics."""
 
     builder: ModelBuilder = field(default_factory=ModelBuilder)
-    """ModelBuilder of scenes, with its compiled models."""
+    """Builder of scenes, with its compiled models."""
     name: str = "mujoco"
     libraries: tuple[str, ...] = ("mujoco-core",)
     contact_margin_m: float = MARGIN_M
@@ -58,12 +59,17 @@ class MuJoCo:
         UsageError
             MuJoCo refuses a shape of the scene.
         RuntimeError
-            MuJoCo lost the scene: it became unstable or had too many contacts.
+            MuJoCo lost the scene: it became unstable, had too many contacts, or too little memory
+            for them.
 
         """
-        with ENGINE_LOCK, _warnings_unlogged():
-            made = self.builder.build(scene)
-            yield MuJoCoSimulation(made)
+        with ENGINE_LOCK, warnings_unlogged():
+            try:
+                made = self.builder.build(scene)
+                yield MuJoCoSimulation(made)
+            except mujoco.FatalError as error:
+                line = " ".join(str(error).split())
+                raise RuntimeError(f"MuJoCo lost a scene: {line}") from error
             _check(made.data)
 
 
@@ -96,7 +102,7 @@ class MuJoCoSimulation:
         self._masses = {k: float(made.model.body_mass[made.rows[k]]) for k in made.movers}
         self._step_s = SUBSTEPS * float(made.model.opt.timestep)
         self._gain = 0.0
-        """Speed that the force of the next step alone would give, m/s."""
+        """Highest speed that a force of the next step alone would give a body, m/s."""
         self._pushed: list[int] = []
         """Bodies on which a force acts during the next step."""
 
@@ -134,7 +140,8 @@ class MuJoCoSimulation:
         """Apply a force, newtons, at a body's centre of mass during the next step."""
         self._forces[body][:] = force
         self._pushed.append(body)
-        self._gain = math.hypot(*force) / self._masses[body] * self._step_s
+        gain = math.hypot(*force) / self._masses[body] * self._step_s
+        self._gain = max(self._gain, gain)
 
     def penetration_m(self, body: int) -> float:
         """Return the depth of a body's deepest contact, metres; 0 without any."""
@@ -148,17 +155,6 @@ class MuJoCoSimulation:
             if contact.geom[0] in geoms or contact.geom[1] in geoms
         ]
         return max([0.0, *depths])
-
-
-@contextmanager
-def _warnings_unlogged() -> Iterator[None]:
-    """Keep MuJoCo from writing a file MUJOCO_LOG.TXT: warnings are counted with the data, too."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda _: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
 
 
 def _check(data: MjData) -> None:

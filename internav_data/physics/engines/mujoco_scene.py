@@ -16,6 +16,7 @@ All other contacts are explicit pairs of parts that bring the product.
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from hashlib import sha256
@@ -123,7 +124,7 @@ class CompiledScene:
 
 @dataclass(slots=True, eq=False)
 class ModelBuilder:
-    """ModelBuilder of scenes; it keeps compiled models by the shapes of their bodies."""
+    """Builder of scenes; it keeps compiled models by the shapes of their bodies."""
 
     step_s: float = STEP_S
     """Time step, seconds."""
@@ -143,11 +144,27 @@ class ModelBuilder:
         bodies = tuple(
             (None if _is_wall(body) else body.asset, body.moves) for body in scene.bodies
         )
-        made = self.models.get(
-            (bodies, scene.agent is not None), lambda: _compiled(scene, self.step_s)
-        )
-        _fill(made, scene)
+        with warnings_unlogged():
+            made = self.models.get(
+                (bodies, scene.agent is not None), lambda: _compiled(scene, self.step_s)
+            )
+            _fill(made, scene)
         return made
+
+
+@contextmanager
+def warnings_unlogged() -> Iterator[None]:
+    """Keep MuJoCo from writing its warnings to a file MUJOCO_LOG.TXT in the working folder.
+
+    Those of a motion are counted with its data, too; those of building say that things which touch
+    do not sleep. The handler is the process's: MuJoCo is silent in other threads, too, meanwhile.
+    """
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 def _is_wall(body: Body) -> bool:
