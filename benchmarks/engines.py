@@ -190,15 +190,16 @@ def flips(rows: list[dict[str, Any]], name: str, change: str) -> dict[str, Any]:
 
 
 class SolvedScenes:
-    """Scenes that are solved inside, with what they are solved for."""
+    """Scenes that are solved inside by some engines, with what they are solved for."""
 
-    def __init__(self) -> None:
+    def __init__(self, names: tuple[str, ...] = NAMES) -> None:
+        self.names = names
         self.scenes: dict[PhysicsScene, PushSpec] = {}
         self._solve = cache.solve_push
 
     def __enter__(self) -> Self:
         def watched(engine: Engine, scene: PhysicsScene, spec: PushSpec) -> PushSolution:
-            if engine.name in NAMES:
+            if engine.name in self.names:
                 self.scenes[scene] = spec
             return self._solve(engine, scene, spec)
 

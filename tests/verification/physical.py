@@ -9,18 +9,18 @@ from builders import scene_object
 from scenery import ASSETS, Grid, obstacle, small_scenes
 
 from internav_data.episodes.outcomes import outcomes_of
-from internav_data.physics import Body, get_solver, settle
+from internav_data.physics import DEFAULT_ENGINE, Body, get_solver, settle
 from internav_data.planner.search import expert_of_episode
 from internav_data.records import Pose
 from internav_data.world import HouseModel, World
 from internav_data.world.config import DEFAULT_WORLD
 
 
-def settled(one):
+def settled(one, engine):
     """An obstacle where it comes to rest."""
     asset = ASSETS[one.asset_id]
     spot = Pose(one.x, one.y, 0.0, one.quaternion)
-    rest = settle(Body.of(asset, spot), 0.01, list)
+    rest = settle(Body.of(asset, spot), 0.01, list, engine)
     assert not rest.refusal
     return replace(
         one,
@@ -33,10 +33,10 @@ def settled(one):
     )
 
 
-def played(house, episode, config=DEFAULT_WORLD, other_engine=None):
+def played(house, episode, config=DEFAULT_WORLD, other_engine=None, engine=DEFAULT_ENGINE):
     """An episode with settled obstacles, outcomes and expert."""
-    engine = get_solver()
-    resting = tuple(settled(one) for one in episode.obstacles)
+    engine = get_solver(engine)
+    resting = tuple(settled(one, engine.name) for one in episode.obstacles)
     episode = replace(
         episode,
         obstacles=resting,

@@ -3,16 +3,18 @@
 import math
 from collections import Counter
 from dataclasses import replace
+from importlib import import_module
 
 import builders
 import physical
 import pytest
 from builders import UPRIGHT, asset, part, scene_object
-from engines import of_bullet
+from engines import bullet_only
 from scenery import ASSETS
 
 from internav_data.geometry import centre_of_mass
-from internav_data.physics import cache_disabled, get_solver
+from internav_data.physics import ENGINES, cache_disabled, get_solver
+from internav_data.physics.engines import mujoco_scene
 from internav_data.records import MovedObject, Pose
 from internav_data.verification.checked_config import CheckedConfig
 from internav_data.verification.checked_layout import CheckedLayout
@@ -21,16 +23,15 @@ from internav_data.verification.interactions import PICK
 from internav_data.verification.replay import (
     CheckedScene,
     bullet_house,
+    mujoco_house,
     replay_episode,
     whole_house,
 )
-from internav_data.verification.replay.bullet_house import centre_of, turned_deg
+from internav_data.verification.replay.standing import centre_of, turned_deg
 from internav_data.verification.replay.whole_house import EVERY, check_whole_house, is_sampled
 from internav_data.verification.scenes import check_scene
 from internav_data.verification.shapes import Shapes
 from internav_data.world import World
-
-bullet_scene = of_bullet("internav_data.physics.engines.bullet_scene")
 
 PLATE = asset(  # a box on a plate that is lower than any footprint and wider than the box
     "Plate_1",
@@ -41,11 +42,17 @@ PLATE = asset(  # a box on a plate that is lower than any footprint and wider th
 KNOWN = {**ASSETS, "Plate_1": PLATE}
 
 
+@pytest.fixture(scope="module", params=[pytest.param("bullet", marks=bullet_only), "mujoco"])
+def engine(request):
+    """Engine that makes an episode, and builds its house."""
+    return request.param
+
+
 @pytest.fixture(scope="module")
-def crowded():
+def crowded(engine):
     """A safe and a pot before a door, and a box behind the pot that a push to the north moves."""
     house, episodes = physical.crowded()
-    return house, physical.played(house, episodes[0])
+    return house, physical.played(house, episodes[0], engine=engine)
 
 
 def found_in(house, episode, assets=KNOWN):
@@ -58,6 +65,10 @@ def found_in(house, episode, assets=KNOWN):
     )
     assert report.counts["predicates"] > 0
     return Counter(report.by_predicate), [f.expected for f in report.found]
+
+
+def by(engine, episode):
+    return replace(episode, physics=replace(episode.physics, engine=engine))
 
 
 def with_obstacle(episode, number, **changes):
@@ -82,14 +93,14 @@ def test_what_is_true_holds(crowded):
     assert found_in(*crowded) == (Counter(), [])
 
 
-def test_a_house_that_is_built_changes_no_solution(crowded):
+def test_a_house_that_is_built_changes_no_solution(crowded, engine):
     """Bullet has globals that all of a process's clients share."""
     house, episode = crowded
 
     def solved():
         with cache_disabled():
-            get_solver().forget()
-            return physical.played(house, episode)
+            get_solver(engine).forget()
+            return physical.played(house, episode, engine=engine)
 
     before = solved()
     found_in(house, episode)
@@ -147,7 +158,10 @@ def test_what_a_moved_object_leans_on_can_give_way(crowded):
     house = builders.one_room(5.0, 4.0)
     pot = builders.obstacle(ASSETS["Pot_1"], 1.0, 2.0)
     obstacles = (pot, builders.obstacle(stand, 3.0, 2.0))
-    episode = builders.episode(house, builders.start(2, 2), builders.goal(16, 4), obstacles)
+    episode = by(
+        crowded[1].physics.engine,
+        builders.episode(house, builders.start(2, 2), builders.goal(16, 4), obstacles),
+    )
     pushed = push_of(crowded[1], 1, "push_west")
     for x, given in ((3.0, Counter()), (3.3, Counter({"physics.house-holds": 2}))):
         end = replace(pushed, pose=Pose(x, 2.0, 0.522, UPRIGHT), moved=())
@@ -159,25 +173,46 @@ def test_what_a_moved_object_leans_on_can_give_way(crowded):
     ("x", "y", "other"),
     [(0.28, 3.0, "floor or wall"), (1.78, 1.77, "object 0 (Cupboard_1)"), (2.42, 3.0, "(Box_1)")],
 )
-def test_what_is_lower_than_footprints_is_inside(x, y, other):
+def test_what_is_lower_than_footprints_is_inside(engine, x, y, other):
     """A plate of 1 cm reaches into a wall, furniture or a box where no footprint overlaps."""
     room = builders.one_room(5.0, 4.0)
     cupboard = scene_object(0, "Cupboard_1", 0, 1.0, 1.77)
     house = replace(room, objects=(cupboard,), assets=KNOWN)
     obstacles = (builders.obstacle(PLATE, x, y), builders.obstacle(ASSETS["Box_1"], 3.0, 3.0))
-    episode = builders.episode(house, builders.start(2, 2), builders.goal(16, 4), obstacles)
+    episode = by(
+        engine, builders.episode(house, builders.start(2, 2), builders.goal(16, 4), obstacles)
+    )
     found, texts = found_in(house, episode)
     assert found["physics.house-inside"] == 1
     assert "Plate_1" in texts[0]
     assert other in texts[0]
 
 
-def test_a_rug_is_floor():
+@pytest.mark.parametrize(("friction", "slides"), [(0.5, True), (0.9, False)])
+def test_frictions_of_two_objects_are_multiplied(engine, friction, slides):
+    """On a slope of 20 degrees (0.36) and of friction 0.5, a larger coefficient counts half."""
+    angle = math.radians(20.0)
+    up, length = math.tan(angle), 1.2
+    sides = [
+        (x, y, z) for y in (-0.4, 0.4) for x, z in ((0, 0), (length, 0), (length, length * up))
+    ]
+    wedge = part("hull", (0.0,) * 3, (length, 0.8, length * up), corners=sides)
+    slope = asset("Slope_1", wedge, friction=0.5)
+    house = replace(builders.one_room(5.0, 4.0), objects=(scene_object(0, "Slope_1", 0, 2.0, 2.0),))
+    turn = (0.0, -math.sin(angle / 2.0), 0.0, math.cos(angle / 2.0))
+    box = builders.obstacle(ASSETS["Box_1"], 2.6 - 0.001 * math.sin(angle), 2.0)
+    box = replace(box, z=0.6 * up + 0.001 * math.cos(angle), quaternion=turn, friction=friction)
+    episode = builders.episode(house, builders.start(2, 2), builders.goal(16, 4), (box,))
+    found, _ = found_in(house, by(engine, episode), {**ASSETS, "Slope_1": slope})
+    assert found == (Counter({"physics.house-holds": 1}) if slides else Counter())
+
+
+def test_a_rug_is_floor(engine):
     rug = replace(builders.rug(), asset_id="Rug_1")
     house = replace(builders.one_room(5.0, 4.0), objects=(scene_object(0, "Rug_1", 0, 2.0, 2.0),))
     box = builders.obstacle(ASSETS["Box_1"], 2.0, 2.0)
     episode = builders.episode(house, builders.start(2, 2), builders.goal(16, 4), (box,))
-    assert found_in(house, episode, {**ASSETS, "Rug_1": rug}) == (Counter(), [])
+    assert found_in(house, by(engine, episode), {**ASSETS, "Rug_1": rug}) == (Counter(), [])
 
 
 def test_houses_are_built_for_a_sample_and_for_data_of_this_engine_alone(crowded, monkeypatch):
@@ -277,11 +312,23 @@ def test_an_expert_that_moves_a_fixed_thing_is_found(crowded, monkeypatch):
 # the builder's own numbers and geometry
 
 
-def test_numbers_are_those_of_the_engine():
+@bullet_only
+def test_numbers_are_those_of_bullet():
+    scene = import_module("internav_data.physics.engines.bullet_scene")
     for name in ("STEP_S", "GRAVITY", "ROLLING_FRICTION", "CONTACT_BREAKS_M"):
-        assert getattr(bullet_house, name) == getattr(bullet_scene, name)
-    assert bullet_house.SOLID_FRICTION == bullet_scene.FLOOR_FRICTION
-    assert get_solver().name == whole_house.ENGINE
+        assert getattr(bullet_house, name) == getattr(scene, name)
+    assert bullet_house.SOLID_FRICTION == scene.FLOOR_FRICTION
+
+
+def test_numbers_are_those_of_mujoco():
+    assert mujoco_house.STEP_S == mujoco_scene.STEP_S / mujoco_scene.SUBSTEPS
+    assert mujoco_house.GRAVITY == mujoco_scene.GRAVITY
+    assert mujoco_house.ROLLING_FRICTION == mujoco_scene.ROLLING_FRICTION
+    assert mujoco_house.THICKNESS_M == mujoco_scene.MARGIN_M
+
+
+def test_houses_of_every_engine_are_built():
+    assert set(whole_house.ENGINES) == set(ENGINES)
 
 
 def test_centre_of_mass_is_that_of_the_generator():

@@ -8,22 +8,19 @@ whoever builds a house holds the engine's lock meanwhile.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-from scipy.spatial import ConvexHull
-
 from internav_data.core.locks import once_per_process
 from internav_data.core.temporary import process_folder
+from internav_data.verification.replay.standing import SOLID, centre_of, obj_of, turned_deg
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from internav_data.core.typing import Floats
-    from internav_data.records import Asset, House, Pose, Quaternion, Vec3
-    from internav_data.verification.shapes import Shapes, Solid
+    from internav_data.records import Asset, House, Quaternion, Vec3
+    from internav_data.verification.replay.standing import Standing
+    from internav_data.verification.shapes import Shapes
 
 STEP_S: Final = 1.0 / 240.0
 GRAVITY: Final = 9.81
@@ -33,49 +30,6 @@ SOLID_FRICTION: Final = 1.0
 CONTACT_BREAKS_M: Final = 0.002
 """Distance that a contact may drift before it is found anew, metres. All clients share it."""
 FLOOR_HALF_M: Final = (100.0, 100.0, 1.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Standing:
-    """An object as it is built: where it stands, and whether it can move."""
-
-    name: str
-    asset_id: str
-    pose: Pose
-    mass_kg: float
-    friction: float
-    moves: bool
-
-
-def obj_of(solids: Sequence[Solid]) -> str:
-    """Return convex solids as Wavefront OBJ text, a group each, in metres."""
-    lines, before = [], 1
-    for number, solid in enumerate(solids):
-        lines.append(f"g solid{number}")
-        lines += [f"v {x:.12g} {y:.12g} {z:.12g}" for x, y, z in solid.corners.tolist()]
-        triangles = ConvexHull(solid.corners).simplices + before
-        lines += [f"f {a} {b} {c}" for a, b, c in triangles.tolist()]
-        before += len(solid.corners)
-    return "\n".join(lines) + "\n"
-
-
-def centre_of(solids: Sequence[Solid]) -> Floats:
-    """Return the centre of mass of convex solids of equal density, (3,) metres."""
-    moment, total = np.zeros(3), 0.0
-    for solid in solids:
-        # A hull is the pyramids from a point inside to its triangles.
-        inside = solid.corners.mean(axis=0)
-        triangles = solid.corners[ConvexHull(solid.corners).simplices] - inside
-        volumes = np.abs(np.linalg.det(triangles)) / 6.0
-        moment += volumes @ (inside + triangles.sum(axis=1) / 4.0)
-        total += float(volumes.sum())
-    return np.asarray(moment / total, dtype=np.float64)
-
-
-def turned_deg(first: Quaternion, second: Quaternion) -> float:
-    """Return the angle between two orientations, degrees."""
-    along = abs(float(np.dot(first, second))) / math.hypot(*first) / math.hypot(*second)
-    return math.degrees(2.0 * math.acos(min(1.0, along)))
 
 
 class BulletHouse:
@@ -150,7 +104,7 @@ class BulletHouse:
                         # Column 8 is the distance, negative where bodies overlap.
                         deepest[pair] = max(deepest.get(pair, 0.0), -contact[8])
         return [
-            (known[a], known[b].name if b in known else "floor or wall", depth)
+            (known[a], known[b].name if b in known else SOLID, depth)
             for (a, b), depth in deepest.items()
         ]
 

@@ -1,8 +1,9 @@
 """Episodes in their whole houses, with every wall, every piece of furniture and every obstacle.
 
 The generator solves its problems among the few bodies that can touch each other. What it leaves
-out by mistake, or builds wrongly, shows in a house that is built otherwise and all at once
-(`bullet_house`). That takes longer than the replay of the episode, so it is done for a sample.
+out by mistake, or builds wrongly, shows in a house that is built otherwise and all at once, in the
+dataset's engine (`bullet_house`, `mujoco_house`). That takes longer than the replay of the episode,
+so it is done for a sample.
 
 Nothing may be inside something else, and objects at rest have to stay where they are for two
 seconds. Obstacles can move, and furniture that a push has moved; all else stays.
@@ -10,26 +11,30 @@ seconds. Obstacles can move, and furniture that a push has moved; all else stays
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 import shapely
 
-from internav_data.verification.replay.bullet_house import BulletHouse, Standing
+from internav_data.verification.replay.bullet_house import BulletHouse
+from internav_data.verification.replay.mujoco_house import MujocoHouse
+from internav_data.verification.replay.standing import Standing
 from internav_data.verification.shapes import STEP_OVER_M
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from numpy.typing import NDArray
 
     from internav_data.records import Asset, Episode, House, Outcome, Pose
     from internav_data.verification.obstacles import Expect
+    from internav_data.verification.replay.standing import BuiltHouse
     from internav_data.verification.shapes import Shapes
 
-ENGINE: Final = "bullet"
-"""Engine of the datasets whose houses can be built here."""
+ENGINES: Final = ("bullet", "mujoco")
+"""Engines of the datasets whose houses can be built here."""
 EVERY: Final = 40
 """One of so many episodes has its house built."""
 HOLD_S: Final = 2.0
@@ -58,9 +63,10 @@ def is_sampled(episode: Episode) -> bool:
 
 
 def check_whole_house(house: House, shapes: Shapes, episode: Episode, expect: Expect) -> None:
-    """Check an episode in its house: as it starts, and after each push that succeeds."""
-    from internav_data.physics.engines.bullet import ENGINE_LOCK  # noqa: PLC0415 - pybullet
+    """Check an episode in its house: as it starts, and after each push that succeeds.
 
+    Its engine is one of `ENGINES`, and installed.
+    """
     pushes = [
         (f"after {outcome.action} of obstacle {number}", ends, outcome.at_rest is True)
         for number, obstacle in enumerate(episode.obstacles)
@@ -69,8 +75,7 @@ def check_whole_house(house: House, shapes: Shapes, episode: Episode, expect: Ex
     ]
     moved = {key for _, ends, _ in pushes for key in ends}
     furniture = _furniture(house, shapes)
-    with ENGINE_LOCK:
-        built = BulletHouse(house, shapes)
+    with _built(episode.physics.engine, house, shapes) as built:
         # Furniture that no push moves is put there once.
         built.put([one for key, one in furniture.items() if key not in moved])
         for what, ends, at_rest in [("at the start", {}, True), *pushes]:
@@ -81,7 +86,19 @@ def check_whole_house(house: House, shapes: Shapes, episode: Episode, expect: Ex
             built.remove(len(objects))
 
 
-def _judge(built: BulletHouse, what: str, expect: Expect, *, at_rest: bool) -> None:
+@contextmanager
+def _built(engine: str, house: House, shapes: Shapes) -> Iterator[BuiltHouse]:
+    """Build floor and walls in an engine, which no other thread of the process uses meanwhile."""
+    if engine == "bullet":
+        from internav_data.physics.engines.bullet import ENGINE_LOCK  # noqa: PLC0415 - pybullet
+
+        with ENGINE_LOCK:
+            yield BulletHouse(house, shapes)
+    else:
+        yield MujocoHouse(house, shapes)
+
+
+def _judge(built: BuiltHouse, what: str, expect: Expect, *, at_rest: bool) -> None:
     """Look for objects inside others, and for some that do not stay if all are to be at rest."""
     for one, other, depth in built.contacts():
         expect(
