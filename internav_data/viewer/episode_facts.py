@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Final
 
-from internav_data.records.agent import AGENT, SPACING_M
+from internav_data.records.agent import AGENT
 from internav_data.viewer.shapes import plans, shown_kind
 from internav_data.views.episodes import obstacle_kind
 from internav_data.views.plan import map_corners
@@ -199,10 +199,11 @@ def _path_text(episode: Episode, outcome: Outcome) -> str:
     before, after = episode.obstructed_path_steps, outcome.path_steps_after
     if after is None:
         return "the path stays cut off" if before is None else "the path is cut off"
-    length = f"{after} steps ({after * SPACING_M:g} m) to the goal"
+    metres = "" if outcome.path_m_after is None else f", {outcome.path_m_after:.2f} m"
+    length = f"{after} steps{metres} to the goal"
     if before is None:
-        return f"the path is open, {length}"
+        return f"the path is open: {length}"
     if after == before:
-        return f"the path stays {length}"
+        return f"the path stays: {length}"
     change = after - before
-    return f"{length}, {abs(change)} {'fewer' if change < 0 else 'more'}"
+    return f"{length}: {abs(change)} {'fewer' if change < 0 else 'more'} than before"

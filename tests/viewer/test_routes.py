@@ -46,7 +46,7 @@ def test_an_episodes_facts_are_its_records(viewed, folder):
     east = facts["obstacles"][0]["outcomes"][0]
     assert east["at"] == [6.2, 2.0]
     assert [each["name"] for each in east["moved"]] == ["Apple 2", "Chair"]
-    assert "slides 1.20 m, takes 2 other objects along; the path is open, 24 steps" in east["text"]
+    assert "slides 1.20 m, takes 2 other objects along; the path is open: 24 steps" in east["text"]
 
 
 def test_an_outcomes_polygons_are_the_parts_at_the_stored_pose(viewed, folder):
@@ -233,3 +233,22 @@ def test_an_outcome_names_the_engine_that_disagrees(hand_episode):
     assert outcome_text(episode, heavy) == "push east: too heavy; mujoco disagrees"
     for agrees in (True, None):
         assert outcome_text(episode, replace(heavy, agrees=agrees)) == "push east: too heavy"
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "metres", "words"),
+    [
+        (None, 43, 9.155, "the path is open: 43 steps, 9.15 m to the goal"),
+        (48, 48, 9.0, "the path stays: 48 steps, 9.00 m to the goal"),
+        (48, 45, None, "45 steps to the goal: 3 fewer than before"),
+        (None, None, None, "the path stays cut off"),
+        (48, None, None, "the path is cut off"),
+    ],
+)
+def test_an_outcome_tells_the_path_in_the_units_of_the_header(
+    hand_episode, before, after, metres, words
+):
+    """Lattice steps and the Euclidean length, as for the path without obstacles."""
+    episode = replace(hand_episode, obstructed_path_steps=before)
+    pick = Outcome("pick", True, 0.0, after, metres, before is None and after is not None, 0.0, None)
+    assert outcome_text(episode, pick) == f"pick: in the agent's hand; {words}"

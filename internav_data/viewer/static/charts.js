@@ -87,9 +87,9 @@ function chart(title, spoken, ...parts) {
   );
 }
 
-/** Round ticks from 0 to above a value. */
+/** Round ticks from 0, four steps at most, to the first that is not below a value. */
 function round(most) {
   const power = 10 ** Math.floor(Math.log10(most / 4));
   const step = [1, 2, 2.5, 5, 10].map((k) => k * power).find((k) => k * 4 >= most * 0.999);
-  return [0, 1, 2, 3, 4].map((k) => k * step);
+  return Array.from({ length: Math.ceil((most * 0.999) / step) + 1 }, (_, k) => k * step);
 }
