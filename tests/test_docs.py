@@ -123,10 +123,14 @@ def test_an_example_floor_plan_can_be_built():
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.stem)
 def test_examples_run(example, small_dataset, small_run, tmp_path):
+    if example.stem == "slurm_generate":
+        pytest.importorskip("submitit")
+    ranges = ["--scenes", "2", "--parts", "2", "--workers", "1", "--local"]
     arguments = {
         "ship_agent": [small_run, tmp_path / "agent"],
         "contact_sheet": [small_dataset, tmp_path / "sheet.png", "--pixels", "120"],
         "stream_episodes": [small_dataset],
+        "slurm_generate": [tmp_path / "d", *ranges, "--episodes-per-scene", "1"],
         "paths_in_a_house": ["--seed", "7", "--scene", "3"],
     }[example.stem]
     done = subprocess.run(

@@ -26,6 +26,37 @@ MAX_NAMED_SCENES = 10
 """Quarantined scenes that are named at the end."""
 
 
+def _scene_range(
+    _context: click.Context, _parameter: click.Parameter, value: str | None
+) -> range | None:
+    """Return the range that A:B means.
+
+    Raises
+    ------
+    BadParameter
+        It is no range.
+
+    """
+    if value is None:
+        return None
+    first, colon, end = value.partition(":")
+    if not (colon and first.isdecimal() and end.isdecimal()):
+        raise click.BadParameter(
+            f"{value!r}: expected A:B, as in 0:6000, for the scenes A up to B - 1"
+        )
+    return range(int(first), int(end))
+
+
+def _one_of(scenes: int, scene_range: range | None) -> int | range:
+    """Return what was given, a number of scenes or their range; both are refused."""
+    source = click.get_current_context().get_parameter_source("scenes")
+    if scene_range is None:
+        return scenes
+    if source is click.core.ParameterSource.COMMANDLINE:
+        raise click.UsageError("--scenes and --scene-range: give one of them")
+    return scene_range
+
+
 @click.command(
     "generate",
     epilog="""\b
@@ -37,6 +68,7 @@ Examples:
   internav-gen generate --out data/confounded --attributes hidden
   internav-gen generate --out data/sure --cross-check       outcomes two engines agree on
   internav-gen generate --out data/dense --episode-preset dense   obstacles that matter
+  internav-gen generate --scene-range 6000:12000 --out part-2   a part, to be merged
   internav-gen generate --dry-run --workers 8                 how long, how large
   internav-gen generate --scene 17 --episode 3                one episode again, as JSON
   internav-gen generate --print-config > mine.toml            all settings, to be changed
@@ -51,6 +83,12 @@ workers gives the same bytes.""",
     help="The dataset's folder.  [default: $INTERNAV_DATASET, else internav-dataset]",
 )
 @click.option("--scenes", type=int, default=12_000, show_default=True, callback=positive)
+@click.option(
+    "--scene-range",
+    metavar="A:B",
+    callback=_scene_range,
+    help="Make scenes A to B - 1 instead: a part of a dataset, for `internav-gen merge`.",
+)
 @click.option("--episodes-per-scene", type=int, help="A tenth of it in test scenes.  [default: 50]")
 @click.option("--workers", type=int, callback=positive, help="Processes.  [default: one a core]")
 @click.option(
@@ -122,6 +160,7 @@ def command(
     *,
     out: Path | None,
     scenes: int,
+    scene_range: range | None,
     workers: int | None,
     executor: str,
     retry_quarantined: bool,
@@ -133,6 +172,7 @@ def command(
     **settings: Any,  # noqa: ANN401 - the options of config_from; __ for a dot
 ) -> int:
     """Make a dataset of houses and episodes in the folder --out."""
+    wanted = _one_of(scenes, scene_range)
     config = config_from(**settings)
     if print_config:
         from internav_data.core.config import config_toml
@@ -151,10 +191,7 @@ def command(
     if episode is not None:
         raise click.UsageError("--episode needs --scene: say which scene it belongs to")
     if dry_run:
-        from internav_data.generation.forecast import forecast
-
-        made = forecast(config, scenes, workers or 0, progress())
-        click.echo(made.to_json() if as_json else made.summary())
+        _forecast(config, wanted, workers or 0, as_json=as_json)
         return 0
     config = config if keep else _with_held_engine(config, out)
     name_dataset(out, config.physics.engine)
@@ -165,13 +202,23 @@ def command(
     report = generate(
         folder,
         config,
-        scenes,
+        wanted,
         workers or 0,
         progress(),
         executor=executor,
         retry_quarantined=retry_quarantined,
     )
     return _print_report(report, as_json=as_json)
+
+
+def _forecast(
+    config: GenerationConfig, scenes: int | range, workers: int, *, as_json: bool
+) -> None:
+    from internav_data.generation.forecast import forecast
+    from internav_data.generation.run import check_scenes
+
+    made = forecast(config, len(check_scenes(scenes)), workers, progress())
+    click.echo(made.to_json() if as_json else made.summary())
 
 
 def _with_held_engine(config: GenerationConfig, out: Path | None) -> GenerationConfig:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 COMMANDS = {
     "generate": "Make a dataset from a seed; continue or extend one.",
+    "merge": "Join the parts of a dataset that several machines made.",
     "validate": "Validate a dataset independently of its generator; list every error.",
     "stats": "Print statistics of a dataset, beside the paper's Table 2.",
     "show": "Draw a house or an episode from above as a PNG.",

@@ -14,6 +14,7 @@ from internav_data.physics.engines import DEFAULT_ENGINE, EngineName
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from internav_data.dataset import DatasetPart
     from internav_data.generation import GenerationConfig, GenerationProgress
 
 F = TypeVar("F", bound="Callable[..., Any]")
@@ -146,7 +147,8 @@ def dataset_to_read(given: Path | None, *, solves: bool = False, engine: str | N
     folder = folder_to_read(given)
     if has_manifest(folder):
         chosen = (engine or _engine_of(folder)) if solves else ""
-        name_dataset(folder if folder == MINI_FOLDER else given, chosen)
+        part = read_manifest(folder).part
+        name_dataset(folder if folder == MINI_FOLDER else given, chosen, part)
         if chosen:
             require_engine(chosen, "" if engine else str(folder))
     elif given is None:
@@ -161,14 +163,15 @@ def _engine_of(folder: Path) -> str:
     return PhysicsConfig.of_dataset(read_manifest(folder).config).engine
 
 
-def name_dataset(given: Path | None, engine: str = "") -> None:
-    """Write on stderr which dataset a command takes, why if none was named, and its engine."""
+def name_dataset(given: Path | None, engine: str = "", part: DatasetPart | None = None) -> None:
+    """Write on stderr which dataset a command takes, why if none was named, range and engine."""
     from internav_data.dataset.location import dataset_folder, origin
 
     if os.environ.get("RANK", "0") != "0":
         return  # torchrun starts this program once a rank
     reason = origin(given)
     line = f"dataset: {dataset_folder(given)}" + (f" ({reason})" if reason else "")
+    line += f"; part {part.first_scene}:{part.end_scene} of a dataset" if part else ""
     click.echo(line + (f"; physics: {engine}" if engine else ""), err=True)
 
 

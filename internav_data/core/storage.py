@@ -285,6 +285,31 @@ class FolderStore:
             os.close(descriptor)
 
 
+@contextlib.contextmanager
+def disk_errors(place: object) -> Iterator[None]:
+    """Turn errors of the disk into one that says what to do.
+
+    Parameters
+    ----------
+    place
+        Store or folder that is named where an error names no file.
+
+    Raises
+    ------
+    InternavError
+        The disk is full, read-only, or otherwise fails.
+
+    """
+    try:
+        yield
+    except OSError as error:
+        where = error.filename or place
+        raise InternavError(
+            f"cannot write to {where}: {error.strerror or error}; make it writable or free some "
+            "space, then run the same command again: finished scenes are kept"
+        ) from error
+
+
 def _lock_file(folder: Path) -> tuple[Path, int]:
     """Return the file whose lock is that of a folder, and the flags to open it with.
 

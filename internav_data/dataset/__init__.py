@@ -23,6 +23,7 @@ from internav_data.dataset.loader import Dataset, load_dataset
 from internav_data.dataset.location import dataset_folder
 from internav_data.dataset.manifest import (
     DataFile,
+    DatasetPart,
     Manifest,
     Quarantined,
     has_manifest,
@@ -30,6 +31,7 @@ from internav_data.dataset.manifest import (
     read_manifest,
     write_manifest,
 )
+from internav_data.dataset.merging import merge
 from internav_data.dataset.outcome_stats import refused_share
 from internav_data.dataset.parquet import FileInfo, read_table, write_parquet
 from internav_data.dataset.repair import Damage, find_damage, repair_files
@@ -65,6 +67,7 @@ __all__ = [
     "Damage",
     "DataFile",
     "Dataset",
+    "DatasetPart",
     "FileInfo",
     "Identity",
     "Manifest",
@@ -89,6 +92,7 @@ __all__ = [
     "load_dataset",
     "locate",
     "logical_digest",
+    "merge",
     "open_staging",
     "read_manifest",
     "read_staged_rows",

@@ -70,7 +70,7 @@ def _summary(manifest: Manifest, stats: Stats) -> str:
     share = f"{100 * stats.sealed_share_of_blocked:.1f} %"
     return f"""
 # Interactive navigation episodes
-
+{_part(manifest)}
 {stats.episodes:,} tasks in {stats.scenes:,} generated houses: {splits}. In each, an agent (a disc
 of 0.2 m radius) is to reach a goal while obstacles, settled by physics, block the path
 ({stats.modes["blocked"]:,} episodes) or lengthen it ({stats.modes["lengthened"]:,}). Of the
@@ -81,6 +81,16 @@ quaternions are (x, y, z, w). `schemas/` holds a JSON Schema of each row, `stats
 `manifest.json` every file with its sha256, `croissant.json` the same for machines, `eval.yaml` the
 tasks of evaluation results. The data take {_megabytes(manifest)} MB in {len(manifest.files)} files.
 """
+
+
+def _part(manifest: Manifest) -> str:
+    numbers = manifest.scene_numbers
+    if manifest.part is None:
+        return ""
+    return (
+        f"\nA part of a dataset, scenes {numbers.start} to {numbers.stop - 1} of it: "
+        "`internav-gen merge` joins the parts.\n"
+    )
 
 
 def _megabytes(manifest: Manifest) -> str:

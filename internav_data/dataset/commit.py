@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from internav_data.core.hardware import hardware
@@ -31,6 +31,7 @@ from internav_data.dataset.manifest import (
     MANIFEST,
     Counts,
     DataFile,
+    DatasetPart,
     Manifest,
     Quarantined,
     has_manifest,
@@ -38,7 +39,7 @@ from internav_data.dataset.manifest import (
     write_manifest,
 )
 from internav_data.dataset.metadata_files import METADATA, put_metadata
-from internav_data.dataset.shards import SPLITS, SceneSource, put_shards
+from internav_data.dataset.shards import SPLITS, SceneSource, assets_table, put_shards
 from internav_data.dataset.staging import (
     IDENTITY,
     Identity,
@@ -55,6 +56,8 @@ from internav_data.records.errors import CorruptDataError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
+
+    import pyarrow as pa
 
     from internav_data.core.storage import Store
     from internav_data.dataset.staging import SceneState
@@ -100,7 +103,10 @@ def held_config(out: StoreLike) -> Mapping[str, Any] | None:
 
 
 def open_staging(
-    out: StoreLike, identity: Identity, defaults: Mapping[str, Any] | None = None
+    out: StoreLike,
+    identity: Identity,
+    defaults: Mapping[str, Any] | None = None,
+    part: DatasetPart | None = None,
 ) -> Staging:
     """Prepare a folder for staging the scenes of a dataset.
 
@@ -113,43 +119,68 @@ def open_staging(
     defaults
         Configuration whose values stand for the settings that a dataset's own lacks, since it was
         made before they existed.
+    part
+        Range of scenes, where they are to be a part of a dataset.
 
     Raises
     ------
     UsageError
-        `out` is a file, holds something that is no dataset, another configuration's dataset, a
-        link to a folder that a commit would write into, or a file that it would write over.
+        `out` is a file, holds something that is no dataset, another configuration's dataset,
+        another part, a link to a folder that a commit would write into, or a file that it would
+        write over.
 
     """
     store = store_of(out)
     place = store.at("")
-    try:
-        names = store.names()
-    except NotADirectoryError:
-        raise UsageError(
-            f"{place}: is a file: give a folder that is new, empty or a dataset"
-        ) from None
-    for folder in sorted(_FOLDERS.intersection(names)):
-        raise UsageError(
-            f"{store.at(folder)}: is a link or a file, and nothing is written through it: put the "
-            "folder itself in its place, or generate into another folder"
-        )
+    names = names_to_write_into(store)
     if has_manifest(store):
-        _same(place, identity_of(read_manifest(store)), identity, defaults or {})
+        manifest = read_manifest(store)
+        _same(place, identity_of(manifest), identity, defaults or {})
+        _same_part(place, manifest, part)
     if exists(store, IDENTITY):
         _same(place, read_identity(store), identity, defaults or {})
     elif not has_manifest(store) and any(final_of(name) != IDENTITY for name in names):
         raise UsageError(f"{place}: holds something that is no dataset: give a new or empty folder")
     if not has_manifest(store):
-        _refuse_strangers(store, journal_names(store))
+        refuse_strangers(store, journal_names(store))
     store.put(IDENTITY, (json.dumps(asdict(identity), indent=1) + "\n").encode())
     staging = Staging(store, identity.digest())
     remove_foreign(staging)
     return staging
 
 
-def _refuse_strangers(store: Store, ours: Iterable[str] = ()) -> None:
-    """Refuse to write a new dataset's metadata over files that somebody put there."""
+def names_to_write_into(store: Store) -> list[str]:
+    """Return the names in a store that a dataset is to be written into.
+
+    Raises
+    ------
+    UsageError
+        It is a file, or a folder that a commit would write into is a link or a file.
+
+    """
+    try:
+        names = store.names()
+    except NotADirectoryError:
+        raise UsageError(
+            f"{store.at('')}: is a file: give a folder that is new, empty or a dataset"
+        ) from None
+    for folder in sorted(_FOLDERS.intersection(names)):
+        raise UsageError(
+            f"{store.at(folder)}: is a link or a file, and nothing is written through it: put the "
+            "folder itself in its place, or write into another folder"
+        )
+    return names
+
+
+def refuse_strangers(store: Store, ours: Iterable[str] = ()) -> None:
+    """Refuse to write a new dataset's metadata over files that somebody put there.
+
+    Raises
+    ------
+    UsageError
+        A file has the name of one of a dataset, and is not among `ours`.
+
+    """
     for name in sorted(METADATA.difference(ours)):
         if exists(store, name):
             raise UsageError(
@@ -165,11 +196,40 @@ def _same(out: str, there: Identity, wanted: Identity, defaults: Mapping[str, An
         rules=wanted.rules,
         obstacle_shares=wanted.obstacle_shares,
     )
-    old, new = (json.loads(json.dumps(asdict(i))) for i in (there, wanted))
-    if difference := _first_difference(old, new, ""):
+    if difference := difference_of(there, wanted, "asked for"):
         raise UsageError(
             f"{out}: holds a dataset of another configuration ({difference}): "
             "give another folder, or the same configuration to resume or extend"
+        )
+
+
+def difference_of(there: Identity, other: Identity, word: str) -> str:
+    """Return the first value in which two identities differ; empty if they are equal.
+
+    It reads `place: there 1, asked for 2`, where `word` is "asked for".
+    """
+    old, new = (json.loads(json.dumps(asdict(i))) for i in (there, other))
+    return _first_difference(old, new, "", word)
+
+
+def _same_part(out: str, there: Manifest, part: DatasetPart | None) -> None:
+    """Check that a dataset in place is the part that is asked for, or none."""
+    held, again = there.part, "to go on with it, or another folder"
+    if held is None:
+        if part is not None:
+            raise UsageError(
+                f"{out}: holds a dataset that is no part of one: leave --scene-range out {again}"
+            )
+        return
+    span = f"{held.first_scene}:{held.end_scene}"
+    if part is None or part.first_scene != held.first_scene:
+        raise UsageError(
+            f"{out}: holds the part {span} of a dataset: give --scene-range {span} {again}"
+        )
+    if part.rules != held.rules:
+        raise UsageError(
+            f"{out}: holds a part that other code of this version made, which cannot go on with "
+            "it: make the part anew in another folder"
         )
 
 
@@ -182,14 +242,15 @@ def _filled(config: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str,
     return filled
 
 
-def _first_difference(old: Any, new: Any, path: str) -> str:  # noqa: ANN401 - JSON
+def _first_difference(old: Any, new: Any, path: str, word: str) -> str:  # noqa: ANN401 - JSON
     if isinstance(old, dict) and isinstance(new, dict):
         for key in sorted(old.keys() | new.keys()):
-            found = _first_difference(old.get(key), new.get(key), f"{path}.{key}".lstrip("."))
+            place = f"{path}.{key}".lstrip(".")
+            found = _first_difference(old.get(key), new.get(key), place, word)
             if found:
                 return found
         return ""
-    return "" if old == new else f"{path}: there {old!r}, asked for {new!r}"
+    return "" if old == new else f"{path}: there {old!r}, {word} {new!r}"
 
 
 def done_scenes(staging: Staging, retry: Retry = "none") -> frozenset[int]:
@@ -202,7 +263,7 @@ def done_scenes(staging: Staging, retry: Retry = "none") -> frozenset[int]:
     if has_manifest(staging.store):
         manifest = read_manifest(staging.store)
         again = {entry.scene for entry in manifest.quarantined if _again(entry.died, retry)}
-        done.update(k for k in range(manifest.scenes) if k not in again)
+        done.update(k for k in manifest.scene_numbers if k not in again)
     return frozenset(done)
 
 
@@ -210,8 +271,16 @@ def _again(died: bool, retry: Retry) -> bool:
     return retry == "all" or (retry == "died" and died)
 
 
-def assemble(out: StoreLike, identity: Identity, assets: Sequence[Asset], scenes: int) -> Manifest:
-    """Make the dataset of scenes 0 … scenes - 1 and end the run: what is staged after them goes.
+def assemble(
+    out: StoreLike,
+    identity: Identity,
+    assets: Sequence[Asset],
+    end_scene: int,
+    part: DatasetPart | None = None,
+) -> Manifest:
+    """Make the dataset of the scenes before `end_scene` and end the run: later staged ones go.
+
+    Parameters are those of `commit_scenes`.
 
     Raises
     ------
@@ -219,15 +288,20 @@ def assemble(out: StoreLike, identity: Identity, assets: Sequence[Asset], scenes
         A scene is neither in the dataset nor staged, or a file is damaged.
 
     """
-    manifest = commit_scenes(Staging(store_of(out), identity.digest()), identity, assets, scenes)
+    staging = Staging(store_of(out), identity.digest())
+    manifest = commit_scenes(staging, identity, assets, end_scene, part)
     end_staging(out)
     return manifest
 
 
 def commit_scenes(
-    staging: Staging, identity: Identity, assets: Sequence[Asset], scenes: int
+    staging: Staging,
+    identity: Identity,
+    assets: Sequence[Asset],
+    end_scene: int,
+    part: DatasetPart | None = None,
 ) -> Manifest:
-    """Make the dataset of scenes 0 … scenes - 1 from staged scenes and what is there already.
+    """Make the dataset of the scenes before `end_scene` from staged ones and what is there already.
 
     Later scenes stay staged, and others may be staged meanwhile. The files of a dataset do not
     depend on how many smaller ones were made on the way.
@@ -238,8 +312,10 @@ def commit_scenes(
         Staged scenes and their identity.
     assets
         All assets of the catalogue.
-    scenes
-        Number of scenes; all of them when the dataset holds more already.
+    end_scene
+        Number after that of the last scene; the dataset keeps what it holds beyond it.
+    part
+        Range of scenes, where they are to be a part of a dataset; else scenes begin at 0.
 
     Raises
     ------
@@ -257,25 +333,24 @@ def commit_scenes(
     journal = Journal(store)
     journal.sweep(old)
     if old is None:
-        _refuse_strangers(store)
-    first = old.scenes if old else 0
-    scenes = max(scenes, first)
+        refuse_strangers(store)
+    first = part.first_scene if part else 0
+    held = old.scene_numbers.stop if old else first
+    end_scene = max(end_scene, held)
     given_up = [entry.scene for entry in old.quarantined] if old else []
-    states = staged_scenes(staging, [*given_up, *range(first, scenes)])
-    missing = [k for k in range(first, scenes) if k not in states]
+    states = staged_scenes(staging, [*given_up, *range(held, end_scene)])
+    missing = [k for k in range(held, end_scene) if k not in states]
     if missing:
         raise CorruptDataError(
             f"{store.at('')}: {len(missing)} scenes are not finished, "
             f"first {missing[0]}: generate again"
         )
-    source = SceneSource(staging, old, states)
-    files = put_shards(journal, source, assets)
-    manifest = _manifest(identity, scenes, old, states, source, files)
-    manifest = put_metadata(journal, store, manifest)
-    journal.note(old.paths() if old else ())
-    journal.announce(MANIFEST)
-    manifest = write_manifest(store, manifest)
-    journal.sweep(manifest)
+    source = SceneSource(store, old, staging, states)
+    kinds = hardware_of([old] if old else [], hardware())
+    wanted = Wanted(identity, end_scene - first, kinds, part)
+    manifest = put_dataset(
+        journal, source, assets_table(assets), wanted, old, states=tuple(states.values())
+    )
     remove_scenes(staging, states)
     return manifest
 
@@ -294,22 +369,74 @@ def end_staging(out: StoreLike) -> None:
     clear_staging(store)
 
 
-def _manifest(
-    identity: Identity,
-    scenes: int,
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """Description of a dataset to write, which its scenes do not give."""
+
+    identity: Identity
+    scenes: int
+    """Number of scenes, quarantined ones included."""
+    hardware: tuple[str, ...]
+    """Names of the arithmetic that the scenes were made with; empty where it is not known."""
+    part: DatasetPart | None = None
+    """Range of a part; None for a dataset."""
+
+
+def put_dataset(
+    journal: Journal,
+    source: SceneSource,
+    assets: pa.Table,
+    wanted: Wanted,
     old: Manifest | None,
-    states: Mapping[int, SceneState],
+    *,
+    states: Sequence[SceneState] = (),
+    parts: Sequence[Manifest] = (),
+) -> Manifest:
+    """Write a dataset's files, then its manifest, and remove what is left of the one before.
+
+    Parameters
+    ----------
+    journal
+        Journal of the commit.
+    source
+        Rows of all its scenes.
+    assets
+        Rows of all assets of the catalogue.
+    wanted
+        Statements of the manifest that its scenes do not give.
+    old, states, parts
+        Origins of the scenes: the manifest in place, staged scenes, parts of the dataset.
+
+    """
+    store = source.store
+    files = put_shards(journal, source, assets)
+    before = (*((old,) if old else ()), *parts)
+    manifest = put_metadata(journal, store, _manifest(wanted, before, states, source, files))
+    journal.note(old.paths() if old else ())
+    journal.announce(MANIFEST)
+    manifest = write_manifest(store, manifest)
+    journal.sweep(manifest)
+    return manifest
+
+
+def _manifest(
+    wanted: Wanted,
+    before: Sequence[Manifest],
+    states: Sequence[SceneState],
     source: SceneSource,
     files: tuple[DataFile, ...],
 ) -> Manifest:
-    redraws = Counter(old.redraws if old else {})
-    quarantined = {entry.scene: entry for entry in old.quarantined} if old else {}
-    for scene, state in states.items():
+    redraws: Counter[str] = Counter()
+    quarantined: dict[int, Quarantined] = {}
+    for manifest in before:
+        redraws.update(manifest.redraws)
+        quarantined |= {entry.scene: entry for entry in manifest.quarantined}
+    for state in states:
         redraws.update(state.redraws)
-        quarantined.pop(scene, None)
+        quarantined.pop(state.scene, None)
         if state.quarantined:
-            quarantined[scene] = Quarantined(
-                scene, state.scene_id, state.attempts, state.quarantined, state.died
+            quarantined[state.scene] = Quarantined(
+                state.scene, state.scene_id, state.attempts, state.quarantined, state.died
             )
     counts: dict[str, Counts] = {
         split: Counts(
@@ -318,6 +445,7 @@ def _manifest(
         )
         for split in SPLITS
     }
+    identity = wanted.identity
     return Manifest(
         FORMAT_VERSION,
         identity.generator,
@@ -327,17 +455,19 @@ def _manifest(
         identity.catalogue_digest,
         json.loads(json.dumps(identity.config, sort_keys=True)),
         counts,
-        scenes,
+        wanted.scenes,
         dict(sorted(redraws.items())),
         tuple(entry for _, entry in sorted(quarantined.items())),
         files,
-        hardware=_hardware(old),
+        requires=("part",) if wanted.part else (),
+        hardware=wanted.hardware,
         obstacle_shares=dict(identity.obstacle_shares) or None,
+        part=wanted.part,
     )
 
 
-def _hardware(old: Manifest | None) -> tuple[str, ...]:
-    """Return the arithmetic of an old dataset's scenes and of this machine; () if not known."""
-    if old is not None and old.scenes and not old.hardware:
+def hardware_of(manifests: Sequence[Manifest], *more: str) -> tuple[str, ...]:
+    """Return the arithmetic of datasets and of further scenes; () where one is not known."""
+    if any(manifest.scenes and not manifest.hardware for manifest in manifests):
         return ()
-    return tuple(sorted({*(old.hardware if old else ()), hardware()}))
+    return tuple(sorted({*more, *(name for each in manifests for name in each.hardware)}))

@@ -34,6 +34,7 @@ def inconsistencies(manifest: Manifest) -> Iterator[str]:
 
     """
     yield from _wrong_types(manifest)
+    yield from _wrong_part(manifest)
     yield from _wrong_files(manifest)
     yield from _wrong_quarantine(manifest)
     yield from _wrong_counts(manifest)
@@ -54,6 +55,19 @@ def _wrong_types(manifest: Manifest) -> Iterator[str]:
         for reason, count in manifest.redraws.items():
             if not _is_count(count):
                 yield f"redraws: {reason!r}: expected a number from 0, got {count!r}"
+
+
+def _wrong_part(manifest: Manifest) -> Iterator[str]:
+    part = manifest.part
+    if part is None:
+        return
+    first, end = part.first_scene, part.end_scene
+    if not _is_count(first) or not _is_count(end) or not first < end:
+        yield f"part: expected scenes from a first one up to an end, got {first!r} up to {end!r}"
+    elif type(manifest.scenes) is int and manifest.scenes > end - first:
+        yield f"part: {end - first} scenes from {first} up to {end}, but {manifest.scenes} stated"
+    if not isinstance(part.rules, str) or not _SHA256.fullmatch(part.rules):
+        yield f"part: rules: expected 64 hexadecimal digits, got {part.rules!r}"
 
 
 def _wrong_files(manifest: Manifest) -> Iterator[str]:
@@ -90,8 +104,10 @@ def _wrong_quarantine(manifest: Manifest) -> Iterator[str]:
             or not isinstance(entry.died, bool)
         ):
             yield f"quarantined: {entry.scene_id!r}: expected its scene, attempts and reason"
-        elif _is_count(manifest.scenes) and entry.scene >= manifest.scenes:
-            yield f"quarantined: {entry.scene_id}: expected a scene below {manifest.scenes}"
+        elif _is_count(manifest.scenes) and entry.scene not in manifest.scene_numbers:
+            numbers = manifest.scene_numbers
+            stated = f"{numbers.start} … {numbers.stop - 1}"
+            yield f"quarantined: {entry.scene_id}: expected a scene of {stated}"
     yield from _repeated("quarantined", [str(entry.scene_id) for entry in manifest.quarantined])
 
 

@@ -41,17 +41,17 @@ class Journal:
     """
 
     def __init__(self, store: Store) -> None:
-        self._store = store
+        self.store = store
         self._names = set(journal_names(store))
 
     def put(self, name: str, data: bytes) -> None:
         """Note a name, then store a blob under it."""
         self.announce(name)
-        self._store.put(name, data)
+        self.store.put(name, data)
 
     def announce(self, *names: str) -> None:
         """Note names under which blobs are to be put, and those of their temporary files."""
-        temporary = (name for name in map(temporary_of, names) if not exists(self._store, name))
+        temporary = (name for name in map(temporary_of, names) if not exists(self.store, name))
         self.note([*names, *temporary])
 
     def note(self, names: Iterable[str]) -> None:
@@ -59,16 +59,16 @@ class Journal:
         if not self._names.issuperset(names := set(names)):
             self._names |= names
             text = json.dumps(sorted(self._names), indent=1) + "\n"
-            self._store.put(JOURNAL, text.encode())
+            self.store.put(JOURNAL, text.encode())
 
     def sweep(self, manifest: Manifest | None) -> None:
         """Remove all files that are noted and that the manifest in place does not name."""
         for name in sorted(self._names - (manifest.paths() if manifest else frozenset())):
-            self._store.remove(name)
-        self._store.remove(JOURNAL)
-        for name in self._store.names(STAGING):
+            self.store.remove(name)
+        self.store.remove(JOURNAL)
+        for name in self.store.names(STAGING):
             if final_of(name) == JOURNAL:  # its own temporary file, after a kill
-                self._store.remove(name)
+                self.store.remove(name)
         self._names.clear()
 
 

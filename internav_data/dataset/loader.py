@@ -137,7 +137,9 @@ class Dataset(Generic[E]):
 
     def __repr__(self) -> str:
         chosen = f", split={self.split!r}" if self.split else ""
-        return f"Dataset({str(self.path)!r}{chosen}, {len(self)} episodes)"
+        part = self.manifest.part
+        range_ = f", part {part.first_scene}:{part.end_scene}" if part else ""
+        return f"Dataset({str(self.path)!r}{chosen}{range_}, {len(self)} episodes)"
 
     def _repr_html_(self) -> str:
         """Return the dataset's statistics for a notebook."""

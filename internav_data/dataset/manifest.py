@@ -106,6 +106,18 @@ class Counts:
 
 
 @dataclass(frozen=True, slots=True)
+class DatasetPart:
+    """Range of scenes that a part of a dataset is to hold, and the code that makes them."""
+
+    first_scene: int
+    """Number of its first scene."""
+    end_scene: int
+    """Number after that of its last scene once it is finished."""
+    rules: str
+    """Digest of the code that makes its scenes, 64 hexadecimal digits."""
+
+
+@dataclass(frozen=True, slots=True)
 class Manifest:
     """Description of a dataset: its identity, its counts and its files."""
 
@@ -120,7 +132,8 @@ class Manifest:
     counts: Mapping[str, Counts]
     """Counts by split."""
     scenes: int
-    """Number of scenes, 0 … scenes - 1, quarantined ones included; the others are in the files."""
+    """Number of scenes, quarantined ones included: 0 … scenes - 1, or as many from the first one of
+    a part on. Those that are not quarantined are in the files."""
     redraws: Mapping[str, int]
     """Number of redraws while generating, by reason."""
     quarantined: tuple[Quarantined, ...]
@@ -134,9 +147,18 @@ class Manifest:
     where it is not known. Machines of the same name make the same bytes."""
     obstacle_shares: Mapping[str, float] | None = None
     """Share of each type of obstacle among what is drawn; null in datasets of earlier releases."""
+    part: DatasetPart | None = None
+    """Range of a part of a dataset, which `internav-gen merge` joins with the others; null for a
+    dataset, whose scenes begin at 0."""
     sha256: str = ""
     """SHA-256 of the canonical text of all other keys (docs/dataset.md), 64 hexadecimal digits;
     filled in when the manifest is written."""
+
+    @property
+    def scene_numbers(self) -> range:
+        """Numbers of its scenes, quarantined ones included."""
+        first = self.part.first_scene if self.part else 0
+        return range(first, first + self.scenes)
 
     def of(self, table: str, split: str | None = None) -> tuple[DataFile, ...]:
         """Return the files of one table (of one split, if given) in order."""
@@ -264,6 +286,8 @@ def _parse(path: str, raw: dict[str, Any]) -> Manifest:
         values["files"] = tuple(_made(DataFile, f) for f in raw["files"])
         values["requires"] = tuple(map(str, raw.get("requires", ())))
         values["hardware"] = tuple(map(str, raw.get("hardware") or ()))
+        if raw.get("part") is not None:
+            values["part"] = _made(DatasetPart, raw["part"])
         if raw.get("metadata") is not None:
             values["metadata"] = tuple(_made(MetadataFile, m) for m in raw["metadata"])
         manifest = _made(Manifest, values)

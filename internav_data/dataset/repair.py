@@ -56,7 +56,7 @@ class Damage:
         left_out = {entry.scene for entry in self.manifest.quarantined}
         kept = [
             scene
-            for scene in range(self.manifest.scenes)
+            for scene in self.manifest.scene_numbers
             if split_of_scene(scene) == file.split and scene not in left_out
         ]
         files, size = self.manifest.of(file.table, file.split), shards.SCENES_PER_SHARD[file.table]

@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import groupby
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -25,6 +26,7 @@ from internav_data.dataset.tables import ASSETS, EPISODES, SCENES, SPECS, TableS
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from internav_data.core.storage import Store
     from internav_data.dataset.journal import Journal
     from internav_data.records import Asset, Split
 
@@ -35,52 +37,80 @@ _DIGITS = 8
 
 
 @dataclass(frozen=True, slots=True)
+class _Home:
+    """A file of a finished dataset."""
+
+    store: Store
+    file: DataFile
+
+    def read(self, columns: Sequence[str] | None = None) -> pa.Table:
+        with open_file(self.store, self.file, SPECS[self.file.table]) as opened:
+            return opened.read_all(columns)
+
+
+@dataclass(frozen=True, slots=True)
 class _Span:
     """Rows start … end - 1 of a file."""
 
-    file: DataFile
+    home: _Home
     start: int
     end: int
 
 
 class SceneSource:
-    """The rows of scenes, from an older version of the dataset or from staging."""
+    """The rows of scenes: from an older version of the dataset, from parts of it, from staging.
+
+    Parameters
+    ----------
+    store, old
+        Store of the dataset, and the manifest in place.
+    staging, states
+        Staged scenes, by number.
+    parts
+        Stores and manifests of finished datasets with other scenes.
+
+    """
 
     def __init__(
-        self, staging: Staging, old: Manifest | None, states: Mapping[int, SceneState]
+        self,
+        store: Store,
+        old: Manifest | None,
+        staging: Staging | None = None,
+        states: Mapping[int, SceneState] = MappingProxyType({}),
+        parts: Sequence[tuple[Store, Manifest]] = (),
     ) -> None:
-        self._staging, self.store = staging, staging.store
+        self.store, self._staging = store, staging
         self._states = {s.scene_id: s for s in states.values() if not s.quarantined}
         self._old_files = old.files if old else ()
         self._old_digests = {file.path: file.sha256 for file in self._old_files}
         self._held: dict[str, list[str]] = {}
         self._home: dict[tuple[str, str], _Span] = {}
-        self._last: tuple[str, pa.Table] | None = None
+        self._last: tuple[_Home, pa.Table] | None = None
         self.scenes: dict[Split, list[str]] = {split: [] for split in SPLITS}
-        for file in self._old_files:
-            if file.table != "assets":
-                self._find_scenes(file)
-            if file.table == "scenes" and file.split is not None:
-                self.scenes[file.split] += self._held[file.path]
+        for home in (_Home(store, file) for file in self._old_files):
+            self._held[home.file.path] = self._find_scenes(home)
+        for place, manifest in parts:
+            for file in manifest.files:
+                self._find_scenes(_Home(place, file))
         for state in self._states.values():
             self.scenes[state.split].append(state.scene_id)
         for scenes in self.scenes.values():
             scenes.sort()  # by number, of six digits: a scene may be made long after its neighbours
 
-    def _find_scenes(self, file: DataFile) -> None:
-        """Note which rows of a file are a scene's: they stand together."""
-        column = self._read(file, SPECS[file.table], ["scene_id"])["scene_id"]
+    def _find_scenes(self, home: _Home) -> list[str]:
+        """Note which rows of a file are a scene's, as they stand together; return the scenes."""
+        file = home.file
+        if file.split is None:  # assets
+            return []
+        column = home.read(["scene_id"])["scene_id"]
         runs, end = pc.value_counts(column).to_pylist(), 0
-        self._held[file.path] = [run["values"] for run in runs]
         for run in runs:
             start, end = end, end + run["counts"]
-            self._home[file.table, run["values"]] = _Span(file, start, end)
-
-    def _read(
-        self, file: DataFile, spec: TableSpec[Any], columns: Sequence[str] | None = None
-    ) -> pa.Table:
-        with open_file(self.store, file, spec) as opened:
-            return opened.read_all(columns)
+            self._home[file.table, run["values"]] = _Span(home, start, end)
+        scenes = [run["values"] for run in runs]
+        if file.table == SCENES.name:
+            self.scenes[file.split] += scenes
+        return scenes
 
     def in_place(self, path: str, sha256: str) -> bool:
         """Return whether the older dataset has this very file."""
@@ -106,6 +136,8 @@ class SceneSource:
         return pa.concat_tables(tables).combine_chunks()
 
     def _new_rows(self, spec: TableSpec[Any], scene_id: str) -> pa.Table:
+        if self._staging is None:
+            raise AssertionError  # states come with their staging
         scene = self._states[scene_id].scene
         return read_staged_rows(self._staging, scene, house=spec is SCENES)
 
@@ -113,31 +145,29 @@ class SceneSource:
         """Yield the rows of older scenes, those that stand together in a file as one table."""
         spans: list[_Span] = []
         for scene_id in scenes:
-            home = self._home.get((spec.name, scene_id))
-            if home is None:
+            span = self._home.get((spec.name, scene_id))
+            if span is None:
                 continue  # a scene without episodes
-            if spans and (spans[-1].file.path, spans[-1].end) == (home.file.path, home.start):
-                home = _Span(home.file, spans.pop().start, home.end)
-            spans.append(home)
+            if spans and (spans[-1].home, spans[-1].end) == (span.home, span.start):
+                span = _Span(span.home, spans.pop().start, span.end)
+            spans.append(span)
         for span in spans:
-            if self._last is None or self._last[0] != span.file.path:
-                self._last = (span.file.path, self._read(span.file, spec))
+            if self._last is None or self._last[0] != span.home:
+                self._last = (span.home, span.home.read())
             yield self._last[1].slice(span.start, span.end - span.start)
 
 
-def put_shards(
-    journal: Journal, source: SceneSource, assets: Sequence[Asset]
-) -> tuple[DataFile, ...]:
+def put_shards(journal: Journal, source: SceneSource, assets: pa.Table) -> tuple[DataFile, ...]:
     """Put all files of a dataset below `data/` and return them as they belong in the manifest.
 
     Episodes come in shards of 240 scenes and scenes in shards of 2,400, split by split, in order
-    of scene and index.
+    of scene and index; `assets` are all rows of the catalogue (see `assets_table`).
     """
     files = []
     for spec in (EPISODES, SCENES):
         for split in SPLITS:
             files += _put_split(journal, source, spec, split)
-    return (*files, _put(journal, source, assets_table(assets), ASSETS, "assets", None))
+    return (*files, _put(journal, source, assets, ASSETS, "assets", None))
 
 
 def assets_table(assets: Sequence[Asset]) -> pa.Table:

@@ -16,7 +16,7 @@ from internav_data.records.splits import split_of_scene
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from internav_data.dataset import Identity, Staging
+    from internav_data.dataset import DatasetPart, Identity, Staging
     from internav_data.generation.progress import GenerationProgress
     from internav_data.records import Asset
 
@@ -34,6 +34,8 @@ class PrefixCommits:
         Numbers of the scenes that need not be made.
     progress
         Reporter, told how many scenes can be read.
+    part
+        Range of scenes, where they are to be a part of a dataset.
 
     """
 
@@ -44,14 +46,18 @@ class PrefixCommits:
         assets: Sequence[Asset],
         done: Collection[int],
         progress: GenerationProgress,
+        part: DatasetPart | None = None,
     ) -> None:
         self._staging, self._identity, self._assets = staging, identity, assets
-        self._progress = progress
-        self.held = read_manifest(staging.store).scenes if has_manifest(staging.store) else 0
-        """Number of scenes that can be read."""
-        self._ended = {*done, *range(self.held)}
-        self._first_missing = self._full = self._train = 0
-        progress.readable = self.held
+        self._progress, self._part = progress, part
+        self._first = part.first_scene if part else 0
+        store = staging.store
+        held = read_manifest(store).scene_numbers if has_manifest(store) else range(0)
+        self._held = held.stop or self._first
+        self._ended = {*done, *held}
+        self._first_missing = self._full = self._first
+        self._train = 0
+        progress.readable = len(held)
         self._advance()
 
     def add(self, scene: int) -> None:
@@ -72,15 +78,16 @@ class PrefixCommits:
             if train and self._train % shards.SCENES_PER_SHARD["episodes"] == 0:
                 self._full = self._first_missing
 
-    def _commit(self, scenes: int) -> None:
-        if scenes <= self.held or not self._any_good(scenes):
+    def _commit(self, end: int) -> None:
+        if end <= self._held or not self._any_good(end):
             return
-        commit_scenes(self._staging, self._identity, self._assets, scenes)
-        self.held = self._progress.readable = scenes
+        commit_scenes(self._staging, self._identity, self._assets, end, self._part)
+        self._held = end
+        self._progress.readable = end - self._first
 
-    def _any_good(self, scenes: int) -> bool:
-        """Return whether a dataset of the first scenes would hold one: none was ever refused."""
-        if self.held:
+    def _any_good(self, end: int) -> bool:
+        """Return whether a dataset of the scenes before `end` would hold one."""
+        if self._held > self._first:
             return True
-        states = staged_scenes(self._staging, range(scenes))
+        states = staged_scenes(self._staging, range(self._first, end))
         return any(not state.quarantined for state in states.values())

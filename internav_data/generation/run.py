@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Final
 from internav_data.core.extras import require
 from internav_data.core.interrupts import InterruptedRunError, Interrupts
 from internav_data.core.messages import Done, Failed, Recipe
-from internav_data.core.storage import FolderStore
+from internav_data.core.storage import FolderStore, disk_errors
 from internav_data.dataset import (
     STAGING,
+    DatasetPart,
     Identity,
     any_staged,
     assemble,
@@ -54,7 +55,6 @@ from internav_data.physics.engines.installed import require_engine
 from internav_data.records import Pose
 from internav_data.records.errors import (
     CorruptDataError,
-    InternavError,
     QuarantineError,
     UsageError,
 )
@@ -62,7 +62,7 @@ from internav_data.records.splits import split_of_scene
 from internav_data.records.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable
     from pathlib import Path
 
     from internav_data.catalog import Catalogue
@@ -88,7 +88,7 @@ TAIL_SCENES = 8
 def generate(
     out: Path,
     config: GenerationConfig,
-    scenes: int,
+    scenes: int | range,
     workers: int = 0,
     progress: GenerationProgress | None = None,
     assets: Catalogue | None = None,
@@ -97,7 +97,7 @@ def generate(
     *,
     retry_quarantined: bool = False,
 ) -> Report:
-    """Make a dataset of scenes 0 to scenes - 1, continue an unfinished one, or extend one.
+    """Make a dataset of scenes 0 to scenes - 1 or a part of one, continue it, or extend it.
 
     The first scenes can be read while the others are being made. Quarantined scenes whose workers
     died are tried again.
@@ -109,7 +109,8 @@ def generate(
     config
         Settings of every scene.
     scenes
-        Number of scenes that the dataset is to hold.
+        Number of scenes that the dataset is to hold; or a range of scenes: then it is a part of a
+        dataset, which `internav_data.dataset.merge` joins with others.
     workers
         Number of scenes made at the same time; 0 for the executor's default, one a core.
     progress
@@ -145,24 +146,28 @@ def generate(
     # In a worker, what is missing would be a failure of each scene.
     require("numba", "platformdirs", "scipy")
     progress = progress or GenerationProgress()
-    check_scenes(scenes)
+    numbers = check_scenes(scenes)
     chosen = get_executor(executor, workers) if isinstance(executor, str) else executor
     config.check()
-    with _disk_errors(out):
+    with disk_errors(out):
         _require_engine(config, out)
     assets = assets or _catalogue(config)
     identity = identity_for(config, assets)
-    with _disk_errors(out):
+    part = (
+        None if isinstance(scenes, int) else DatasetPart(scenes.start, scenes.stop, identity.rules)
+    )
+    with disk_errors(out):
         if out.exists() and not out.is_dir():
             raise UsageError(f"{out} is a file: give a folder that is new, empty or a dataset")
         store = FolderStore(out)
         with store.lock(BUSY):
             _forget_idle_staging(store)
-            staging = open_staging(store, identity, _FIRST.identity(assets.digest))
-            done = _done_before(staging, scenes, "all" if retry_quarantined else "died")
-            commits = PrefixCommits(staging, identity, _all_of(assets), done, progress)
-            scenes = max(scenes, commits.held)
-            queue = _SceneQueue(config, scenes, tuple(k for k in range(scenes) if k not in done))
+            staging = open_staging(store, identity, _FIRST.identity(assets.digest), part)
+            done = _done_before(staging, numbers, "all" if retry_quarantined else "died")
+            numbers = range(numbers.start, max(numbers.stop, _held_end(store)))
+            part = replace(part, end_scene=numbers.stop) if part else None
+            commits = PrefixCommits(staging, identity, _all_of(assets), done, progress, part)
+            queue = _SceneQueue(config, numbers, tuple(k for k in numbers if k not in done))
             recipe = Recipe(setup, ScenePayload(config, assets, staging))
             with Interrupts() as stop:
                 _repair(chosen, recipe, progress, stop)
@@ -170,7 +175,7 @@ def generate(
                 if stop():
                     commits.commit_all()
                     raise InterruptedRunError(_interruption(out, progress), stop.signum)
-            manifest = _assembled(staging, identity, assets, scenes, progress)
+            manifest = _assembled(staging, identity, assets, numbers, progress, part)
     return report_of(out, manifest, progress)
 
 
@@ -244,17 +249,26 @@ def check_standing(assets: Iterable[Asset], engine: str = DEFAULT_ENGINE) -> Non
         )
 
 
-def check_scenes(scenes: int) -> None:
-    """Check the number of scenes of a dataset.
+def check_scenes(scenes: int | range) -> range:
+    """Return the numbers of a dataset's scenes, given how many they are or which.
 
     Raises
     ------
     UsageError
-        It is not 1 to `MAX_SCENES`.
+        They are none, or beyond `MAX_SCENES`.
 
     """
+    if isinstance(scenes, range):
+        first, end = scenes.start, scenes.stop
+        if scenes.step != 1 or not 0 <= first < end <= MAX_SCENES:
+            raise UsageError(
+                f"scene range is {first}:{end}: expected A:B with 0 <= A < B <= {MAX_SCENES:,}, "
+                "for the scenes A up to B - 1"
+            )
+        return scenes
     if not 1 <= scenes <= MAX_SCENES:
         raise UsageError(f"scenes is {scenes}: ask for 1 to {MAX_SCENES:,} scenes")
+    return range(scenes)
 
 
 def identity_for(config: GenerationConfig, assets: Catalogue) -> Identity:
@@ -275,16 +289,22 @@ def _all_of(assets: Catalogue) -> tuple[Asset, ...]:
     return tuple(assets.assets.values())
 
 
-def _done_before(staging: Staging, scenes: int, retry: Retry) -> frozenset[int]:
+def _done_before(staging: Staging, numbers: range, retry: Retry) -> frozenset[int]:
     done, store = done_scenes(staging, retry), staging.store
-    held = read_manifest(store).scenes if has_manifest(store) else 0
-    most = max(done, default=-1) + 1
-    if held < scenes < most:
+    first, end = min(done, default=numbers.start), max(done, default=-1) + 1
+    if first < numbers.start or _held_end(store) < numbers.stop < end:
+        least = min(first, numbers.start)
+        wanted = f"--scene-range {least}:{end}" if numbers.start else f"--scenes {end}"
         raise UsageError(
-            f"{store.at('')}: scenes up to {most - 1} are finished there and would be lost: ask "
-            f"for --scenes {most} or more, or remove {store.at(STAGING)} first"
+            f"{store.at('')}: scenes {first} to {end - 1} are finished there and would be lost: "
+            f"ask for {wanted} or more, or remove {store.at(STAGING)} first"
         )
     return done
+
+
+def _held_end(store: Store) -> int:
+    """Return the number after that of the last scene of the dataset in place; 0 without one."""
+    return read_manifest(store).scene_numbers.stop if has_manifest(store) else 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,8 +312,8 @@ class _SceneQueue:
     """Scenes that a run has to make."""
 
     config: GenerationConfig
-    scenes: int
-    """Number of scenes of the dataset, those made before included."""
+    numbers: range
+    """Numbers of the dataset's scenes, those made before included."""
     todo: tuple[int, ...]
     """Scenes to make, ascending."""
 
@@ -322,8 +342,9 @@ def _make(
 ) -> None:
     """Have the scenes made; those that cannot be are stored as quarantined."""
     staging: Staging = recipe.payload.staging
-    before = queue.scenes - len(queue.todo)
-    progress.begin(queue.scenes, before, sum(queue.expected(scene) for scene in queue.todo))
+    total = len(queue.numbers)
+    before = total - len(queue.todo)
+    progress.begin(total, before, sum(queue.expected(scene) for scene in queue.todo))
 
     def tick() -> bool:
         progress.tick()
@@ -392,12 +413,15 @@ def _assembled(
     staging: Staging,
     identity: Identity,
     assets: Catalogue,
-    scenes: int,
+    numbers: range,
     progress: GenerationProgress,
+    part: DatasetPart | None,
 ) -> Manifest:
-    store = staging.store
+    store, end = staging.store, numbers.stop
     staged = staged_scenes(staging)
-    if has_manifest(store) and min(staged, default=scenes) >= scenes:
+    if has_manifest(store) and min(staged, default=end) >= end:
+        if read_manifest(store).part != part:  # a longer one was asked for before
+            commit_scenes(staging, identity, _all_of(assets), end, part)
         if not staged:
             end_staging(store)
         return read_manifest(store)
@@ -407,12 +431,13 @@ def _assembled(
             f"{store.at(STAGING)}: its scenes were removed while this run was at work: run the "
             "command again, in a folder that stays"
         )
-    if not has_manifest(store) and all(state.quarantined for state in staged.values()):
+    none_is_good = all(state.quarantined for state in staged.values())
+    if part is None and not has_manifest(store) and none_is_good:
         raise _hopeless(store, len(staged), next(iter(staged.values())).quarantined)
-    progress.log(f"writing {scenes} scenes into {store.at('')}")
-    if max(staged) >= scenes:  # they stay for a run that asks for them
-        return commit_scenes(staging, identity, _all_of(assets), scenes)
-    return assemble(store, identity, _all_of(assets), scenes)
+    progress.log(f"writing {len(numbers)} scenes into {store.at('')}")
+    if max(staged) >= end:  # they stay for a run that asks for them
+        return commit_scenes(staging, identity, _all_of(assets), end, part)
+    return assemble(store, identity, _all_of(assets), end, part)
 
 
 def _forget_idle_staging(store: Store) -> None:
@@ -440,16 +465,3 @@ def _interruption(out: Path, progress: GenerationProgress) -> str:
         f"interrupted after {done} of {progress.scenes_total} scenes; {readable} in {out}: "
         "run the same command again to continue"
     )
-
-
-@contextlib.contextmanager
-def _disk_errors(out: Path) -> Iterator[None]:
-    """Turn errors of the disk into one that says what to do."""
-    try:
-        yield
-    except OSError as error:
-        where = error.filename or out
-        raise InternavError(
-            f"cannot write to {where}: {error.strerror or error}; make it writable or free some "
-            "space, then run the same command again: finished scenes are kept"
-        ) from error

@@ -298,7 +298,8 @@ def _check_references(
 def _check_counts(manifest: Manifest, keys: DatasetKeys, report: FindingCollector) -> None:
     """Check that every requested scene is present with the number of episodes of the config."""
     given_up = {q.scene_id for q in manifest.quarantined}
-    wanted = {f"scene-{k:06d}" for k in range(manifest.scenes)} - given_up
+    first = manifest.part.first_scene if manifest.part else 0
+    wanted = {f"scene-{first + k:06d}" for k in range(manifest.scenes)} - given_up
     missing, surplus = sorted(wanted - set(keys.scenes)), sorted(set(keys.scenes) - wanted)
     report.expect(
         not missing, "schema.scenes.all", f"{len(wanted)} scenes", f"without {missing[:3]}"

@@ -185,7 +185,7 @@ def given_up(**values):
         (lambda raw: raw.update(generator=1), "generator: expected"),
         (lambda raw: raw.update(redraws=[]), "redraws: expected"),
         (lambda raw: raw.update(redraws={"x": -1}), "redraws: 'x'"),
-        (given_up(scene=300, scene_id="scene-000300"), "expected a scene below 131"),
+        (given_up(scene=300, scene_id="scene-000300"), "expected a scene of 0 … 130"),
         (given_up(scene_id="scene-000004"), "quarantined: 'scene-.*expected its scene"),
         (given_up(scene="3"), "quarantined: 'scene-.*expected its scene"),
         (lambda raw: raw.update(quarantined=[{**Q}, {**Q}], scenes=132), "named 2 times"),
