@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[1]
 PICTURED = (0, 14, 0)
 """Seed, scene and episode of the picture."""
-FILMED = (0, 9, 1)
+FILMED = (0, 2, 2)
 """Seed, scene and episode of the replay."""
 
 

@@ -111,7 +111,7 @@ def _steps(out: Path, scenes: int, engine: Sequence[str]) -> Iterator[Sequence[s
         chosen = ("--scene", "6", "--episode", str(episode))
         yield "show", dataset, *chosen, "--out", str(out / name)
     films = ("--out", str(out / "replay.mp4"), "--out", str(out / "replay.gif"))
-    yield "replay", dataset, "9/1", "--force", *films
+    yield "replay", dataset, "2/2", "--force", *films
     page = str(out / "page.html")
     yield "view", dataset, "--html", page, "--sample", SAMPLE_EPISODES, "--force"
 

@@ -234,10 +234,19 @@ def load_agent(path: str | Path, which: str = "last") -> Agent[Any]:
 
     It has the attributes `method`, `config` and `progress`.
 
+    Parameters
+    ----------
+    path
+        A run's folder, a checkpoint's, or that of an exported agent.
+    which
+        `last` or `best`, of a run.
+
     Raises
     ------
-    UsageError, CorruptDataError
-        See `read`.
+    UsageError
+        There is no checkpoint.
+    CorruptDataError
+        The checkpoint is damaged, of another version, or its weights do not fit its config.
     """
     checkpoint = read(Path(path), which, training=False)
     agent = make_agent(checkpoint.method, checkpoint.config)
@@ -254,10 +263,21 @@ def export_agent(path: str | Path, folder: str | Path, which: str = "last") -> P
 
     The training tensors are left out: no run can be resumed from it.
 
+    Parameters
+    ----------
+    path
+        A run's folder, or a checkpoint's.
+    folder
+        Folder to write, which must not be there yet.
+    which
+        `last` or `best`, of a run.
+
     Raises
     ------
-    UsageError, CorruptDataError
-        See `read`; or the folder is there already.
+    UsageError
+        There is no checkpoint, or the folder is there already.
+    CorruptDataError
+        The checkpoint is damaged, of another version, or its weights do not fit its config.
     """
     folder = Path(folder)
     if folder.exists():

@@ -20,7 +20,7 @@ from internav_data.core.files import FileLimits, check_sha256, json_sha256, pars
 from internav_data.core.storage import Store, StoreLike, exists, store_of
 from internav_data.dataset.compatibility import present_settings
 from internav_data.dataset.consistency import inconsistencies
-from internav_data.dataset.location import making_command
+from internav_data.dataset.location import MINI, making_command
 from internav_data.dataset.parquet import TableFile, footer_sha256, open_parquet
 from internav_data.dataset.staging import IDENTITY, STAGING
 from internav_data.dataset.tables import FORMAT_VERSION, TABLES
@@ -249,7 +249,10 @@ def _absence(store: Store) -> str:
             f"{root}: the dataset is not finished (no {MANIFEST}, but .work/): "
             "run `internav-gen generate` on it again to resume"
         )
-    return f"{root}: no dataset here ({MANIFEST} is missing): `{making_command(root)}` makes one"
+    return (
+        f"{root}: no dataset here ({MANIFEST} is missing): `{making_command(root)}` makes one, "
+        f"`{MINI}` names the one that ships"
+    )
 
 
 def _check_version(path: str, raw: Any) -> None:  # noqa: ANN401 - JSON

@@ -209,6 +209,18 @@ class Expert:
     path_m: float
     """Length walked, metres: 0.25 m for each MoveAhead."""
 
+    @property
+    def summary(self) -> str:
+        """Numbers of actions, pushes and pickups in words."""
+        return (
+            f"{_counted(self.steps, 'action')}: {_counted(self.pushes, 'push', 'pushes')}, "
+            f"{_counted(self.picks, 'pick')}"
+        )
+
+
+def _counted(number: int, one: str, many: str = "") -> str:
+    return f"{number} {one if number == 1 else many or one + 's'}"
+
 
 @dataclass(frozen=True, slots=True)
 class Physics:
@@ -306,7 +318,7 @@ def _lines(episode: Episode) -> Iterator[str]:
     start, goal, expert = episode.start, episode.goal, episode.expert
     yield (
         f"Episode {episode.episode_id} ({episode.split}, seed {episode.seed}): {episode.mode}"
-        f"{', sealed' if episode.sealed else ''}, {episode.room_count} rooms, "
+        f"{', sealed' if episode.sealed else ''}, {_counted(episode.room_count, 'room')}, "
         f"{episode.rooms_on_path} on the path"
     )
     yield f"  start    ({start.x:g}, {start.y:g}) m, yaw {start.yaw_deg} deg, room {start.room}"
@@ -321,10 +333,7 @@ def _lines(episode: Episode) -> Iterator[str]:
     if expert is None:
         yield "  expert   none"
     else:
-        yield (
-            f"  expert   {expert.steps} actions: {expert.pushes} pushes, {expert.picks} picks, "
-            f"{expert.path_m:g} m walked"
-        )
+        yield f"  expert   {expert.summary}, {expert.path_m:g} m walked"
     yield f"  physics  {episode.physics.build}"
 
 

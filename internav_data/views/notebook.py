@@ -53,11 +53,7 @@ def episode_html(episode: Episode) -> str:
         f"<th>{head}</th>" for head in ("", "obstacle", "kg", "opens the lattice", "moves", "stays")
     )
     expert = episode.expert
-    told = (
-        "no expert"
-        if expert is None
-        else f"expert: {expert.steps} actions, {expert.pushes} pushes, {expert.picks} picks"
-    )
+    told = "no expert" if expert is None else f"expert: {expert.summary}"
     return (
         f"<div><pre>{facts}</pre>{_svg(episode)}<table><tr>{heads}</tr>{rows}</table>"
         f"<p>{escape(told)}</p></div>"

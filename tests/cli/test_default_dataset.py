@@ -59,7 +59,7 @@ def test_nothing_there_is_one_line_with_the_command_that_makes_one(call_program,
     assert (code, out) == (5, "")
     (line,) = err.splitlines()
     assert "internav-dataset: no dataset here" in line
-    assert "`internav-gen generate --scenes 120` makes one" in line
+    assert "`internav-gen generate --scenes 120` makes one, `mini` names the one that ships" in line
     assert not list(tmp_path.iterdir())
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import builders
 import pytest
 
-from internav_data.records import Outcome
+from internav_data.records import Expert, Outcome
 from internav_data.records.display import displayed, register_display
 
 
@@ -30,6 +30,21 @@ def test_an_episode_without_expert_or_path_can_be_told(hand_episode):
     told = repr(replace(hand_episode, expert=None, obstructed_path_m=None, obstacles=()))
     assert "expert   none" in told
     assert "cut off" in told
+
+
+@pytest.mark.parametrize(
+    ("counts", "words"),
+    [
+        ((1, 0, 0), "1 action: 0 pushes, 0 picks"),
+        ((36, 1, 1), "36 actions: 1 push, 1 pick"),
+        ((9, 2, 3), "9 actions: 2 pushes, 3 picks"),
+    ],
+)
+def test_an_expert_is_counted_in_words(hand_episode, counts, words):
+    steps, pushes, picks = counts
+    expert = Expert((11,), steps, pushes, picks, 2.0)
+    assert expert.summary == words
+    assert f"  expert   {words}, 2 m walked" in repr(replace(hand_episode, expert=expert))
 
 
 def test_a_house_is_a_line(hand_house):

@@ -250,5 +250,7 @@ def test_an_outcome_tells_the_path_in_the_units_of_the_header(
 ):
     """Lattice steps and the Euclidean length, as for the path without obstacles."""
     episode = replace(hand_episode, obstructed_path_steps=before)
-    pick = Outcome("pick", True, 0.0, after, metres, before is None and after is not None, 0.0, None)
+    pick = Outcome(
+        "pick", True, 0.0, after, metres, before is None and after is not None, 0.0, None
+    )
     assert outcome_text(episode, pick) == f"pick: in the agent's hand; {words}"
