@@ -55,7 +55,7 @@ from internav_data.records.errors import CorruptDataError, InternavError, UsageE
 if TYPE_CHECKING:
     from internav_data.envs.slot import EpisodeSnapshot
 
-FORMAT: Final = 2
+FORMAT: Final = 3
 FOLDER: Final = "checkpoints"
 POINTER: Final = "checkpoints.json"
 _SERIAL: Final = re.compile(r"\d{6,}")

@@ -53,6 +53,9 @@ class AgentConfig:
     intent policy's option probabilities; equation (7) run twice; or the uniform intent."""
     sync_every: Annotated[int, Bounds(1)] = 3
     """Rollouts between copies of the global policy into the intent policy (K)."""
+    hand_back_step: bool = False
+    """Let Push and Pick end by an action of their own that waits a step (-0.01). False: their Done
+    is the option's termination, drawn on arrival at a state, and costs no step."""
     forbidden: tuple[Literal["push", "pick"], ...] = ()
     """Options that are never opened."""
     initial_done_probability: Annotated[float, Bounds(1e-6, 0.5)] = 0.01
@@ -90,6 +93,9 @@ class PPOConfig:
     """Clip values by `clip_coef` too. 0.1 against returns near 10 throttles the critic."""
     vf_coef: Annotated[float, Bounds(0.0)] = 0.5
     """Weight of the value loss, half the squared error of values."""
+    scale_values: bool = True
+    """Divide the value loss by the running variance of returns. Against returns near 10 its
+    gradient takes nearly all that `max_grad_norm` leaves, and most where an episode succeeds."""
     ent_coef: Annotated[float, Bounds(0.0)] = 0.01
     """Weight of the entropy bonus."""
     gamma: Annotated[float, Bounds(0.0, 1.0)] = 0.99
@@ -298,7 +304,7 @@ _PRESETS: Final = {
         network=NetworkConfig(300, "paper", hidden=512, shared_encoder=False),
         ppo=PPOConfig(
             num_envs=12, num_steps=30, update_epochs=1, num_minibatches=1, clip_coef=0.1,
-            clip_vloss=True,
+            clip_vloss=True, scale_values=False,
         ),
         stages=StagesConfig(total_timesteps=10_000_000, side_by_side=False, decay_over="all"),
     ),

@@ -28,9 +28,19 @@ _LAYERS: Final = {
 """Channels, kernel, stride and padding of each convolution. `paper` is the released code's; `small`
 is made for 64x64 or 32x32 pixels on a CPU."""
 _ACTOR_GAIN: Final = 0.01
+_SCALE_RATE: Final = 0.2
+"""Weight of a rollout's variance in the running one of returns."""
+_MIN_SCALE: Final = 0.1
+"""Least deviation of returns that values are measured in."""
+_RIDGE: Final = 0.01
+"""Penalty on a fitted critic's change, in units of its inputs' mean square."""
 EMBEDDED: Final = 12
 """Length of an embedded intent (section 5.2)."""
 _RGB, _DEPTH = 3, 1
+_NEAR_M: Final = 0.25
+"""Distance over which the goal's nearness falls to 1/e, metres: a step of the agent."""
+_NEAR_WEIGHT: Final = 3.0
+"""Nearness at the goal itself."""
 L = TypeVar("L", nn.Linear, nn.Conv2d)
 _TINY: Final = 1e-12
 
@@ -79,19 +89,27 @@ class CameraEncoder(SensorEncoder):
 
 
 class GoalEncoder(SensorEncoder):
-    """Linear embedding of the point goal's distance, and of its bearing's cosine and sine."""
+    """Linear embedding of the point goal: distance, cosine and sine of the bearing, and nearness.
+
+    Nearness is 3 exp(-distance / 0.25 m), metres ahead and metres to the left: without these three
+    inputs a linear layer cannot tell the goal from a place 0.25 m beside it.
+    """
 
     sensors = ("goal",)
 
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__(config)
         self._scale_m, self.size = config.goal_scale_m, config.goal_embedding
-        self.linear = _linear(3, config.goal_embedding)
+        self.linear = _linear(6, config.goal_embedding)
 
     def forward(self, goal: Tensor) -> Tensor:
         """Return the embedding of `goal` (T, n, 2) metres and radians."""
-        distance, bearing = goal[..., 0] / self._scale_m, goal[..., 1]
-        out: Tensor = self.linear(torch.stack([distance, bearing.cos(), bearing.sin()], -1))
+        distance, cos, sin = goal[..., 0], goal[..., 1].cos(), goal[..., 1].sin()
+        scaled = distance / self._scale_m
+        near = _NEAR_WEIGHT * (-distance / _NEAR_M).exp()
+        out: Tensor = self.linear(
+            torch.stack([scaled, cos, sin, near, scaled * cos, scaled * sin], -1)
+        )
         return out
 
 
@@ -151,6 +169,53 @@ class Encoder(nn.Module):
         return torch.cat(features, -1)
 
 
+class ValueHead(nn.Linear):
+    """Linear critic whose output is in units of the returns' deviation.
+
+    So that the gradient of its loss has the size of a policy's: at returns near 10 the two are
+    clipped together to a tenth, and what a success teaches is lost. Pop-Art without the mean (van
+    Hasselt et al. 2016): a new scale changes the weights and leaves the values as they are.
+
+    Parameters
+    ----------
+    hidden
+        Number of inputs.
+    """
+
+    scale: Tensor
+
+    def __init__(self, hidden: int) -> None:
+        super().__init__(hidden, 1)
+        _initialised(self, 1.0)
+        self.register_buffer("scale", torch.ones(()))
+
+    def forward(self, out: Tensor) -> Tensor:
+        """Return values (T, n), in units of the reward, for the GRU's outputs (T, n, hidden)."""
+        return super().forward(out).squeeze(-1) * self.scale
+
+    @torch.no_grad()
+    def note_returns(self, variance: Tensor) -> None:
+        """Adapt the scale to a rollout's variance of returns."""
+        scale = self.scale.square().lerp(variance, _SCALE_RATE).sqrt().clamp(min=_MIN_SCALE)
+        for parameter in self.parameters():
+            parameter.mul_(self.scale / scale)
+        self.scale.copy_(scale)
+
+    @torch.no_grad()
+    def fit(self, out: Tensor, returns: Tensor, reduce: Callable[[Tensor], Tensor]) -> None:
+        """Fit the values of `out` (T, n, hidden) to `returns` (T, n) by ridge regression.
+
+        The penalty is on the distance from the present parameters; `reduce` sums across ranks.
+        """
+        inputs = functional.pad(out.flatten(0, 1), (0, 1), value=1.0).double()  # (T n, hidden + 1)
+        missing = ((returns - self(out)) / self.scale).flatten().double()
+        gram, moment = reduce(inputs.T @ inputs), reduce(inputs.T @ missing)
+        penalty = _RIDGE * gram.diagonal().mean() * torch.eye(len(gram), device=gram.device)
+        step = torch.linalg.solve(gram + penalty, moment).to(out.dtype)
+        self.weight.add_(step[:-1])
+        self.bias.add_(step[-1])
+
+
 class RecurrentActorCritic(nn.Module):
     """GRU with a linear actor and a linear critic.
 
@@ -173,12 +238,12 @@ class RecurrentActorCritic(nn.Module):
                 nn.init.zeros_(parameter)
         self.actor = _linear(hidden, len(probabilities), _ACTOR_GAIN)
         self.actor.bias.data.copy_(torch.tensor(probabilities).log())
-        self.critic = _linear(hidden, 1, 1.0)
+        self.critic = ValueHead(hidden)
 
     def value(self, out: Tensor) -> Tensor:
         """Return the critic's values (T, n) for the GRU's outputs (T, n, hidden)."""
         value: Tensor = self.critic(out)
-        return value.squeeze(-1)
+        return value
 
 
 class IntentConditionedPolicy(RecurrentActorCritic):

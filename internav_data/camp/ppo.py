@@ -14,8 +14,9 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from internav_data.camp.agents.protocol import Agent
+from internav_data.camp.agents.protocol import Agent, Batch
 from internav_data.camp.config import PPOConfig
+from internav_data.camp.networks import ValueHead
 from internav_data.camp.rollout import Rollout
 from internav_data.records.errors import NotFiniteError
 
@@ -61,7 +62,7 @@ def update(
     orders
         Permutation of the rollout's environments for each epoch, cut into minibatches.
     critic_only
-        Train the critic alone: it is new.
+        Train the critic alone: it is new. A linear one is fitted to the returns first.
     reduce
         All-reduce sum across ranks, each of which has part of every minibatch.
 
@@ -81,10 +82,14 @@ def update(
     advantages = rollout.advantages(config)
     returns = advantages + rollout.values
     explained = explained_variance(rollout.values, returns, reduce)
+    scale = value_scale(agent) if config.scale_values else 1.0
     if config.normalise_advantages:
         mean, variance = moments(advantages, reduce)
         advantages = (advantages - mean) / (variance.sqrt() + _EPSILON)
-    parameters = agent.critics() if critic_only else agent.optimised()
+    parameters = [p for critic in agent.critics() for p in critic.parameters()]
+    parameters = parameters if critic_only else agent.optimised()
+    if critic_only:
+        fit_critic(agent, rollout.batch, returns, reduce)
     limit = math.inf if critic_only or config.target_kl is None else config.target_kl
     rows: list[dict[str, float]] = []
     stopped, device = False, rollout.rewards.device
@@ -101,11 +106,13 @@ def update(
         stopped = row["kl"] > limit
         if stopped:
             break
-        loss = config.vf_coef * losses["value_loss"]
+        loss = config.vf_coef * losses["value_loss"] / scale**2
         if not critic_only:
             loss = loss + losses["policy_loss"] - config.ent_coef * losses["entropy"]
             loss = loss + losses["extra_loss"]
         row["grad_norm"] = step(optimiser, loss, parameters, config.max_grad_norm, reduce)
+    if config.scale_values:
+        rescale_critics(agent, returns, reduce)
     # Gradients: none where not a single step was taken.
     norms = [row["grad_norm"] for row in rows if "grad_norm" in row]
     means = {name: sum(row[name] for row in rows) / len(rows) for name in losses}
@@ -117,6 +124,36 @@ def update(
         "updates": float(len(norms)),
         "stopped": float(stopped),
     }
+
+
+def value_scale(agent: Agent[Any]) -> float:
+    """Return the deviation of returns that an agent's critics measure values in; 1 for none."""
+    scales = [float(c.scale) for c in agent.critics() if isinstance(c, ValueHead)]
+    return scales[0] if scales else 1.0
+
+
+def rescale_critics(agent: Agent[Any], returns: Tensor, reduce: Reduce = alone) -> None:
+    """Adapt the scale of an agent's critics to the deviation of returns (T, n)."""
+    _, variance = moments(returns, reduce)
+    for critic in agent.critics():
+        if isinstance(critic, ValueHead):
+            critic.note_returns(variance)
+
+
+@torch.no_grad()
+def fit_critic(
+    agent: Agent[Any], batch: Batch[Any], returns: Tensor, reduce: Reduce = alone
+) -> None:
+    """Fit an agent's critic to the returns (T, n) of a batch, where it is a single linear one.
+
+    Gradient steps on a last layer alone hardly move it.
+    """
+    match agent.critics():
+        case [ValueHead() as critic]:
+            found = agent.evaluate(batch)
+            check_finite(torch.arange(returns.shape[1]), found.value)
+            if found.critic_inputs is not None:
+                critic.fit(found.critic_inputs, returns, reduce)
 
 
 def moments(values: Tensor, reduce: Reduce = alone) -> tuple[Tensor, Tensor]:

@@ -235,7 +235,7 @@ def test_a_config_larger_than_its_weights_takes_no_memory(kept):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"format": 1}, "format 1: this release reads 2"),
+        ({"format": 1}, "format 1: this release reads 3"),
         ({"method": "ppo"}, "another agent's weights"),
         ({"method": 3}, "expected a method"),
         ({"config": []}, "expected a JSON object"),

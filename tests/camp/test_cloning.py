@@ -15,7 +15,6 @@ from internav_data.camp.agents.hierarchy import (  # noqa: E402
     OPTION_NAMES,
     PICK,
     PUSH,
-    STOP,
     WAIT,
     option_labels,
 )
@@ -25,22 +24,21 @@ from internav_data.records.errors import UsageError  # noqa: E402
 from internav_data.world.actions import ACTIONS, actions_of_option  # noqa: E402
 
 AHEAD, LEFT, RIGHT, DOWN, PUSHED, UP, DROP = 0, 1, 2, 3, 5, 9, 10
-N, P, I, S = NAVIGATE, PUSH, PICK, STOP
+N, P, I = NAVIGATE, PUSH, PICK
 
 
-def rows_of(actions, temporally_extended=True):
-    taken, label = option_labels(actions, temporally_extended=temporally_extended)
+def rows_of(actions, hand_back_step=False):
+    taken, label = option_labels(actions, temporally_extended=True, hand_back_step=hand_back_step)
     return list(zip(label.option.tolist(), label.choice.tolist(), taken, strict=True))
 
 
-def test_a_run_of_pushes_is_push_and_hands_back():
+def test_a_run_of_pushes_is_push():
     assert rows_of([AHEAD, PUSHED, PUSHED, LEFT, DONE]) == [
         (N, AHEAD, AHEAD),
         (P, PUSHED, PUSHED),
         (P, PUSHED, PUSHED),
-        (P, DONE, WAIT),
         (N, LEFT, LEFT),
-        (S, DONE, DONE),
+        (N, DONE, DONE),
     ]
 
 
@@ -51,18 +49,28 @@ def test_pickup_rotations_and_drop_are_pick():
         (I, LEFT, LEFT),
         (I, RIGHT, RIGHT),
         (I, DROP, DROP),
-        (I, DONE, WAIT),
         (N, RIGHT, RIGHT),
-        (S, DONE, DONE),
+        (N, DONE, DONE),
+    ]
+
+
+def test_a_hand_back_may_be_a_step():
+    assert rows_of([PUSHED, PUSHED, UP, DONE], hand_back_step=True) == [
+        (P, PUSHED, PUSHED),
+        (P, PUSHED, PUSHED),
+        (P, DONE, WAIT),
+        (I, UP, UP),
+        (I, DONE, WAIT),
+        (N, DONE, DONE),
     ]
 
 
 @pytest.mark.parametrize("between", [[AHEAD], [LEFT, AHEAD], [DOWN]])
 def test_a_move_between_pickup_and_drop_makes_two_interactions(between):
-    middle = [(N, action, action) for action in between]
-    assert rows_of([UP, *between, DROP]) == [
-        (I, UP, UP), (I, DONE, WAIT), *middle, (I, DROP, DROP), (I, DONE, WAIT)
-    ]  # fmt: skip
+    _, label = option_labels([UP, *between, DROP], temporally_extended=True)
+    assert label.option.tolist() == [I, *[N] * len(between), I]
+    assert label.decide.all()
+    assert label.open.tolist() == [N, I, *[N] * len(between)]
 
 
 @pytest.mark.parametrize("action", ACTIONS, ids=lambda action: action.label)
@@ -70,7 +78,8 @@ def test_every_action_is_labelled_with_an_option_that_can_take_it(action):
     _, label = option_labels([action], temporally_extended=True)
     taken_by = OPTION_NAMES[label.option[0]]
     assert action in actions_of_option(taken_by)
-    assert taken_by == action.options[0], "its own option, not one that borrows it"
+    own = "navigate" if action == DONE else action.options[0]  # as its auxiliary task pays it
+    assert taken_by == own, "its own option, not one that borrows it"
 
 
 @pytest.mark.parametrize("before", [[], [AHEAD], [PUSHED], [UP]])
@@ -79,46 +88,54 @@ def test_an_action_that_no_option_takes_is_refused_by_name(before):
         option_labels([*before, WAIT, DONE], temporally_extended=True)
 
 
-def test_decisions_and_what_is_told_of_them():
-    _, label = option_labels([PUSHED, PUSHED, AHEAD], temporally_extended=True)
-    assert label.decide.tolist() == [True, False, False, True]
-    assert label.open.tolist() == [0, P, P, 0]
-    assert label.used.tolist() == [0, 1, 2, 0]
+def test_decisions_and_the_state_before_them():
+    _, label = option_labels([PUSHED, PUSHED, AHEAD, PUSHED, UP], temporally_extended=True)
+    assert label.decide.tolist() == [True, False, True, True, True]
+    assert label.open.tolist() == [0, P, P, 0, P]
+    assert label.used.tolist() == [0, 1, 2, 0, 1]
 
 
 @pytest.mark.parametrize("count", [10, 11, 12, 22, 23])
-def test_the_eleventh_action_closes_without_a_hand_back(count):
-    taken, label = option_labels([PUSHED] * count, temporally_extended=True)
-    assert taken.count(WAIT) == (1 if count % 11 else 0)
-    assert label.decide.nonzero().flatten().tolist() == list(range(0, count, 11))
+@pytest.mark.parametrize("step", [False, True])
+def test_the_eleventh_action_closes(count, step):
+    taken, label = option_labels(
+        [*[PUSHED] * count, AHEAD], temporally_extended=True, hand_back_step=step
+    )
+    assert taken.count(WAIT) == (1 if step and count % 11 else 0)
+    last = len(taken) - 1
+    assert label.decide.nonzero().flatten().tolist() == [*range(0, count, 11), last]
     assert label.used.max() <= 10
+    assert label.open[last].item() == (P if not step and count % 11 else 0)
 
 
 def test_hrl_decides_at_every_step_and_never_waits():
     actions = [AHEAD, PUSHED, PUSHED, UP, LEFT, DROP, DONE]
     taken, label = option_labels(actions, temporally_extended=False)
     assert taken == label.choice.tolist() == actions
-    assert label.option.tolist() == [N, P, P, I, I, I, S]
+    assert label.option.tolist() == [N, P, P, I, I, I, N]
     assert label.decide.all()
     assert not label.open.any()
     assert not label.used.any()
 
 
-def test_labels_are_what_the_model_could_have_done(config):
+@pytest.mark.parametrize("step", [False, True])
+def test_labels_are_what_the_model_could_have_done(step):
     """Played by the state machine of the agent, labels give the same open options."""
     from internav_data.camp.agents.hierarchy import option_step
 
     rng = np.random.default_rng(0)
     for _ in range(20):
         actions = [*rng.choice([0, 1, 5, 5, 5, 9, 10], 60).tolist(), DONE]
-        taken, label = option_labels(actions, temporally_extended=True)
+        taken, label = option_labels(actions, temporally_extended=True, hand_back_step=step)
         opened = used = torch.zeros(1, dtype=torch.int64)
         for k, option in enumerate(label.option.tolist()):
             assert (label.open[k], label.used[k]) == (opened.item(), used.item())
-            assert label.decide[k] == (opened.item() == 0)
-            assert opened.item() in {0, option}
+            assert label.decide[k] or opened.item() == option
+            assert label.decide[k] == (opened.item() == 0) or not step
             opened, used, handed_back, _ = option_step(
-                label.option[k : k + 1], label.choice[k : k + 1], used
+                label.option[k : k + 1],
+                label.choice[k : k + 1],
+                used.masked_fill(label.decide[k], 0),
             )
             assert bool(handed_back) == (taken[k] == WAIT)
         assert [action for action in taken if action != WAIT] == actions
@@ -174,7 +191,7 @@ def test_experts_are_learnt_by_every_learner(experts, config, method):
     agent = make_agent(method, config(network={"hidden": 32}))
     optimiser = torch.optim.Adam(agent.optimised(), 1e-3)
     shown = Demonstrations(experts(), agent, EXPERTS.__getitem__)
-    critic = [p.detach().clone() for p in agent.critics()]
+    critic = [p.detach().clone() for head in agent.critics() for p in head.parameters()]
     losses = []
     for number in range(60):
         if number % 30 == 0:
@@ -185,7 +202,8 @@ def test_experts_are_learnt_by_every_learner(experts, config, method):
             agent.synchronise()
     assert losses[0] > 1.0
     assert losses[-1] < 0.35 * losses[0]
-    assert all(torch.equal(a, b) for a, b in zip(critic, agent.critics(), strict=True))
+    after = [p for head in agent.critics() for p in head.parameters()]
+    assert all(torch.equal(a, b) for a, b in zip(critic, after, strict=True))
 
 
 def test_each_update_goes_on_from_the_last_ones_hidden_states(experts, config, monkeypatch):
@@ -227,7 +245,8 @@ def test_hidden_states_go_on_between_updates(experts, config):
     torch.testing.assert_close(torch.cat(parts), whole, atol=1e-5, rtol=0)
 
 
-def test_the_datasets_experts_reach_their_goals_hand_backs_and_all(houses, config):
+@pytest.mark.parametrize("step", [False, True])
+def test_the_datasets_experts_reach_their_goals_hand_backs_and_all(houses, config, step):
     from internav_data.camp.cloning import experts_of
     from internav_data.dataset import load_dataset
     from internav_data.envs.vector import InterNavVectorEnv
@@ -246,7 +265,7 @@ def test_the_datasets_experts_reach_their_goals_hand_backs_and_all(houses, confi
             assert not said[3].any()
             return said
 
-    agent = make_agent("camp", config())
+    agent = make_agent("camp", config(agent={"hand_back_step": step}))
     shown = Demonstrations(Watched(), agent, experts_of(load_dataset(houses)))
     shown.loop.reset(seed=3)
     batch = shown.collect(150)
@@ -254,7 +273,7 @@ def test_the_datasets_experts_reach_their_goals_hand_backs_and_all(houses, confi
     assert all(ends)
     option = batch.record.option
     assert ((option == PUSH) | (option == PICK)).any()
-    assert any(waits)
+    assert any(waits) == step
     assert torch.isfinite(agent.evaluate(batch).log_prob).all()
 
 

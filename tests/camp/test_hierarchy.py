@@ -66,7 +66,10 @@ def test_mixtures_sum_to_one_and_masked_actions_have_no_chance(collected, method
     chances = ran.action_log_probs.exp()
     torch.testing.assert_close(chances.sum(-1), torch.ones(8, 4, 4))
     assert (chances[..., ~ALLOWED] == 0).all()
-    assert method == "hrl" or (chances[..., ALLOWED] > 0).all()
+    acts = ALLOWED.clone()
+    acts[[PUSH, PICK], DONE] = False  # their Done is no action: they end on arrival
+    assert (chances[..., acts] > 0).all()
+    assert (chances[..., [PUSH, PICK], DONE] == 0).all()
     record = rollout.batch.record
     assert ALLOWED[record.option, record.choice].all()
 
@@ -93,12 +96,22 @@ def test_the_mixture_is_equation_7_by_hand(collected):
     assert (meant[..., PICK] * acts[..., PICK, 1]).max() > 1e-3
 
 
-@pytest.mark.parametrize("method", ["camp", "hrl"])
+@pytest.mark.parametrize("method", ["camp", "camp with a step", "hrl"])
 def test_what_is_drawn_has_the_probability_of_its_parts(collected, method):
-    """An option counts where it was decided, an action always; Done by global has no action."""
+    """[open] (log beta or log(1 - beta)) + decide log pi_Omega + log pi_omega(a), by hand.
+
+    Done by global has no action; with a hand-back step no beta is drawn.
+    """
+    step = method == "camp with a step"
     agent, _, lived = collected(
-        method, changes={"agent": {"initial_interaction_probability": 0.3}}, rollouts=4
+        method.split()[0],
+        changes={"agent": {"initial_interaction_probability": 0.3, "hand_back_step": step}},
+        rollouts=4,
     )
+
+    def entropy_of(probs):
+        return torch.distributions.Categorical(probs).entropy()
+
     kinds = set()
     for rollout in lived:
         record, ran = rollout.batch.record, ran_of(agent, rollout.batch)
@@ -106,20 +119,24 @@ def test_what_is_drawn_has_the_probability_of_its_parts(collected, method):
         for t in range(8):
             for k in range(4):
                 option, choice = record.option[t, k], record.choice[t, k]
-                decided = bool(record.open[t, k] == 0)
-                right = ran.option_log_probs[t, k, option] if decided else torch.zeros(())
-                entropy = (
-                    torch.distributions.Categorical(ran.option_log_probs[t, k].exp()).entropy()
-                    * decided
-                )
+                opened, decided = record.open[t, k], bool(record.decide[t, k])
+                right = entropy = torch.zeros(())
+                if opened and not step:
+                    beta = ran.termination[t, k, opened].sigmoid()
+                    right = right + (beta if decided else 1 - beta).log()
+                    entropy = entropy + entropy_of(torch.stack([beta, 1 - beta]))
+                if decided:
+                    right = right + ran.option_log_probs[t, k, option]
+                    entropy = entropy + entropy_of(ran.option_log_probs[t, k].exp())
                 if option != STOP:
                     right = right + ran.action_log_probs[t, k, option, choice]
-                    acts = ran.action_log_probs[t, k, option].exp()
-                    entropy = entropy + torch.distributions.Categorical(acts).entropy()
+                    entropy = entropy + entropy_of(ran.action_log_probs[t, k, option].exp())
                 assert rollout.log_probs[t, k] == pytest.approx(right.item(), abs=1e-5)
                 assert now.entropy[t, k].item() == pytest.approx(entropy.item(), abs=1e-4)
-                kinds.add((option.item(), decided))
-    assert (PUSH, False) in kinds or method == "hrl"
+                kinds.add((opened.item() > 0, decided))
+    assert (False, True) in kinds
+    assert ((True, False) in kinds) == (method != "hrl")
+    assert ((True, True) in kinds) == (method == "camp")
 
 
 @pytest.mark.parametrize("method", ["camp", "ppo-intent"])
@@ -179,11 +196,14 @@ def test_no_gradient_flows_from_intents_to_action_policies(collected):
 
 @pytest.mark.parametrize("method", ["camp", "hrl"])
 def test_who_does_not_execute_gets_no_gradient(collected, method):
-    """Other advantages for Push's actions change no gradient of Navigate's or Pick's actor."""
+    """Other advantages for Push's actions change no gradient of Navigate's or Pick's actor.
+
+    An option that was open has drawn whether it ends, so it has executed too.
+    """
     agent, _, (_, rollout) = collected(
         method, changes={"agent": {"initial_interaction_probability": 0.3}}
     )
-    option = rollout.batch.record.option
+    option, opened = rollout.batch.record.option, rollout.batch.record.open
     assert set(option.unique().tolist()) >= {NAVIGATE, PUSH, PICK}
 
     def gradients(weights):
@@ -195,7 +215,9 @@ def test_who_does_not_execute_gets_no_gradient(collected, method):
     weights = torch.randn(8, 4)
     before = gradients(weights)
     for changed in (NAVIGATE, PUSH, PICK):
-        after = gradients(torch.where(option == changed, weights * 5, weights))
+        took_part = (option == changed) | ((opened == changed) & (opened != 0))
+        alone = ~((option != opened) & (opened != 0))  # no other one has drawn its end
+        after = gradients(torch.where(took_part & alone, weights * 5, weights))
         for policy in (NAVIGATE, PUSH, PICK):
             assert torch.equal(before[policy], after[policy]) == (policy != changed)
 
@@ -232,9 +254,27 @@ def test_an_interaction_that_never_hands_back_has_eleven_actions_then_global_dec
     assert [row["action"] for row in rows] == [ACTIONS_OF[option][1]] * 25  # none is replaced
 
 
+def always_ending(config, option, **agent):
+    made = insist(make_agent("camp", config(agent=agent)), option)
+    with torch.no_grad():
+        made.policies[option].actor.weight.zero_()
+        made.policies[option].actor.bias[-1] = 40.0
+    return made
+
+
+@pytest.mark.parametrize("option", [PUSH, PICK])
+def test_termination_is_drawn_on_arrival_and_costs_no_step(config, option):
+    """The option ends after each of its actions and is chosen again: it acts at every step."""
+    rows = acted(always_ending(config, option), steps=5)
+    assert all(row["decide"] and row["option"] == option for row in rows)
+    assert all(row["action"] in ACTIONS_OF[option][:-1] for row in rows)
+    assert [row["open"] for row in rows] == [0, *[option] * 4]
+    assert [row["used"] for row in rows] == [0, *[1] * 4]
+
+
 @pytest.mark.parametrize("option", [PUSH, PICK])
 def test_a_hand_back_is_one_step_of_waiting_and_ends_nothing(config, option, fake):
-    agent = insist(make_agent("camp", config()), option, len(ACTIONS_OF[option]) - 1)
+    agent = always_ending(config, option, hand_back_step=True)
     rows = acted(agent, steps=5)
     assert all(row["action"] == WAIT and row["choice"] == DONE for row in rows)
     assert all(row["decide"] and not row["forced"] for row in rows)

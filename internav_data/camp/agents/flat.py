@@ -59,6 +59,8 @@ class FlatOutput(NamedTuple):
     """(T, n, A): log P(a)."""
     value: Tensor
     """(T, n): the critic's values."""
+    out: Tensor
+    """(T, n, hidden): outputs of the GRU, from which actions and values come."""
     state: State
     """(n, …): memory after the last step."""
     inputs: dict[str, Tensor]
@@ -109,15 +111,16 @@ class PPOAgent(RecurrentAgent[FlatRecord]):
         ran = self.run(batch)
         log_prob = networks.log_prob_of(ran.log_probs, batch.record.choice)
         entropy = networks.entropy_of(ran.log_probs)
-        return Evaluated(log_prob, ran.value, entropy, ran.state, ran.inputs.get("intent"))
+        intent = ran.inputs.get("intent")
+        return Evaluated(log_prob, ran.value, entropy, ran.state, intent, critic_inputs=ran.out)
 
     def labels(self, actions: Sequence[int]) -> tuple[list[int], FlatRecord]:
         """See `Agent`."""
         return list(actions), FlatRecord(torch.tensor(actions))
 
-    def critics(self) -> list[nn.Parameter]:
+    def critics(self) -> list[nn.Module]:
         """See `Agent`."""
-        return list(self.policy.critic.parameters())
+        return [self.policy.critic]
 
     def run(self, batch: Batch[Any]) -> FlatOutput:
         """Run the networks over T steps of n environments; the record of new ones is None."""
@@ -128,7 +131,7 @@ class PPOAgent(RecurrentAgent[FlatRecord]):
         out, hidden = batch.segments.run(self.policy.gru, features, batch.state["hidden"])
         log_probs = torch.log_softmax(self.policy.actor(out), -1)
         state = {**batch.state, "hidden": hidden}
-        return FlatOutput(log_probs, self.policy.value(out), state, inputs)
+        return FlatOutput(log_probs, self.policy.value(out), out, state, inputs)
 
 
 class PPOIntentAgent(PPOAgent):

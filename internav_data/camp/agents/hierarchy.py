@@ -13,6 +13,7 @@ from typing import Any, Final, NamedTuple
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 
 from internav_data.camp import networks
 from internav_data.camp.agents.protocol import (
@@ -34,11 +35,13 @@ interaction is open.)"""
 OPTION_NAMES: Final[tuple[OptionName, ...]] = ("navigate", "push", "pick", "done")
 """Options by number."""
 OPTIONS: Final = len(OPTION_NAMES)
+STAY: Final = OPTIONS
+"""Decision that the open interaction goes on, after those for the options."""
 OPTION_INPUTS: Final = 3
 """Number of inputs that tell of the open option; see `option_inputs`."""
 DONE: Final = int(Action.DONE)
 WAIT: Final = int(Action.WAIT)
-"""Action of the step at which an interaction hands control back."""
+"""Action of the step at which an interaction hands control back (`agent.hand_back_step`)."""
 ACTIONS_OF: Final[tuple[tuple[int, ...], ...]] = tuple(
     tuple(int(action) for action in actions_of_option(option)) for option in OPTION_NAMES[:STOP]
 )
@@ -103,7 +106,8 @@ class HierarchyRecord(OptionRecord):
         if opened:
             found["interaction_length"] = float(interacting.sum()) / opened
         forced = 0 if self.forced is None else int(self.forced.sum())
-        ended = forced + int((interacting & (self.choice == DONE)).sum())
+        handed_back = (interacting & (self.choice == DONE)) | (decide & (self.open != 0))
+        ended = forced + int(handed_back.sum())
         if ended:
             found["forced_share"] = forced / ended
         chosen, intended = self.option_probs, self.intended_option_probs
@@ -152,8 +156,15 @@ def option_step(
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """Return the option state after an action; all (n,).
 
-    Done of Push or Pick hands control back, even as the first action; after its 11th action an
-    interaction closes.
+    After its 11th action an interaction closes; Done of Push or Pick, which is an action only where
+    a hand-back is a step, closes it too, even as the first one.
+
+    Parameters
+    ----------
+    option, choice
+        Option that acted, and its action.
+    used
+        Actions that it had used before: 0 if it has just been opened.
 
     Returns
     -------
@@ -171,13 +182,22 @@ def option_step(
 
 
 def option_labels(
-    actions: Sequence[int], *, temporally_extended: bool
+    actions: Sequence[int], *, temporally_extended: bool, hand_back_step: bool = False
 ) -> tuple[list[int], HierarchyRecord]:
     """Return an expert's actions as options take them, for cloning.
 
-    A maximal run of pushes is Push; pickups, drops and the rotations between them are Pick; Done is
-    the global policy's; the rest is Navigate. Temporally extended interactions are followed by a
-    hand-back, save one that its 11th action closed.
+    A maximal run of pushes is Push; pickups, drops and the rotations between them are Pick; the
+    rest is Navigate, Done at the goal too, which Navigate's auxiliary task pays. A temporally
+    extended interaction terminates on arrival at the next option's step, or at a step of its own.
+
+    Parameters
+    ----------
+    actions
+        Actions of the environment.
+    temporally_extended
+        Whether interactions stay open over several actions.
+    hand_back_step
+        Whether those that their 11th action has not closed end by a step of waiting.
 
     Returns
     -------
@@ -191,7 +211,8 @@ def option_labels(
     UsageError
         No option can take an action, so that cloning could not make it likely.
     """
-    rows: list[tuple[int, int, int, int]] = []  # choice, option, open, used
+    rows: list[tuple[int, int, int, int, bool]] = []  # choice, option, open, used, decide
+    opened, used = NAVIGATE, 0
     for run in _RUNS.finditer(_letters(actions)):
         acting = {"push": PUSH, "pick": PICK}.get(run.lastgroup or "", NAVIGATE)
         taken = list(actions[run.start() : run.end()])
@@ -200,17 +221,18 @@ def option_labels(
                 f"expert's action {Action(strange[0]).label}: cannot be cloned: option "
                 f"{OPTION_NAMES[acting]!r} cannot take it (`Action.options`)"
             )
-        if acting == NAVIGATE:
-            rows.append((taken[0], STOP if taken[0] == DONE else NAVIGATE, NAVIGATE, 0))
-            continue
-        if temporally_extended and len(taken) % INTERACTION_ACTIONS:
+        extended = temporally_extended and acting != NAVIGATE
+        if extended and hand_back_step and len(taken) % INTERACTION_ACTIONS:
             taken.append(DONE)
         for number, action in enumerate(taken):
-            spent = number % INTERACTION_ACTIONS if temporally_extended else 0
-            rows.append((action, acting, acting if spent else NAVIGATE, spent))
-    choice, option, opened, used = torch.tensor(rows).reshape(-1, 4).unbind(1)
-    waits = (choice == DONE) & (option != STOP)
-    record = HierarchyRecord(choice, option, opened, used, decide=used == 0)
+            decide = not extended or number % INTERACTION_ACTIONS == 0
+            rows.append((action, acting, opened, used, decide))
+            spent = 1 if decide else used + 1
+            still = extended and spent < INTERACTION_ACTIONS and action != DONE
+            opened, used = (acting, spent) if still else (NAVIGATE, 0)
+    choice, option, opens, uses, decides = torch.tensor(rows).reshape(-1, 5).unbind(1)
+    waits = (choice == DONE) & (option != NAVIGATE)
+    record = HierarchyRecord(choice, option, opens, uses, decide=decides.bool())
     return choice.masked_fill(waits, WAIT).tolist(), record
 
 
@@ -225,8 +247,12 @@ class ForwardOutput(NamedTuple):
     """(T, n, 4): log P(omega), equation 5."""
     action_log_probs: Tensor
     """(T, n, 4, A): log-probabilities of the actions of each option; STOP's is Done."""
+    termination: Tensor
+    """(T, n, 4): logits of beta, the probability that each option terminates on arrival."""
     value: Tensor
     """(T, n): the global policy's values."""
+    out: Tensor
+    """(T, n, hidden): outputs of the global policy's GRU."""
     intended_option_probs: Tensor | None
     """(T, n, 4): P(omega'), equation 6; None where the intent was given."""
     intent: Tensor
@@ -246,6 +272,13 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
         Training config.
     temporally_extended
         False for `hrl`: it decides at every step, Push and Pick have no Done, there is no intent.
+
+    Notes
+    -----
+    Done of Push and of Pick is their termination beta(s), as in the options framework (Sutton,
+    Precup and Singh 1999): it is drawn on arrival at a state, and where it ends the interaction
+    global decides and the chosen policy acts in the same step. With `agent.hand_back_step` it is an
+    action of its own instead, which waits.
     """
 
     mask: Tensor
@@ -255,6 +288,7 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
         super().__init__()
         network, agent = config.network, config.agent
         self.hidden, self.temporally_extended = network.hidden, temporally_extended
+        self.hand_back_step = temporally_extended and agent.hand_back_step
         variant = agent.intent if temporally_extended else "none"
         self.uses_intent = variant != "none"
         count = 1 if network.shared_encoder else 3
@@ -298,25 +332,29 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
 
     def step(self, batch: Batch[Any], uniforms: Uniforms) -> AgentStep[HierarchyRecord]:
         """See `Agent`."""
-        state = batch.state
-        ran = self.run(batch, option_inputs(state["open"], state["used"])[None])
-        option_log_probs, action_log_probs = ran.option_log_probs[0], ran.action_log_probs[0]
-        decide = state["open"] == 0
-        option = torch.where(decide, networks.drawn(option_log_probs, uniforms[0]), state["open"])
+        before, used = batch.state["open"], batch.state["used"]
+        ran = self.run(batch, option_inputs(before, used)[None])
+        decisions, ends = (values[0] for values in self.decisions(ran, before[None]))
+        action_log_probs = ran.action_log_probs[0]
+        decision = networks.drawn(decisions, uniforms[0])
+        decide = decision != STAY
+        option = torch.where(decide, decision, before)
         choice = networks.drawn(_of_option(action_log_probs, option), uniforms[1])
-        opened, used, handed_back, forced = option_step(option, choice, state["used"])
+        opened, spent, handed_back, forced = option_step(
+            option, choice, used.masked_fill(decide, 0)
+        )
         if not self.temporally_extended:
-            opened, used, forced = opened * 0, used * 0, forced & False
-        option_probs, intended = option_log_probs.exp(), ran.intended_option_probs
+            opened, spent, forced = opened * 0, spent * 0, forced & False
+        option_probs, intended = ran.option_log_probs[0].exp(), ran.intended_option_probs
         # An episode ends by the global policy's Done, or by Navigate and its Done.
         done = action_log_probs[:, NAVIGATE, DONE].exp()
-        ending = (option_probs[:, STOP] + option_probs[:, NAVIGATE] * done) * decide
+        ending = (option_probs[:, STOP] + option_probs[:, NAVIGATE] * done) * ends[:, 0].exp()
         record = HierarchyRecord(
-            choice, option, state["open"], state["used"], decide, ran.intent[0], forced,
+            choice, option, before, used, decide, ran.intent[0], forced,
             option_probs, None if intended is None else intended[0], ending,
         )  # fmt: skip
-        log_prob = _log_prob(option_log_probs, action_log_probs, record)
-        after = {"hidden": ran.hidden, "open": opened, "used": used}
+        log_prob = _log_prob(decisions, action_log_probs, record)
+        after = {"hidden": ran.hidden, "open": opened, "used": spent}
         return AgentStep(
             choice.masked_fill(handed_back, WAIT), log_prob, ran.value[0], record, after
         )
@@ -325,11 +363,35 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
         """See `Agent`."""
         record = batch.record
         ran = self.run(batch, option_inputs(record.open, record.used), record.intent)
-        log_prob = _log_prob(ran.option_log_probs, ran.action_log_probs, record)
+        decisions, ends = self.decisions(ran, record.open)
+        log_prob = _log_prob(decisions, ran.action_log_probs, record)
         decided = record.decide * networks.entropy_of(ran.option_log_probs)
         acted = networks.entropy_of(_of_option(ran.action_log_probs, record.option))
         state = {**batch.state, "hidden": ran.hidden}
-        return Evaluated(log_prob, ran.value, decided + acted, state, ran.intent)
+        entropy = networks.entropy_of(ends) + decided + acted
+        return Evaluated(log_prob, ran.value, entropy, state, ran.intent, critic_inputs=ran.out)
+
+    def decisions(self, ran: ForwardOutput, opened: Tensor) -> tuple[Tensor, Tensor]:
+        """Return what is decided on arrival, where interactions `opened` (T, n) are open.
+
+        Returns
+        -------
+        decisions : (T, n, 5)
+            Log-probabilities that the global policy takes each option, and that the open one
+            stays: log beta + log pi_Omega(omega), and log(1 - beta).
+        ends : (T, n, 2)
+            log beta and log(1 - beta): 0 and minus infinity where none is open.
+        """
+        is_open = opened != NAVIGATE
+        if self.hand_back_step:  # its own Done closes it, after the step
+            logit = torch.full_like(ran.value, -torch.inf)
+            ends = torch.stack([logit, torch.zeros_like(logit)], -1)
+        else:
+            logit = ran.termination.take_along_dim(opened.unsqueeze(-1), -1)
+            ends = functional.logsigmoid(torch.cat([logit, -logit], -1))
+        none = ends.new_tensor([0.0, -torch.inf])
+        ends = torch.where(is_open.unsqueeze(-1), ends, none)
+        return torch.cat([ran.option_log_probs + ends[..., :1], ends[..., 1:]], -1), ends
 
     def run(
         self, batch: Batch[Any], option_features: Tensor, intent: Tensor | None = None
@@ -351,11 +413,14 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
             views[0],
             *(torch.cat([views[k % len(views)], option_features], -1) for k in (PUSH, PICK)),
         ]
-        hidden, log_probs = list(batch.state["hidden"].unbind(1)), []
+        hidden, log_probs, terminations = list(batch.state["hidden"].unbind(1)), [], []
         for k, policy in enumerate(self.policies):
             out, hidden[k] = segments.run(policy.gru, inputs[k], hidden[k])
-            may_end = k == NAVIGATE or self.temporally_extended
-            log_probs.append(action_log_probs_of(k, policy.actor(out), may_end=may_end))
+            logits = policy.actor(out)
+            may_end = k == NAVIGATE or self.hand_back_step
+            log_probs.append(action_log_probs_of(k, logits, may_end=may_end))
+            terminations.append(logits[..., -1] - logits[..., :-1].logsumexp(-1))
+        termination = torch.stack([*terminations, torch.zeros_like(terminations[0])], -1)
         acts = torch.stack([*log_probs, self.done.expand_as(log_probs[0])], -2)  # (T, n, 4, A)
         features, intended = torch.cat([views[0], option_features], -1), None
         if not self.uses_intent:
@@ -368,7 +433,9 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
         out, hidden[GLOBAL] = segments.run(self.global_policy.gru, conditioned, hidden[GLOBAL])
         option_log_probs = torch.log_softmax(self.global_policy.actor(out) + self.mask, -1)
         value, after = self.global_policy.value(out), torch.stack(hidden, 1)
-        return ForwardOutput(option_log_probs, acts, value, intended, intent, after)
+        return ForwardOutput(
+            option_log_probs, acts, termination, value, out, intended, intent, after
+        )
 
     def mixed(self, intended: Tensor, action_log_probs: Tensor) -> Tensor:
         """Return P(i), (T, n, A), equation 7: the policies' actions, weighted by P(omega').
@@ -382,7 +449,11 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
 
     def labels(self, actions: Sequence[int]) -> tuple[list[int], HierarchyRecord]:
         """See `Agent`."""
-        return option_labels(actions, temporally_extended=self.temporally_extended)
+        return option_labels(
+            actions,
+            temporally_extended=self.temporally_extended,
+            hand_back_step=self.hand_back_step,
+        )
 
     def optimised(self) -> list[nn.Parameter]:
         """See `Agent`: neither the intent policy nor the critics of the policies' pretraining."""
@@ -393,9 +464,9 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
         )
         return [parameter for part in parts for parameter in part.parameters()]
 
-    def critics(self) -> list[nn.Parameter]:
+    def critics(self) -> list[nn.Module]:
         """See `Agent`."""
-        return list(self.global_policy.critic.parameters())
+        return [self.global_policy.critic]
 
     def synchronise(self) -> None:
         """See `Agent`."""
@@ -504,9 +575,9 @@ class AuxiliaryAgent(RecurrentAgent[OptionRecord]):
         parts = [*used, *(self.hierarchy.policies[task] for task in self._trained)]
         return [parameter for part in parts for parameter in part.parameters()]
 
-    def critics(self) -> list[nn.Parameter]:
+    def critics(self) -> list[nn.Module]:
         """See `Agent`."""
-        return [p for k in self._trained for p in self.hierarchy.policies[k].critic.parameters()]
+        return [self.hierarchy.policies[task].critic for task in self._trained]
 
 
 def _of_option(action_log_probs: Tensor, option: Tensor) -> Tensor:
@@ -514,10 +585,12 @@ def _of_option(action_log_probs: Tensor, option: Tensor) -> Tensor:
     return action_log_probs.take_along_dim(option[..., None, None], -2).squeeze(-2)
 
 
-def _log_prob(
-    option_log_probs: Tensor, action_log_probs: Tensor, record: HierarchyRecord
-) -> Tensor:
-    """Return decide * log pi_Omega(omega) + log pi_omega(a); the second is 0 for omega = Done."""
-    decided = networks.log_prob_of(option_log_probs, record.option)
+def _log_prob(decisions: Tensor, action_log_probs: Tensor, record: HierarchyRecord) -> Tensor:
+    """Return the log-probability of all draws of a step.
+
+    [open] (log beta or log(1 - beta)) + decide log pi_Omega(omega) + log pi_omega(a); the last is 0
+    for omega = Done.
+    """
+    decision = record.option.masked_fill(~record.decide, STAY)
     acted = networks.log_prob_of(_of_option(action_log_probs, record.option), record.choice)
-    return torch.where(record.decide, decided, 0.0) + acted
+    return networks.log_prob_of(decisions, decision) + acted

@@ -118,6 +118,8 @@ class Evaluated:
     """(T, n, …): P(i), where it was recomputed."""
     loss: Tensor | None = None
     """(T, n): loss of other predictions (`nie`)."""
+    critic_inputs: Tensor | None = None
+    """(T, n, hidden): inputs of the agent's one `ValueHead`, which a new critic is fitted to."""
 
 
 class Agent(nn.Module, ABC, Generic[R]):
@@ -191,8 +193,8 @@ class Agent(nn.Module, ABC, Generic[R]):
         """Return the parameters that are trained."""
         return [parameter for parameter in self.parameters() if parameter.requires_grad]
 
-    def critics(self) -> list[nn.Parameter]:
-        """Return the critics' parameters, which are trained alone while they are new."""
+    def critics(self) -> list[nn.Module]:
+        """Return the critics' heads, which are trained alone while they are new."""
         return []
 
     def synchronise(self) -> None:
