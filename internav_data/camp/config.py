@@ -163,6 +163,9 @@ class StagesConfig:
     auxiliary_share: Annotated[float, Bounds(0.0, 1.0)] = 0.1
     """Share of the steps in the three auxiliary tasks; for flat methods, on the main task in
     single rooms."""
+    min_auxiliary_timesteps: Annotated[int, Bounds(0)] = 1_000_000
+    """Number of environment steps below which a run has no auxiliary stage: in a short one most
+    of its rollouts train the critics alone."""
     single_room_share: Annotated[float, Bounds(0.0, 1.0)] = 0.1
     """Share of the steps of joint training in scenes of a single room."""
     side_by_side: bool = True
@@ -306,7 +309,10 @@ _PRESETS: Final = {
             num_envs=12, num_steps=30, update_epochs=1, num_minibatches=1, clip_coef=0.1,
             clip_vloss=True, scale_values=False,
         ),
-        stages=StagesConfig(total_timesteps=10_000_000, side_by_side=False, decay_over="all"),
+        stages=StagesConfig(
+            total_timesteps=10_000_000, min_auxiliary_timesteps=0, side_by_side=False,
+            decay_over="all",
+        ),
     ),
     "small": CampConfig(),
 }  # fmt: skip

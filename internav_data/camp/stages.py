@@ -77,7 +77,8 @@ def schedule(
     """
     check_parts(parts)
     stages_config, count = config.stages, config.ppo.num_envs
-    auxiliary = stages_config.auxiliary_share
+    short = stages_config.total_timesteps < stages_config.min_auxiliary_timesteps
+    auxiliary = 0.0 if short else stages_config.auxiliary_share
     side_by_side = stages_config.side_by_side
     if hierarchical and side_by_side and auxiliary and count < len(TASKS):
         raise UsageError(

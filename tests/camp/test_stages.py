@@ -11,6 +11,14 @@ from internav_data.camp.stages import PARTS, order_seed, schedule
 from internav_data.records.errors import UsageError
 
 
+LONG = {"stages": {"total_timesteps": 2_000_000}}
+
+
+def config_of(name):
+    """Return a preset, long enough for its auxiliary stages."""
+    return preset(name) if name == "paper" else from_mapping(preset(name), LONG, "test")
+
+
 def steps_of(stages, config):
     each = config.ppo.num_envs * config.ppo.num_steps
     return {stage.name: stage.updates * each for stage in stages}
@@ -18,7 +26,7 @@ def steps_of(stages, config):
 
 @pytest.mark.parametrize("name", ["small", "paper"])
 def test_every_method_gets_the_same_steps(name):
-    config = preset(name)
+    config = config_of(name)
     deep, flat = (schedule(config, PARTS, hierarchical=deep) for deep in (True, False))
     assert sum(steps_of(deep, config).values()) == sum(steps_of(flat, config).values())
     assert sum(steps_of(deep, config).values()) == pytest.approx(
@@ -52,20 +60,28 @@ def test_the_papers_stages_are_one_policy_after_the_other():
     assert all(one[1] == two[0] for one, two in itertools.pairwise(ends))
 
 
+def test_short_runs_have_no_auxiliary_stage_whatever_the_method():
+    for hierarchical in (True, False):
+        stages = schedule(preset("small"), PARTS, hierarchical=hierarchical)
+        assert [stage.name for stage in stages] == ["single", "all"]
+        steps = steps_of(stages, preset("small"))
+        assert sum(steps.values()) == pytest.approx(300_000, rel=0.01)
+
+
 def test_small_trains_the_tasks_side_by_side_and_decays_in_each_stage():
-    stages = schedule(preset("small"), PARTS, hierarchical=True)
+    stages = schedule(config_of("small"), PARTS, hierarchical=True)
     assert [stage.name for stage in stages] == ["auxiliary", "single", "all"]
     assert stages[0].tasks == ("navigate",) * 6 + ("push",) * 5 + ("pick",) * 5
     assert {(stage.decay_from, stage.decay_to) for stage in stages} == {(0.0, 1.0)}
     assert [stage.critic for stage in stages] == ["auxiliary", "main", "main"]
-    flat = schedule(preset("small"), PARTS, hierarchical=False)
+    flat = schedule(config_of("small"), PARTS, hierarchical=False)
     assert {stage.critic for stage in flat} == {"main"}
     assert {stage.rate for stage in flat} == {3e-4}
     assert not any(stage.tasks for stage in flat)
 
 
 def test_a_part_alone_is_that_part_of_the_whole():
-    config = preset("small")
+    config = config_of("small")
     whole = schedule(config, PARTS, hierarchical=True)
     assert [schedule(config, (part,), hierarchical=True)[0] for part in PARTS] == whole
 
@@ -77,10 +93,12 @@ def test_parts_follow_each_other(parts):
 
 
 def test_what_leaves_nothing_to_do_is_refused():
-    tiny = from_mapping(preset("small"), {"stages": {"total_timesteps": 1000}}, "test")
+    tiny = {"total_timesteps": 1000, "min_auxiliary_timesteps": 0}
+    tiny = from_mapping(preset("small"), {"stages": tiny}, "test")
     with pytest.raises(UsageError, match="less than one update of 1024"):
         schedule(tiny, ("auxiliary",), hierarchical=True)
-    two = from_mapping(preset("small"), {"ppo": {"num_envs": 2, "num_minibatches": 1}}, "test")
+    two = {**LONG, "ppo": {"num_envs": 2, "num_minibatches": 1}}
+    two = from_mapping(preset("small"), two, "test")
     with pytest.raises(UsageError, match="3 at least"):
         schedule(two, PARTS, hierarchical=True)
 

@@ -40,7 +40,10 @@ SMALL = {
         "critic_warmup_rollouts": 1,
     },
     "cloning": {"frames": 64, "epochs": 2, "num_envs": 4, "num_steps": 8, "sync_every": 2},
-    "stages": {"total_timesteps": 320, "auxiliary_share": 0.3, "single_room_share": 0.3},
+    "stages": {
+        "total_timesteps": 320, "auxiliary_share": 0.3, "single_room_share": 0.3,
+        "min_auxiliary_timesteps": 0,
+    },  # fmt: skip
     "run": {
         "max_steps": 12, "checkpoint_every": 3, "validate_every": 2, "validation_episodes": 2,
         "tensorboard": False,
@@ -342,6 +345,7 @@ def test_two_ranks_train_what_one_does(scenes, tmp_path):
         "update_epochs = 2\ncritic_warmup_rollouts = 1\n"
         "[cloning]\nframes = 48\nepochs = 1\nnum_envs = 6\nnum_steps = 8\nlearning_rate = 0.5\n"
         "[stages]\ntotal_timesteps = 288\nauxiliary_share = 0.3\nsingle_room_share = 0.3\n"
+        "min_auxiliary_timesteps = 0\n"
         "learning_rate = 0.5\njoint_learning_rate = 0.5\n"
         "[run]\nmax_steps = 12\nvalidation_episodes = 0\ntensorboard = false\n"
     )
