@@ -17,6 +17,8 @@ VARIANTS = [
     ("camp", {"intent": "policy"}),
     ("camp", {"intent": "recursive"}),
     ("camp", {"intent": "none"}),
+    ("camp", {"hand_back_step": True}),
+    ("camp", {"forbidden": ["pick"]}),
 ]
 
 
