@@ -195,7 +195,7 @@ class ValueHead(nn.Linear):
 
     @torch.no_grad()
     def note_returns(self, variance: Tensor) -> None:
-        """Adapt the scale to a rollout's variance of returns."""
+        """Adapt the scale to a rollout's variance of returns, a scalar in squared rewards."""
         scale = self.scale.square().lerp(variance, _SCALE_RATE).sqrt().clamp(min=_MIN_SCALE)
         for parameter in self.parameters():
             parameter.mul_(self.scale / scale)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import torch
@@ -86,21 +86,17 @@ def update(
     if config.normalise_advantages:
         mean, variance = moments(advantages, reduce)
         advantages = (advantages - mean) / (variance.sqrt() + _EPSILON)
-    parameters = [p for critic in agent.critics() for p in critic.parameters()]
-    parameters = parameters if critic_only else agent.optimised()
+    parameters = agent.optimised()
     if critic_only:
+        parameters = [each for critic in agent.critics() for each in critic.parameters()]
         fit_critic(agent, rollout.batch, returns, reduce)
     limit = math.inf if critic_only or config.target_kl is None else config.target_kl
     rows: list[dict[str, float]] = []
     stopped, device = False, rollout.rewards.device
-    minibatches = [
-        environments
-        for order in orders
-        for environments in torch.tensor(order, device=device).chunk(config.num_minibatches)
-    ]
-    for environments in minibatches:
-        estimates = advantages[:, environments], returns[:, environments]
-        losses, row = _losses(agent, rollout, environments, estimates, config, reduce)
+    permuted = [torch.tensor(order, device=device) for order in orders]
+    for environments in (part for each in permuted for part in each.chunk(config.num_minibatches)):
+        targets = advantages[:, environments], returns[:, environments]
+        losses, row = _losses(agent, rollout, environments, targets, config, reduce)
         rows.append(row)
         # Stop before the step that would leave the rollout's policy too far behind.
         stopped = row["kl"] > limit
@@ -108,14 +104,13 @@ def update(
             break
         loss = config.vf_coef * losses["value_loss"] / scale**2
         if not critic_only:
-            loss = loss + losses["policy_loss"] - config.ent_coef * losses["entropy"]
-            loss = loss + losses["extra_loss"]
+            loss = loss + _policy_objective(losses, config)
         row["grad_norm"] = step(optimiser, loss, parameters, config.max_grad_norm, reduce)
     if config.scale_values:
         rescale_critics(agent, returns, reduce)
     # Gradients: none where not a single step was taken.
-    norms = [row["grad_norm"] for row in rows if "grad_norm" in row]
-    means = {name: sum(row[name] for row in rows) / len(rows) for name in losses}
+    norms = [row.pop("grad_norm") for row in rows if "grad_norm" in row]
+    means = {name: sum(row[name] for row in rows) / len(rows) for name in rows[0]}
     return {
         **means,
         "grad_norm": sum(norms) / max(len(norms), 1),
@@ -243,6 +238,12 @@ def _losses(
     means = reduce(torch.stack([loss.detach() for loss in losses.values()])).tolist()
     error = float((ratio.detach() - 1.0).abs().max())
     return losses, {**dict(zip(losses, means, strict=True)), "ratio_error": error}
+
+
+def _policy_objective(losses: Mapping[str, Tensor], config: PPOConfig) -> Tensor:
+    """Return what is minimised beside the value loss, a scalar, of the means of `_losses`."""
+    bonus = config.ent_coef * losses["entropy"]
+    return losses["policy_loss"] - bonus + losses["extra_loss"]
 
 
 def check_finite(environments: Tensor, *outputs: Tensor) -> None:

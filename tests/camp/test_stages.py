@@ -10,7 +10,6 @@ from internav_data.camp.config import from_mapping, preset
 from internav_data.camp.stages import PARTS, order_seed, schedule
 from internav_data.records.errors import UsageError
 
-
 LONG = {"stages": {"total_timesteps": 2_000_000}}
 
 

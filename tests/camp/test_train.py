@@ -43,7 +43,7 @@ SMALL = {
     "stages": {
         "total_timesteps": 320, "auxiliary_share": 0.3, "single_room_share": 0.3,
         "min_auxiliary_timesteps": 0,
-    },  # fmt: skip
+    },
     "run": {
         "max_steps": 12, "checkpoint_every": 3, "validate_every": 2, "validation_episodes": 2,
         "tensorboard": False,
