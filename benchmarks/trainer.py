@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 import torch
 
-from internav_data.camp.agents import LEARNERS, make_agent
+from internav_data.camp.agents import AGENTS, make_agent
 from internav_data.camp.agents.hierarchy import ACTIONS_OF, NAVIGATE, STOP
 from internav_data.camp.config import from_mapping, preset
 from internav_data.camp.ppo import update
@@ -71,7 +71,7 @@ class Clock:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("dataset", type=Path)
-    parser.add_argument("--methods", default=",".join(LEARNERS))
+    parser.add_argument("--methods", default=",".join(AGENTS))
     parser.add_argument("--rollouts", type=int, default=3)
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()

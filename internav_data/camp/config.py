@@ -102,6 +102,8 @@ class PPOConfig:
     """Discount a step."""
     gae_lambda: Annotated[float, Bounds(0.0, 1.0)] = 0.95
     """Decay of generalised advantages (lambda)."""
+    adam_eps: Annotated[float, Bounds(0.0, exclusive=True)] = 1e-5
+    """Epsilon of Adam: gradients far below it make small steps."""
     max_grad_norm: Annotated[float, Bounds(0.0)] = 0.5
     """Maximum norm of the gradient; longer ones are clipped."""
     target_kl: Annotated[float | None, Bounds(0.0)] = 0.03
@@ -136,9 +138,9 @@ class CloningConfig:
     """Expert to clone: the one that knows everything, or, where the dataset holds it, the one that
     learns by failing (`generate --blind-expert`)."""
     frames: Annotated[int, Bounds(1)] = 150_000
-    """Number of expert frames in an epoch."""
+    """Number of expert frames in an epoch; the stage replays them `epochs` times."""
     epochs: Annotated[int, Bounds(1)] = 4
-    """Passes over them."""
+    """Passes over the frames."""
     num_envs: Annotated[int, Bounds(1, 65536)] = 16
     """Number of experts that are replayed side by side."""
     num_steps: Annotated[int, Bounds(1)] = 16
@@ -209,8 +211,9 @@ class RunConfig:
     two cores (106 s against 98 s with two, 48,000 steps of CaMP) and leaves one for another run."""
     checkpoint_every: Annotated[int, Bounds(1)] = 10
     """Number of updates between checkpoints."""
-    validate_every: Annotated[int, Bounds(1)] = 50
-    """Number of updates of a stage between validations; stages of the main task end with one."""
+    validate_every: Annotated[int, Bounds(0)] = 50
+    """Number of updates of a stage between validations, 0 for none in between; stages of the main
+    task end with one."""
     validation_episodes: Annotated[int, Bounds(0)] = 64
     """Number of episodes of the validation split that are played, always the same; 0 for no
     validation."""
@@ -255,6 +258,18 @@ class CampConfig:
             raise UsageError(
                 f"ppo.num_minibatches is {self.ppo.num_minibatches}: minibatches are of whole "
                 f"environments, so it must divide ppo.num_envs ({self.ppo.num_envs})"
+            )
+        an_update = self.cloning.num_envs * self.cloning.num_steps
+        if self.cloning.frames < an_update:
+            raise UsageError(
+                f"cloning.frames is {self.cloning.frames}: one update replays {an_update} frames "
+                "(cloning.num_envs x cloning.num_steps); ask for as many at least"
+            )
+        most = max(self.ppo.num_envs, self.cloning.num_envs)
+        if self.run.workers > most:
+            raise UsageError(
+                f"run.workers is {self.run.workers}: there are {most} environments (ppo.num_envs) "
+                f"to step; ask for {most} processes at most"
             )
         least = 36 if self.network.encoder == "paper" else 16
         if self.network.image_size < least:

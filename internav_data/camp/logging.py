@@ -240,7 +240,8 @@ class ProgressReporter(ProgressLine):
             skipped = cloning.get("without_expert", 0)
             more = f", {skipped:,} episodes without an expert skipped" if skipped else ""
             return (
-                f"cloning: {row['step']:,} frames ({share:.0%}), loss {cloning['loss']:.3f}, "
+                f"cloning, epoch {cloning['epoch']} of {cloning['epochs']}: {row['step']:,} frames "
+                f"({share:.0%}), loss {cloning['loss']:.3f}, "
                 f"{rate:,.0f} frames/s, {left} left{more}"
             )
         success = row["episode"].get("success")

@@ -102,6 +102,9 @@ class Collector:
         Agent that acts.
     seed
         Seed of environment 0, for messages.
+    overwrites
+        Write a rollout's observations over those of the one before: fresh memory costs seven times
+        as much as the copies into it.
 
     Attributes
     ----------
@@ -111,8 +114,11 @@ class Collector:
         Memory of the agent, (n, …).
     """
 
-    def __init__(self, env: Environments, agent: Agent[Any], seed: int = 0) -> None:
+    def __init__(
+        self, env: Environments, agent: Agent[Any], seed: int = 0, *, overwrites: bool = False
+    ) -> None:
         self.loop, self.agent, self._seed = EnvironmentLoop(env), agent, seed
+        self._rows: dict[str, Tensor] | None = {} if overwrites else None
         self.state = agent.initial_state(env.num_envs)
 
     def restore(self, states: Sequence[EpisodeSnapshot], episode_starts: Bools) -> None:
@@ -134,7 +140,7 @@ class Collector:
             An observation or a reward is NaN or infinite.
         """
         agent, device, before = self.agent, self.agent.device, self.state
-        seen = ObservationRows(len(uniforms), device)
+        seen = ObservationRows(len(uniforms), device, self._rows)
         taken: list[AgentStep[Any]] = []
         start_rows: list[Tensor] = []
         ends: list[tuple[Tensor, ...]] = []
@@ -198,17 +204,21 @@ class ObservationRows:
         Number of steps T.
     device
         Device of the tensors.
+    rows
+        Tensors of earlier steps, by sensor, to be overwritten; this object changes it.
     """
 
-    def __init__(self, steps: int, device: torch.device) -> None:
+    def __init__(
+        self, steps: int, device: torch.device, rows: dict[str, Tensor] | None = None
+    ) -> None:
         self._steps, self._device, self._next = steps, device, 0
-        self.rows: dict[str, Tensor] = {}
+        self.rows: dict[str, Tensor] = {} if rows is None else rows
 
     def append(self, observations: Observations) -> dict[str, Tensor]:
         """Copy the observations of a step; return the copy, (n, …) by sensor."""
         for name, array in observations.items():
             values = torch.from_numpy(array)
-            if name not in self.rows:
+            if name not in self.rows or len(self.rows[name]) != self._steps:
                 self.rows[name] = values.new_empty(
                     (self._steps, *values.shape), device=self._device
                 )

@@ -73,30 +73,18 @@ def schedule(
     Raises
     ------
     UsageError
-        An unknown part, more tasks side by side than environments, or nothing left to do.
+        An unknown part, more tasks side by side than environments, or less than one update to do.
     """
     check_parts(parts)
     stages_config, count = config.stages, config.ppo.num_envs
-    short = stages_config.total_timesteps < stages_config.min_auxiliary_timesteps
-    auxiliary = 0.0 if short else stages_config.auxiliary_share
-    side_by_side = stages_config.side_by_side
-    if hierarchical and side_by_side and auxiliary and count < len(TASKS):
-        raise UsageError(
-            f"ppo.num_envs is {count}: three auxiliary tasks side by side need 3 at least; "
-            "or set stages.side_by_side=false"
-        )
-    # Tasks of each environment, and share of the steps, by stage.
-    shares: dict[str, tuple[tuple[str, ...], float]] = {}
-    if hierarchical and not side_by_side:
-        for task in TASKS:
-            shares[f"auxiliary-{task}"] = ((task,) * count, auxiliary / len(TASKS))
-    else:
-        tasks = tuple(TASKS[k * len(TASKS) // count] for k in range(count)) if hierarchical else ()
-        shares["auxiliary"] = (tasks, auxiliary)
-    single = stages_config.single_room_share
-    shares |= {"single": ((), single), "all": ((), 1.0 - auxiliary - single)}
     steps = count * config.ppo.num_steps
-    updates = max(1, round(stages_config.total_timesteps / steps))
+    if stages_config.total_timesteps < steps:
+        raise UsageError(
+            f"stages.total_timesteps (--steps) is {stages_config.total_timesteps}: less than one "
+            f"update of {steps} steps (ppo.num_envs x ppo.num_steps); ask for as many at least"
+        )
+    shares = _shares(config, hierarchical=hierarchical)
+    updates = round(stages_config.total_timesteps / steps)
     extra = round(stages_config.extra_timesteps / steps)
     stages, share_before = [], 0.0
     for name, (tasks, share) in shares.items():
@@ -119,9 +107,37 @@ def schedule(
     if not stages:
         raise UsageError(
             f"stages.total_timesteps is {stages_config.total_timesteps}: less than one update of "
-            f"{steps} steps is left for {', '.join(parts)}"
+            f"{steps} steps is left for {', '.join(parts)} (stages.min_auxiliary_timesteps is "
+            f"{stages_config.min_auxiliary_timesteps})"
         )
     return stages
+
+
+def _shares(config: CampConfig, *, hierarchical: bool) -> dict[str, tuple[tuple[str, ...], float]]:
+    """Return the tasks of each environment, and the share of all steps, by stage.
+
+    Raises
+    ------
+    UsageError
+        There are more tasks side by side than environments.
+    """
+    stages, count = config.stages, config.ppo.num_envs
+    short = stages.total_timesteps < stages.min_auxiliary_timesteps
+    auxiliary = 0.0 if short else stages.auxiliary_share
+    if hierarchical and stages.side_by_side and auxiliary and count < len(TASKS):
+        raise UsageError(
+            f"ppo.num_envs is {count}: three auxiliary tasks side by side need 3 at least; "
+            "or set stages.side_by_side=false"
+        )
+    shares: dict[str, tuple[tuple[str, ...], float]] = {}
+    if hierarchical and not stages.side_by_side:
+        for task in TASKS:
+            shares[f"auxiliary-{task}"] = ((task,) * count, auxiliary / len(TASKS))
+    else:
+        tasks = tuple(TASKS[k * len(TASKS) // count] for k in range(count)) if hierarchical else ()
+        shares["auxiliary"] = (tasks, auxiliary)
+    single = stages.single_room_share
+    return shares | {"single": ((), single), "all": ((), 1.0 - auxiliary - single)}
 
 
 def check_parts(parts: Sequence[str]) -> None:

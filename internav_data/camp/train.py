@@ -12,7 +12,7 @@ from typing import Any, Final
 import torch
 
 from internav_data.camp import cloning, ppo
-from internav_data.camp.agents import agent_names, make_agent
+from internav_data.camp.agents import agent_names, check_settings, make_agent
 from internav_data.camp.agents.hierarchy import AuxiliaryAgent, Hierarchy
 from internav_data.camp.agents.protocol import Agent
 from internav_data.camp.checkpoint import Checkpoint, TrainState, pack, save, snapshots_of, unpack
@@ -28,6 +28,12 @@ from internav_data.records import Purpose, TrainingStream, generator
 from internav_data.records.errors import NotFiniteError, UsageError
 
 INTERRUPTED: Final = "saved; go on with --resume"
+_CLONING_EPS: Final = 1e-8
+"""Adam's epsilon in cloning."""
+_MAX_RATIO_ERROR: Final = 1e-3
+"""Greatest distance from 1 of a replayed ratio on a CPU, where 1e-5 is usual."""
+_MAX_RATIO_ERROR_GPU: Final = 0.2
+"""The same where products are of lower precision."""
 _CLONING_SAVES: Final = 4
 """Factor between checkpoints of cloning and of PPO, as its updates are smaller."""
 
@@ -97,6 +103,8 @@ class Trainer:
         draws = generator(seed, Purpose.TRAINING, attempt=TrainingStream.TORCH)
         torch.manual_seed(int(draws.integers(2**62)))
         self.data = TrainingData(request.dataset, config.data.filter, config.cloning.expert)
+        if checkpoint is None:
+            check_settings(self.method, config)
         self.agent = make_agent(self.method, config)
         self.stages = self._schedule()
         for stage in self.stages:
@@ -194,7 +202,8 @@ class Trainer:
             while state.done < stage.updates:
                 self.write(self.update(now))
                 last = state.done == stage.updates
-                validated = validates and (last or state.done % every.validate_every == 0)
+                due = every.validate_every and state.done % every.validate_every == 0
+                validated = bool(validates and (last or due))
                 score = self.validate() if validated else None
                 signum = max(self.ranks.all_gather_items([self._request.interrupted()]))
                 if last or signum or validated or state.done % save_every == 0:
@@ -216,8 +225,9 @@ class Trainer:
         if stage.tasks and isinstance(self.agent, Hierarchy):
             tasks = stage.tasks[local.start : local.stop]
             learner = AuxiliaryAgent(self.agent, tasks, stage.tasks)
-        optimiser = torch.optim.Adam(learner.optimised(), stage.rate)
-        source: Collector | Demonstrations = Collector(env, learner, seed)
+        eps = _CLONING_EPS if stage.clones else self.config.ppo.adam_eps
+        optimiser = torch.optim.Adam(learner.optimised(), stage.rate, eps=eps)
+        source: Collector | Demonstrations = Collector(env, learner, seed, overwrites=True)
         if stage.clones:
             source = Demonstrations(
                 env, learner, experts_of(self.data.demonstrated, self.config.cloning.expert)
@@ -262,10 +272,12 @@ class Trainer:
             now.learner, now.optimiser, demonstrations, config.num_steps, self.ranks.reduce
         )
         frames = config.num_envs * config.num_steps
+        epoch = 1 + state.done * config.epochs // stage.updates
         state.done, state.cloned_frames = state.done + 1, state.cloned_frames + frames
         if state.done % config.sync_every == 0:
             self.agent.synchronise()
         row = {**found, "learning_rate": rate, "update": state.done, "updates": stage.updates}
+        row |= {"epoch": epoch, "epochs": config.epochs}
         row["without_expert"] = self.data.without_expert
         row["frames_per_s"] = rates(frames, [self.lap()] * 3)["steps_per_s"]
         return {"step": state.cloned_frames, "cloning": row}
@@ -288,6 +300,7 @@ class Trainer:
             now.learner, now.optimiser, rollout, config, orders,
             critic_only=critic_only, reduce=self.ranks.reduce,
         )  # fmt: skip
+        self._check_replay(losses["ratio_error"])
         steps = config.num_envs * config.num_steps
         state.done, state.updates = state.done + 1, state.updates + 1
         state.environment_steps += steps
@@ -302,6 +315,23 @@ class Trainer:
             "episode": episodes, "decision": decisions, "ppo": losses,
             "time": rates(steps, (collector.loop.env_s, collected_s, self.lap())),
         }  # fmt: skip
+
+    def _check_replay(self, ratio_error: float) -> None:
+        """Check that an agent's `evaluate` finds the probabilities of what its `act` did.
+
+        Raises
+        ------
+        UsageError
+            A ratio of the first minibatch is not 1.
+        """
+        on_cpu = self.ranks.device.type == "cpu"
+        limit = _MAX_RATIO_ERROR if on_cpu else _MAX_RATIO_ERROR_GPU
+        if not ratio_error <= limit:
+            raise UsageError(
+                f"method {self.method!r}: replayed before any step is taken, an action's "
+                f"probability ratio differs from 1 by {ratio_error:.2g}, expected {limit} at most: "
+                "let its evaluate() compute what act() drew from, with the same memory"
+            )
 
     def _statistics(self, rollout: Rollout, local: range) -> tuple[Row, Row]:
         """Return the statistics of a rollout's episodes and decisions, across ranks."""

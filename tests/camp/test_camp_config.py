@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from internav_data.camp.agents import AGENTS, make_agent
+from internav_data.camp.agents import AGENTS, check_settings, make_agent
 from internav_data.camp.config import CampConfig, from_mapping, preset
 from internav_data.core.config import plain
 from internav_data.core.field_docs import descriptions
@@ -99,3 +99,21 @@ def test_a_method_with_an_intent_says_so_in_its_row(name):
     """`--intent none` changes the agent of such a method, and of no other."""
     agent = make_agent(name, preset("small"))
     assert agent.uses_intent == AGENTS[name].intent
+
+
+@pytest.mark.parametrize("name", AGENTS)
+def test_a_setting_that_a_method_has_no_use_for_is_refused(name):
+    """What a method reads changes its agent or its labels; the rest would change nothing."""
+    changes = {
+        "intent": "none", "sync_every": 1, "hand_back_step": True, "forbidden": ["push"],
+        "nie_objects": 2, "nie_weight": 1.0,
+    }  # fmt: skip
+    assert {each for method in AGENTS.values() for each in method.settings} == set(changes)
+    for setting, value in changes.items():
+        config = from_mapping(preset("small"), {"agent": {setting: value}}, "test")
+        check_settings("mine", config)
+        if setting in AGENTS[name].settings:
+            check_settings(name, config)
+            continue
+        with pytest.raises(UsageError, match=f"agent.{setting} is .*'{name}' has no use for it"):
+            check_settings(name, config)

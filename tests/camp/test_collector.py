@@ -153,3 +153,24 @@ def test_a_real_environment_is_lived_in(houses, config):
             lived.append(rollout)
     assert torch.equal(lived[0].log_probs, lived[2].log_probs)
     assert torch.equal(lived[0].rewards, lived[2].rewards)
+
+
+@pytest.mark.parametrize("overwrites", [False, True])
+def test_observations_are_overwritten_where_that_was_asked_for_alone(fake, config, overwrites):
+    """What is observed is the same, also where a rollout is longer than the one before."""
+    agent = make_agent("ppo", config())
+    collectors = [Collector(fake(), agent), Collector(fake(), agent, overwrites=overwrites)]
+    places, earlier = [], []
+    for collector in collectors:
+        collector.loop.reset()
+    for number, steps in enumerate((6, 6, 9)):
+        fresh, rollout = (
+            each.collect(uniforms_of(0, number, range(4), steps)) for each in collectors
+        )
+        for name, values in fresh.batch.observations.items():
+            assert torch.equal(values, rollout.batch.observations[name])
+        places.append(rollout.batch.observations["rgb"].data_ptr())
+        earlier.append((rollout, fresh))
+    first, same = earlier[0]
+    kept = torch.equal(first.batch.observations["rgb"], same.batch.observations["rgb"])
+    assert (places[0] == places[1], kept) == (overwrites, not overwrites)

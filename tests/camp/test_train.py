@@ -17,7 +17,7 @@ from internav_data.camp import data as data_module  # noqa: E402
 from internav_data.camp import train as train_module  # noqa: E402
 from internav_data.camp.agents import make_agent  # noqa: E402
 from internav_data.camp.agents.flat import PPOAgent  # noqa: E402
-from internav_data.camp.checkpoint import find, load_agent  # noqa: E402
+from internav_data.camp.checkpoint import find, load_agent, read  # noqa: E402
 from internav_data.camp.config import (  # noqa: E402
     config_of,
     from_mapping,
@@ -315,6 +315,29 @@ def test_settings_come_from_preset_file_options_and_overrides(tmp_path):
         config_of("small", None, [], {"seed": -1})
 
 
+def test_an_agent_whose_replay_differs_is_refused_at_its_first_rollout(request_for, monkeypatch):
+    class Forgetful(PPOAgent):
+        """It computes other probabilities than it drew from."""
+
+        def evaluate(self, batch):
+            found = super().evaluate(batch)
+            return replace(found, log_prob=1.01 * found.log_prob)
+
+    monkeypatch.setattr(train_module, "make_agent", lambda _, config: Forgetful(config))
+    given = replace(request_for("odd", "ppo"), clones=False)
+    with pytest.raises(UsageError, match=r"'ppo': replayed before any step.*evaluate\(\)"):
+        begin(given)
+    assert read(given.out).progress["updates"] == 0, "nothing of it is saved"
+
+
+def test_without_validations_in_between_a_stage_of_the_main_task_still_ends_with_one(request_for):
+    given = replace(request_for("rare", "ppo", run={"validate_every": 0}), clones=False)
+    begin(given)
+    rows = [json.loads(line) for line in (given.out / "log.jsonl").read_text().splitlines()]
+    stages = [row["stage"] for row in rows if "validation" in row]
+    assert stages == ["auxiliary", "single", "all"]
+
+
 BY_GRADIENTS = """
 import atexit
 import os
@@ -326,12 +349,12 @@ def check():
     if torch.distributed.is_initialized():
         os._exit(9)
 
-torch.optim.Adam = torch.optim.SGD
+torch.optim.Adam = lambda parameters, rate, **_: torch.optim.SGD(parameters, rate)
 main()
 """
 """`camp-train` that must leave its process group, and whose steps are the gradients.
 
-Adam divides by |g| + 1e-8, so that the last bits of tiny gradients would decide on its steps.
+Adam divides by |g| + epsilon, so that the last bits of tiny gradients would decide on its steps.
 """
 
 

@@ -18,7 +18,7 @@ from internav_data.camp.agents.flat import PPOAgent, PPOIntentAgent
 from internav_data.camp.agents.hierarchy import Hierarchy
 from internav_data.camp.agents.nie import NIEAgent
 from internav_data.camp.agents.protocol import Agent
-from internav_data.camp.config import CampConfig
+from internav_data.camp.config import AgentConfig, CampConfig
 from internav_data.records import Purpose, TrainingStream, generator
 from internav_data.records.errors import UsageError
 
@@ -32,8 +32,13 @@ class Method:
     """Text for `docs/training.md`."""
     privileged: str = "none"
     """Privileged input: observations that a robot would not have."""
-    intent: bool = False
-    """Whether it has an intent, so that `--intent` and `--sync-every` make variants of it."""
+    settings: tuple[str, ...] = ()
+    """Fields of `AgentConfig` that it reads and that not every method does."""
+
+    @property
+    def intent(self) -> bool:
+        """Whether it has an intent, so that `--intent` and `--sync-every` make variants of it."""
+        return "intent" in self.settings
 
 
 AGENTS: Final = {
@@ -41,23 +46,25 @@ AGENTS: Final = {
         Hierarchy,
         "a global policy opens Navigate, Push or Pick, conditioned on what the whole model is "
         "about to do (section 4)",
-        intent=True,
+        settings=("intent", "sync_every", "hand_back_step", "forbidden"),
     ),
     "hrl": Method(
         partial(Hierarchy, temporally_extended=False),
         "the same policies and the same pretraining; global decides at every step, Push and Pick "
         "have no Done, no intent",
+        settings=("forbidden",),
     ),
     "ppo": Method(PPOAgent, "one policy over all actions"),
     "ppo-intent": Method(
         PPOIntentAgent,
         "`ppo`, conditioned on what its own copy of some rollouts ago is about to do (figure 2c)",
-        intent=True,
+        settings=("intent", "sync_every"),
     ),
     "nie": Method(
         NIEAgent,
         "`ppo` that foresees what each action does to objects in sight (Zeng et al. 2021)",
         "**instance ids**",
+        settings=("nie_objects", "nie_weight"),
     ),
 }
 """Methods by name; trainer, documentation and tests derive their lists from it."""
@@ -68,6 +75,29 @@ GROUP: Final = "internav.agents"
 def agent_names() -> list[str]:
     """Return the names of all methods; those of entry points come last."""
     return [*AGENTS, *sorted(point.name for point in entry_points(group=GROUP))]
+
+
+def check_settings(name: str, config: CampConfig) -> None:
+    """Check that a method reads those settings of agents that are not as they are by default.
+
+    A user's own method may read any of them.
+
+    Raises
+    ------
+    UsageError
+        The method does not read a setting that was changed.
+    """
+    default = AgentConfig()
+    for setting in sorted({each for method in AGENTS.values() for each in method.settings}):
+        value = getattr(config.agent, setting)
+        if name not in AGENTS or setting in AGENTS[name].settings:
+            continue
+        if value != getattr(default, setting):
+            others = ", ".join(key for key, method in AGENTS.items() if setting in method.settings)
+            raise UsageError(
+                f"agent.{setting} is {value!r}: method {name!r} has no use for it; leave it out, "
+                f"or choose the method: {others}"
+            )
 
 
 def make_agent(name: str, config: CampConfig) -> Agent[Any]:
