@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -275,14 +276,22 @@ def _check_out(out: Path, *, force: bool) -> None:
         )
 
 
-def _reporter(name: str) -> Callable[[int, int], None] | None:
-    """Return a function that writes the number of finished episodes on a terminal."""
-    if not sys.stderr.isatty():
-        return None
+def _reporter(name: str) -> Callable[[int, int], None]:
+    """Return a function that shows the number of finished episodes, the rate and the time left."""
+    from internav_data.core.progress import ProgressLine, clock
+
+    line, began = ProgressLine(sys.stderr), time.monotonic()
 
     def report(done: int, total: int) -> None:
-        end = "\r\033[K" if done == total else ""
-        click.echo(f"\r\033[K{name}: {done}/{total} episodes{end}", nl=False, err=True)
+        if done == total:
+            line.end()
+        elif line.due():
+            spent = max(time.monotonic() - began, 1e-9)
+            left = clock((total - done) * spent / done)
+            line.update(
+                f"{name}: {done}/{total} episodes ({done / total:.0%}), "
+                f"{done / spent:.1f} episodes/s, {left} left"
+            )
 
     return report
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,6 +13,9 @@ import psutil
 import pytest
 from internav_cli.camp_eval import main
 from stderr_lines import beside_the_dataset
+
+from internav_data import load_dataset
+from internav_data.core import progress
 
 EVAL = Path(sys.executable).with_name("camp-eval")
 
@@ -91,6 +95,19 @@ def test_a_signal_to_the_group_ends_it_in_one_line_with_all_its_processes(
     assert [line for line in beside_the_dataset(err) if line] == ["camp-eval: interrupted"]
     assert psutil.wait_procs(children, 300)[1] == []
     assert not (tmp_path / "out").exists()
+
+
+def test_a_log_says_how_far_an_evaluation_is(call, dataset, monkeypatch):
+    monkeypatch.setattr(progress, "LOG_EVERY_S", 0.0)
+    code, _, err = call("random", dataset, "--split", "all", "--out", "out", "--max-steps", 20)
+    assert code == 0, err
+    counts = re.findall(
+        r"random: (\d+)/(\d+) episodes \(\d+%\), [\d.]+ episodes/s, \d+ s left", err
+    )
+    done = [int(number) for number, _ in counts]
+    assert done
+    assert done == sorted(done)
+    assert {total for _, total in counts} == {str(len(load_dataset(dataset)))}
 
 
 def test_the_same_call_gives_the_same_files(call, dataset, tmp_path):
