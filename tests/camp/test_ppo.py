@@ -72,6 +72,45 @@ def test_a_new_critic_is_trained_alone(collected, config):
     )
 
 
+@pytest.mark.parametrize("method", AGENTS)
+def test_a_new_critic_is_fitted_to_the_returns(collected, config, method):
+    """One update explains them; gradient steps alone, at a rate of a last layer, do not."""
+    agent, _, (_, rollout) = collected(method, steps=32)
+    returns = rollout.advantages(config().ppo) + rollout.values
+    learnt(agent, rollout, config().ppo, adam(agent, 1e-6), critic_only=True)
+    with torch.no_grad():
+        values = agent.evaluate(rollout.batch).value
+    before = explained_variance(rollout.values, returns)
+    assert explained_variance(values, returns) > max(before, 0.0) + 0.05
+
+
+@pytest.mark.parametrize("method", ["ppo", "camp"])
+def test_a_success_does_not_take_the_policys_share_of_the_gradient(collected, config, method):
+    """With values in units of the returns' deviation, ten times the reward is the same loss."""
+    agent, _, (_, rollout) = collected(method, steps=16)
+    ppo = dataclasses.replace(config().ppo, update_epochs=1, num_minibatches=1, ent_coef=0.0)
+
+    def norms(factor, scale_values):
+        one = copy.deepcopy(agent)
+        head = one.critics()[0]
+        with torch.no_grad():
+            for parameter in head.parameters():
+                parameter.zero_()
+        of = dataclasses.replace(
+            rollout, rewards=rollout.rewards * factor,
+            values=rollout.values * 0, last_value=rollout.last_value * 0,
+            final_values=rollout.final_values * 0,
+        )  # fmt: skip
+        settings = dataclasses.replace(ppo, scale_values=scale_values)
+        if scale_values:
+            returns = of.advantages(ppo)
+            head.scale.copy_(returns.std())
+        return learnt(one, of, settings, adam(one, 1e-9))["grad_norm"]
+
+    assert norms(10.0, True) == pytest.approx(norms(1.0, True), rel=1e-3)
+    assert norms(10.0, False) > 3.0 * norms(1.0, False)
+
+
 def test_the_kl_stops_updates_before_the_step_that_offends(collected, config):
     """Parameters are those after the steps that were within the limit, not one more."""
     agent, _, (_, rollout) = collected("ppo", steps=16)
