@@ -135,6 +135,8 @@ def candidate(
 ) -> EvaluatedPolicy:
     """Return a reference policy by its name, or the agent of a run's folder.
 
+    An agent plays on as many of torch's threads as it was trained with (`run.threads`).
+
     Raises
     ------
     UsageError
@@ -153,9 +155,13 @@ def candidate(
             f"{who}: neither a run's folder nor a reference policy; expected what `camp-train` "
             f"wrote, or some of {', '.join(REFERENCE_POLICIES)} with commas between them"
         )
+    import torch  # noqa: PLC0415 - reference policies do without
+
     from internav_data.camp.checkpoint import load_agent  # noqa: PLC0415 - torch
 
     agent = load_agent(who)
+    # Networks of 16 small pictures are no work for two threads, which wait for each other.
+    torch.set_num_threads(agent_config(agent, "run", "threads", 1))
     about = replace(_facts(agent, about), greedy=greedy, without_intent=without_intent)
     about = replace(about, name=row_name(about))
     size = agent_config(agent, "network", "image_size", 64)

@@ -173,6 +173,16 @@ def test_the_intent_can_be_left_out_where_there_is_one(played_data, stored):
         candidate(str(stored("ppo")), played_data, SHORT, without_intent=True)
 
 
+def test_an_agent_plays_on_as_many_threads_as_it_was_trained_with(played_data, stored):
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    try:
+        candidate(str(stored("ppo")), played_data, SHORT)
+        assert torch.get_num_threads() == 1
+    finally:
+        torch.set_num_threads(before)
+
+
 def test_names_of_rows(played_data):
     about = candidate("shortest_path", played_data, SHORT).about
     assert (about.name, about.is_reference) == ("shortest_path", True)
