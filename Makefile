@@ -75,7 +75,7 @@ mini: $(STAMP) ## make the small dataset that ships with the package again
 
 DEMO_TRAIN := --device cpu --preset small --pretrain bc --steps 32768 \
   --set cloning.frames=80000 --set cloning.epochs=1 --set ppo.critic_warmup_rollouts=4 \
-  --set stages.auxiliary_share=0 --set stages.joint_learning_rate=3e-4 \
+  --set stages.joint_learning_rate=3e-4 \
   --set run.max_steps=150 --set run.validate_every=8
 DEMO_MEASURE := --split all --max-steps 150 --force
 
