@@ -113,7 +113,11 @@ Exit codes: 0 good, 1 error, 2 usage, 5 corrupt data, 6 NaN or infinity,
     help="Processes that step environments; they change no number.  [default: none]",
 )
 @click.option(
-    "--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto", show_default=True
+    "--device",
+    type=click.Choice(["auto", "cpu", "cuda"]),
+    default="auto",
+    show_default=True,
+    help="Where networks run; auto takes a GPU where there is one.",
 )
 @click.option(
     "--resume",

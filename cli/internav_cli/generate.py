@@ -82,7 +82,14 @@ workers gives the same bytes.""",
     type=click.Path(path_type=Path),
     help="The dataset's folder.  [default: $INTERNAV_DATASET, else internav-dataset]",
 )
-@click.option("--scenes", type=int, default=12_000, show_default=True, callback=positive)
+@click.option(
+    "--scenes",
+    type=int,
+    default=12_000,
+    show_default=True,
+    callback=positive,
+    help="Number of houses, those that are there already included.",
+)
 @click.option(
     "--scene-range",
     metavar="A:B",

@@ -8,6 +8,7 @@ import sys
 import time
 from pathlib import Path
 
+import click
 import pytest
 from stderr_lines import beside_the_dataset
 
@@ -69,6 +70,27 @@ def cpu_seconds():
     """Time of the processors that children took: other work on the machine does not count."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
+
+
+def options_of(command, path):
+    """Yield path and option of a command and of all below it; old names are hidden."""
+    if isinstance(command, click.Group):
+        context = click.Context(command)
+        for name in command.list_commands(context):  # imported when they are asked for
+            yield from options_of(command.get_command(context, name), (*path, name))
+    for option in command.params:
+        if isinstance(option, click.Option) and not option.hidden:
+            yield path, option
+
+
+def test_every_command_and_option_says_what_it_does():
+    from internav_cli import camp_eval, camp_train, data
+    from internav_cli.main import cli
+
+    programs = (data.cli, cli, camp_eval.cli, camp_train.command)
+    found = [each for program in programs for each in options_of(program, (program.name,))]
+    assert len(found) > 100
+    assert [(path, option.opts) for path, option in found if not option.help] == []
 
 
 def test_help_imports_nothing_heavy():
