@@ -221,9 +221,12 @@ def _asked(given: dict[str, Any], request: Request) -> dict[str, Any]:
     from internav_data.camp.run import CHANGEABLE
     from internav_data.core.config import keys_given, known_keys
 
-    keys = keys_given(given["config_file"], given["overrides"], _settings(given))
+    named = keys_given(given["config_file"], given["overrides"], _settings(given))
+    known = known_keys(request.config)
+    # A name inside a setting, as in mine.width, is that setting's.
+    keys = [key for key in known if any(f"{each}.".startswith(f"{key}.") for each in named)]
     if given["preset"]:
-        keys += [key for key in known_keys(request.config) if key not in CHANGEABLE]
+        keys += [key for key in known if key not in CHANGEABLE]
     return {
         "method": given["method"],
         "config": request.config if keys else None,

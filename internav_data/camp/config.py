@@ -229,6 +229,8 @@ class CampConfig:
 
     seed: Annotated[int, Bounds(0, MAX_SEED)] = 0
     """Seed that every random number derives from."""
+    mine: Mapping[str, Annotated[float, Bounds(-1e6, 1e6)]] = field(default_factory=dict)
+    """Hyperparameters of an agent of your own, by name (`--set mine.width=3`)."""
     network: NetworkConfig = field(default_factory=NetworkConfig)
     """Sizes of the networks."""
     agent: AgentConfig = field(default_factory=AgentConfig)

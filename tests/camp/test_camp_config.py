@@ -6,8 +6,8 @@ import json
 import pytest
 
 from internav_data.camp.agents import AGENTS, check_settings, make_agent
-from internav_data.camp.config import CampConfig, from_mapping, preset
-from internav_data.core.config import plain
+from internav_data.camp.config import CampConfig, config_of, from_mapping, preset
+from internav_data.core.config import config_toml, plain
 from internav_data.core.field_docs import descriptions
 from internav_data.records.errors import UsageError
 
@@ -83,7 +83,8 @@ def test_unknown_presets_are_refused():
 
 def test_every_field_is_documented():
     config = CampConfig()
-    for part in (config, *(getattr(config, f.name) for f in dataclasses.fields(config)[1:])):
+    values = [getattr(config, f.name) for f in dataclasses.fields(config)]
+    for part in (config, *filter(dataclasses.is_dataclass, values)):
         notes = descriptions(type(part))
         for field in dataclasses.fields(part):
             assert notes.get(field.name), f"{type(part).__name__}.{field.name}"
@@ -99,6 +100,22 @@ def test_a_method_with_an_intent_says_so_in_its_row(name):
     """`--intent none` changes the agent of such a method, and of no other."""
     agent = make_agent(name, preset("small"))
     assert agent.uses_intent == AGENTS[name].intent
+
+
+def test_settings_of_ones_own_are_numbers_by_name(tmp_path):
+    """From the command line, over those of a file, whose other names stay; they are written."""
+    file = tmp_path / "mine.toml"
+    file.write_text("[mine]\nwidth = 1\ndecay = 0.5\n")
+    config = config_of("small", file, ["mine.width=3"])
+    assert config.mine == {"width": 3.0, "decay": 0.5}
+    check_settings("mine", config)
+    file.write_text(config_toml(config))
+    assert config_of("small", file) == config
+    assert from_mapping(preset("small"), json.loads(json.dumps(plain(config))), "test") == config
+    with pytest.raises(UsageError, match=r"mine.decay: method 'ppo' has no settings of its own"):
+        check_settings("ppo", config)
+    with pytest.raises(UsageError, match=r"mine.width: expected a number"):
+        config_of("small", None, ["mine.width=wide"])
 
 
 @pytest.mark.parametrize("name", AGENTS)

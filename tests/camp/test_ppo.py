@@ -2,6 +2,8 @@
 
 import copy
 import dataclasses
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -70,6 +72,20 @@ def test_a_new_critic_is_trained_alone(collected, config):
     torch.testing.assert_close(
         agent.evaluate(rollout.batch).log_prob, rollout.log_probs, atol=1e-5, rtol=0
     )
+
+
+def test_the_documentations_own_agent_is_trained(collected, config):
+    """Its critic alone at first, then all of it; replayed exactly."""
+    text = (Path(__file__).parents[2] / "docs" / "training.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(import torch\n.*?)# Every agent must", text, re.DOTALL)
+    names = {"__name__": "own"}
+    exec(compile(code, "docs/training.md", "exec"), names)  # noqa: S102 - our own page
+    agent, _, (_, rollout) = collected("", agent=names["Mine"](config()), steps=16)
+    before = parameters(agent)
+    learnt(agent, rollout, config().ppo, critic_only=True)
+    changed = {n for n, p in agent.named_parameters() if not torch.equal(p, before[n])}
+    assert changed == {"policy.critic.weight", "policy.critic.bias"}
+    assert learnt(agent, rollout, config().ppo)["ratio_error"] < 1e-5
 
 
 @pytest.mark.parametrize("method", AGENTS)

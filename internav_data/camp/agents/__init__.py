@@ -88,6 +88,11 @@ def check_settings(name: str, config: CampConfig) -> None:
         The method does not read a setting that was changed.
     """
     default = AgentConfig()
+    if name in AGENTS and config.mine:
+        raise UsageError(
+            f"mine.{min(config.mine)}: method {name!r} has no settings of its own; leave it out, "
+            f"or name your own method (entry points {GROUP})"
+        )
     for setting in sorted({each for method in AGENTS.values() for each in method.settings}):
         value = getattr(config.agent, setting)
         if name not in AGENTS or setting in AGENTS[name].settings:
