@@ -136,11 +136,12 @@ test-other: ## run tests of physics, generation and the loader with PYTHON=anoth
 	$(OTHER)/bin/python -m pytest $(TESTS) -k 'not (pandas or duckdb or polars)' $(ARGS) $(OTHER_TESTS)
 
 .PHONY: test-interop
-test-interop: ## read datasets with the newest datasets and mlcroissant, upload with huggingface_hub
+test-interop: ## the newest datasets, mlcroissant and huggingface_hub read and send what we write; buckets by moto
 	@$(call VIRTUAL_ENVIRONMENT,$(INTEROP)); \
 	$(INTEROP)/bin/python -m pip install -qq --disable-pip-version-check --no-input --upgrade \
-	  --editable . click pytest hypothesis datasets huggingface_hub mlcroissant pyyaml
-	$(INTEROP)/bin/python -m pytest -q $(ARGS) tests/interop tests/dataset/test_hugging_face.py
+	  --editable '.[generate]' pytest hypothesis datasets huggingface_hub mlcroissant 'moto[server]' pyyaml
+	$(INTEROP)/bin/python -m pytest -q $(ARGS) tests/interop tests/dataset/test_hugging_face.py \
+	  tests/generation/test_object_store.py
 
 LOWEST_TESTS := tests/dataset/test_loader.py tests/dataset/test_stream.py tests/core \
   tests/geometry tests/catalog tests/evaluation/test_statistics.py tests/verification/test_mutations.py \

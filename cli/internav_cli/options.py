@@ -165,12 +165,13 @@ def _engine_of(folder: Path) -> str:
 
 def name_dataset(given: Path | None, engine: str = "", part: DatasetPart | None = None) -> None:
     """Write on stderr which dataset a command takes, why if none was named, range and engine."""
+    from internav_data.core.storage import store_of
     from internav_data.dataset.location import dataset_folder, origin
 
     if os.environ.get("RANK", "0") != "0":
         return  # torchrun starts this program once a rank
     reason = origin(given)
-    line = f"dataset: {dataset_folder(given)}" + (f" ({reason})" if reason else "")
+    line = f"dataset: {store_of(dataset_folder(given)).at('')}" + (f" ({reason})" if reason else "")
     line += f"; part {part.first_scene}:{part.end_scene} of a dataset" if part else ""
     click.echo(line + (f"; physics: {engine}" if engine else ""), err=True)
 

@@ -40,6 +40,10 @@ class LockedError(InternavError):
     """Another process holds the lock of the store."""
 
 
+class StoreError(InternavError):
+    """A store that is far away cannot be reached, read or written; its data need not be damaged."""
+
+
 class OutsideError(UsageError):
     """A folder of the store is a link out of it: nothing is written or removed through it."""
 
@@ -49,7 +53,7 @@ class Store(Protocol):
     """Named blobs. Names are relative paths with forward slashes.
 
     A store travels pickled to worker processes. Reading what is not there raises
-    FileNotFoundError, any other failure another OSError.
+    FileNotFoundError, any other failure another OSError, or StoreError where that says more.
     """
 
     def at(self, name: str) -> str:
@@ -121,12 +125,25 @@ class Store(Protocol):
 
 
 StoreLike: TypeAlias = "str | Path | Store"
-"""A store, or the folder that is one."""
+"""A store; or the folder that is one, or the URL `s3://bucket/prefix`, also as a path."""
 
 
 def store_of(root: StoreLike) -> Store:
-    """Return a store, that of a folder where a path is given."""
-    return root if isinstance(root, Store) else FolderStore(Path(root))
+    """Return a store: that of a folder where a path is given, that of a bucket for its URL.
+
+    Raises
+    ------
+    UsageError
+        A URL names no bucket.
+
+    """
+    if isinstance(root, Store):
+        return root
+    if str(root).startswith("s3:/"):
+        from internav_data.core.object_store import ObjectStore  # noqa: PLC0415 - it imports us
+
+        return ObjectStore.of(str(root))
+    return FolderStore(Path(root))
 
 
 def temporary_of(name: str) -> str:
@@ -267,22 +284,43 @@ class FolderStore:
 
         """
         self.root.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(*_lock_file(self.root))
-        _HELD.add(descriptor)
-        try:
-            # Some network file systems cannot lock folders: there we trust the user.
-            with contextlib.suppress(OSError):
-                deadline = time.monotonic() + _ENDING_S
-                while not try_lock(descriptor):
-                    if time.monotonic() > deadline:
-                        holder = lock_holder(descriptor)
-                        named = f" (held by {holder})" if holder else ""
-                        raise LockedError(f"{self.root}: {busy}{named}")
-                    time.sleep(_POLL_S)
+        with hold_lock(*_lock_file(self.root), str(self.root), busy):
             yield
-        finally:
-            _HELD.discard(descriptor)
-            os.close(descriptor)
+
+
+@contextlib.contextmanager
+def hold_lock(path: Path, flags: int, place: str, busy: str) -> Iterator[None]:
+    """Hold the lock of a file, which the kernel opens when its holder dies.
+
+    Parameters
+    ----------
+    path, flags
+        File whose lock it is, and the flags to open it with.
+    place, busy
+        Place of the store, and what to do while another process holds it.
+
+    Raises
+    ------
+    LockedError
+        Another process holds it; it is named.
+
+    """
+    descriptor = os.open(path, flags)
+    _HELD.add(descriptor)
+    try:
+        # Some network file systems cannot lock folders: there we trust the user.
+        with contextlib.suppress(OSError):
+            deadline = time.monotonic() + _ENDING_S
+            while not try_lock(descriptor):
+                if time.monotonic() > deadline:
+                    holder = lock_holder(descriptor)
+                    named = f" (held by {holder})" if holder else ""
+                    raise LockedError(f"{place}: {busy}{named}")
+                time.sleep(_POLL_S)
+        yield
+    finally:
+        _HELD.discard(descriptor)
+        os.close(descriptor)
 
 
 @contextlib.contextmanager
@@ -318,9 +356,14 @@ def _lock_file(folder: Path) -> tuple[Path, int]:
     """
     if not WINDOWS:
         return folder, os.O_RDONLY
+    return lock_file_for(os.path.realpath(folder))
+
+
+def lock_file_for(place: str) -> tuple[Path, int]:
+    """Return the file of the user's temporary folder whose lock is that of a place, and flags."""
     import tempfile  # noqa: PLC0415 - slow to import, and of use here alone
 
-    name = hashlib.sha256(os.path.realpath(folder).encode()).hexdigest()[:32]
+    name = hashlib.sha256(place.encode()).hexdigest()[:32]
     return Path(tempfile.gettempdir(), f"internav-{name}.lock"), os.O_RDWR | os.O_CREAT
 
 

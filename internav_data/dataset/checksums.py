@@ -73,6 +73,12 @@ class ChunkChecksums:
     ends: list[list[int]]
     checksums: list[list[int]]
 
+    def ranges(self, groups: Sequence[int], columns: Sequence[int]) -> Iterator[tuple[int, int]]:
+        """Yield the start and the end of chunks, by numbers of row groups and columns."""
+        for group in groups:
+            starts, ends = self.starts[group], self.ends[group]
+            yield from ((starts[k], ends[k]) for k in columns)
+
     def verify(self, read: Callable[[int, int], bytes], group: int, columns: Sequence[int]) -> None:
         """Compare chunks of a row group with their checksums.
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from internav_data.core.extras import require
 from internav_data.core.lru import LRUCache
-from internav_data.core.storage import Store, StoreLike, store_of
+from internav_data.core.storage import FolderStore, Store, StoreLike, store_of
 from internav_data.dataset.decode import from_table
 from internav_data.dataset.flatten import COLUMNS, FLAT
 from internav_data.dataset.location import folder_to_read
@@ -96,7 +96,10 @@ class Dataset(Generic[E]):
         columns: Sequence[str] | None = None,
     ) -> None:
         # Files are opened when they are first read: the folder must be found then too.
-        self.store = path if isinstance(path, Store) else store_of(Path(path).absolute())
+        store = store_of(path)
+        if isinstance(store, FolderStore):
+            store = FolderStore(store.root.absolute())
+        self.store: Store = store
         self.split, self.filters = split, filters
         self.columns = None if columns is None else tuple(columns)
         with_manifest(self.store, self._open_checked)
@@ -139,7 +142,7 @@ class Dataset(Generic[E]):
         chosen = f", split={self.split!r}" if self.split else ""
         part = self.manifest.part
         range_ = f", part {part.first_scene}:{part.end_scene}" if part else ""
-        return f"Dataset({str(self.path)!r}{chosen}{range_}, {len(self)} episodes)"
+        return f"Dataset({self.store.at('')!r}{chosen}{range_}, {len(self)} episodes)"
 
     def _repr_html_(self) -> str:
         """Return the dataset's statistics for a notebook."""

@@ -243,14 +243,15 @@ def read_manifest_and_digest(root: StoreLike) -> tuple[Manifest, str]:
 
 
 def _absence(store: Store) -> str:
-    root = Path(store.at(""))
+    root = store.at("")
     if exists(store, IDENTITY):
         return (
             f"{root}: the dataset is not finished (no {MANIFEST}, but .work/): "
             "run `internav-gen generate` on it again to resume"
         )
     return (
-        f"{root}: no dataset here ({MANIFEST} is missing): `{making_command(root)}` makes one, "
+        f"{root}: no dataset here ({MANIFEST} is missing): "
+        f"`{making_command(Path(root))}` makes one, "
         f"`{MINI}` names the one that ships"
     )
 

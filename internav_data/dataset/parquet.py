@@ -11,13 +11,14 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from internav_data.core.storage import Store, write_atomically
+from internav_data.core.ranges_file import RangesFile
+from internav_data.core.storage import Store, StoreError, write_atomically
 from internav_data.dataset.checksums import ChunkChecksums, checksums_of, with_checksums
 from internav_data.dataset.compatibility import conformed, problems
 from internav_data.dataset.decode import one_array
 from internav_data.dataset.digest import logical_digest
 from internav_data.dataset.encode import to_table
-from internav_data.records.errors import CorruptDataError
+from internav_data.records.errors import CorruptDataError, InternavError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -206,8 +207,11 @@ class TableFile:
 
     def __init__(self, place: str, source: Path | BinaryIO, spec: TableSpec[Any]) -> None:
         self.place, self._spec = place, spec
+        self._ranges = None if isinstance(source, Path) else RangesFile(source)
         self._source = (
-            pa.OSFile(str(source)) if isinstance(source, Path) else pa.PythonFile(source, mode="r")
+            pa.OSFile(str(source))
+            if self._ranges is None
+            else pa.PythonFile(self._ranges, mode="r")
         )
         try:
             self._file = pq.ParquetFile(self._source, page_checksum_verification=True)
@@ -247,6 +251,7 @@ class TableFile:
         try:
             self._verify([group], names)
             table = self._file.read_row_group(group, columns=names, use_threads=False)
+            self._release()
             table = table.replace_schema_metadata(None)  # the checksums, of this file alone
             return table if self._exact else conformed(table, self._spec.schema, columns)
         except Exception as error:
@@ -283,6 +288,7 @@ class TableFile:
         try:
             self._verify(range(self.metadata.num_row_groups), names)
             table = self._file.read(columns=names).replace_schema_metadata(None)
+            self._release()
             table.validate(full=True)
         except Exception as error:
             raise damaged(self.place, error) from error
@@ -293,8 +299,15 @@ class TableFile:
         if self._checksums is None or not groups:
             return
         columns = range(self.metadata.num_columns) if names is None else self._leaves(names)
+        if self._ranges is not None:
+            self._ranges.hold(self._checksums.ranges(groups, columns))
         for group in groups:
             self._checksums.verify(self._source.read_at, group, columns)
+
+    def _release(self) -> None:
+        """Forget the bytes of a file far away that were read."""
+        if self._ranges is not None:
+            self._ranges.release()
 
     def _leaves(self, names: Sequence[str]) -> list[int]:
         """Return the numbers of the leaf columns that are named, or lie below one that is."""
@@ -353,7 +366,9 @@ def read_table(path: Path, spec: TableSpec[Any], columns: Sequence[str] | None =
         return file.read_all(columns)
 
 
-def damaged(path: Path | str, error: BaseException) -> CorruptDataError:
-    """Return the error to raise for a file that pyarrow cannot read."""
+def damaged(path: Path | str, error: BaseException) -> InternavError:
+    """Return the error to raise for a file that pyarrow cannot read, or that is out of reach."""
+    if isinstance(error, StoreError):
+        return StoreError(*error.args)
     reason = (str(error).splitlines() or [type(error).__name__])[0]
     return CorruptDataError(f"{path}: the file is damaged ({reason}): {MENDING}")

@@ -18,7 +18,9 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -259,14 +261,16 @@ def staged_scenes(staging: Staging, scenes: Iterable[int] | None = None) -> dict
         names = [name for name in store.names(staging.folder) if name.endswith(".work")]
     else:
         names = [name for name in map(staging.name, scenes) if exists(store, name)]
-    states = {}
-    for name in names:
-        try:
-            state = _state(staging, name, store.read(name))
-        except CorruptDataError:
-            continue
-        states[state.scene] = state
-    return dict(sorted(states.items()))
+    with ThreadPoolExecutor() as threads:  # a bucket takes 20 ms for each
+        states = [state for state in threads.map(partial(_state_or_none, staging), names) if state]
+    return {state.scene: state for state in sorted(states, key=lambda state: state.scene)}
+
+
+def _state_or_none(staging: Staging, name: str) -> SceneState | None:
+    try:
+        return _state(staging, name, staging.store.read(name))
+    except CorruptDataError:
+        return None
 
 
 def read_staged_rows(staging: Staging, scene: int, *, house: bool) -> pa.Table:

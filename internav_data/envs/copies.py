@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from internav_data.core.storage import FolderStore, store_of
 from internav_data.dataset.location import folder_to_read
 
 if TYPE_CHECKING:
@@ -20,10 +21,13 @@ if TYPE_CHECKING:
 
 
 def with_absolute_path(dataset: str | Path | Dataset[Episode]) -> str | Dataset[Episode]:
-    """Return a dataset's path, found from any directory; a loaded dataset as it is."""
+    """Return a dataset's path, found from any directory, or its URL; a loaded dataset as it is."""
     if not isinstance(dataset, str | Path):
         return dataset
-    return os.path.abspath(folder_to_read(dataset))  # noqa: PTH100 - links stay what they are
+    store = store_of(folder_to_read(dataset))
+    if not isinstance(store, FolderStore):
+        return store.at("")
+    return os.path.abspath(store.root)  # noqa: PTH100 - links stay what they are
 
 
 def plain_spec(spec: EnvSpec | None) -> EnvSpec | None:

@@ -6,7 +6,6 @@ distance fields cost far more than a step. The most recently used ones are kept.
 
 from __future__ import annotations
 
-import hashlib
 import math
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
@@ -15,12 +14,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from internav_data.core.files import read_file
 from internav_data.core.hardware import hardware
 from internav_data.core.lru import LRUCache
-from internav_data.dataset import load_dataset, read_manifest
+from internav_data.core.storage import FolderStore, store_of
+from internav_data.dataset import load_dataset
 from internav_data.dataset.location import folder_to_read
-from internav_data.dataset.manifest import MANIFEST, MANIFEST_LIMITS
+from internav_data.dataset.manifest import read_manifest_and_digest
 from internav_data.dataset.select import joined
 from internav_data.envs.auxiliary import auxiliary_starts
 from internav_data.envs.order import EpisodeOrder, scene_bounds
@@ -240,14 +239,13 @@ def open_source(
         if agreed_only:
             _check_agreed(dataset.manifest)
         return Source(dataset.select(split, filters))
-    path = folder_to_read(dataset)
-    if not (path / MANIFEST).exists():
-        load_dataset(path)  # raises with what is wrong there
+    store = store_of(folder_to_read(dataset))
+    manifest, digest = read_manifest_and_digest(store)
     if agreed_only:
-        _check_agreed(read_manifest(path))
-    digest = hashlib.sha256(read_file(path / MANIFEST, MANIFEST_LIMITS)).hexdigest()
-    key = repr((str(path.resolve()), digest, split, filters))
-    return _SOURCES.get(key, lambda: Source(load_dataset(path, split, filters)))
+        _check_agreed(manifest)
+    place = store.root.resolve() if isinstance(store, FolderStore) else store.at("")
+    key = repr((str(place), digest, split, filters))
+    return _SOURCES.get(key, lambda: Source(load_dataset(store, split, filters)))
 
 
 def _check_agreed(manifest: Manifest) -> None:

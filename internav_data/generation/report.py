@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 class Report:
     """Result of a run."""
 
-    out: Path
-    """Folder of the dataset."""
+    out: Path | str
+    """Folder of the dataset, or its URL."""
     scenes: int
     """Scenes of the dataset, quarantined ones included."""
     episodes: int
@@ -52,7 +52,7 @@ class Report:
         return asdict(self) | {"out": str(self.out)}
 
 
-def report_of(out: Path, manifest: Manifest, progress: GenerationProgress) -> Report:
+def report_of(out: Path | str, manifest: Manifest, progress: GenerationProgress) -> Report:
     """Return the report of a run: the dataset's figures, and those counted on the way."""
     return Report(
         out=out,

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 from internav_data.core.extras import require
 from internav_data.core.interrupts import InterruptedRunError, Interrupts
 from internav_data.core.messages import Done, Failed, Recipe
-from internav_data.core.storage import FolderStore, disk_errors
+from internav_data.core.storage import FolderStore, disk_errors, store_of
 from internav_data.dataset import (
     STAGING,
     DatasetPart,
@@ -63,10 +63,9 @@ from internav_data.records.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
-    from pathlib import Path
 
     from internav_data.catalog import Catalogue
-    from internav_data.core.storage import Store
+    from internav_data.core.storage import Store, StoreLike
     from internav_data.dataset import Manifest, Retry, Staging
     from internav_data.records import Asset
 
@@ -86,7 +85,7 @@ TAIL_SCENES = 8
 
 
 def generate(
-    out: Path,
+    out: StoreLike,
     config: GenerationConfig,
     scenes: int | range,
     workers: int = 0,
@@ -105,7 +104,8 @@ def generate(
     Parameters
     ----------
     out
-        The dataset's folder: new, empty, or one that holds a dataset of this config.
+        The dataset's folder, or `s3://bucket/prefix`: new, empty, or one that holds a dataset of
+        this config.
     config
         Settings of every scene.
     scenes
@@ -149,17 +149,18 @@ def generate(
     numbers = check_scenes(scenes)
     chosen = get_executor(executor, workers) if isinstance(executor, str) else executor
     config.check()
-    with disk_errors(out):
-        _require_engine(config, out)
+    store = store_of(out)
+    place = store.at("").rstrip("/")
+    with disk_errors(place):
+        _require_engine(config, store)
     assets = assets or _catalogue(config)
     identity = identity_for(config, assets)
     part = (
         None if isinstance(scenes, int) else DatasetPart(scenes.start, scenes.stop, identity.rules)
     )
-    with disk_errors(out):
-        if out.exists() and not out.is_dir():
-            raise UsageError(f"{out} is a file: give a folder that is new, empty or a dataset")
-        store = FolderStore(out)
+    with disk_errors(place):
+        if isinstance(store, FolderStore) and store.root.exists() and not store.root.is_dir():
+            raise UsageError(f"{place} is a file: give a folder that is new, empty or a dataset")
         with store.lock(BUSY):
             _forget_idle_staging(store)
             staging = open_staging(store, identity, _FIRST.identity(assets.digest), part)
@@ -174,12 +175,12 @@ def generate(
                 _make(chosen, recipe, queue, commits, progress, stop)
                 if stop():
                     commits.commit_all()
-                    raise InterruptedRunError(_interruption(out, progress), stop.signum)
+                    raise InterruptedRunError(_interruption(place, progress), stop.signum)
             manifest = _assembled(staging, identity, assets, numbers, progress, part)
-    return report_of(out, manifest, progress)
+    return report_of(store.root if isinstance(store, FolderStore) else place, manifest, progress)
 
 
-def with_held_engine(config: GenerationConfig, out: Path) -> GenerationConfig:
+def with_held_engine(config: GenerationConfig, out: StoreLike) -> GenerationConfig:
     """Return a config with the physics engine of the dataset that a folder holds, if it holds one.
 
     Raises
@@ -188,17 +189,18 @@ def with_held_engine(config: GenerationConfig, out: Path) -> GenerationConfig:
         The dataset's manifest is damaged, or names no engine that there is.
 
     """
-    held = held_config(FolderStore(out))
+    held = held_config(out)
     if held is None:
         return config
     engine = PhysicsConfig.of_dataset(held).engine
     return replace(config, physics=replace(config.physics, engine=engine))
 
 
-def _require_engine(config: GenerationConfig, out: Path) -> None:
+def _require_engine(config: GenerationConfig, store: Store) -> None:
     """Check that the engine is installed; another one is offered where no scene is made yet."""
-    begun = held_config(FolderStore(out)) is not None
-    require_engine(config.physics.engine, str(out) if begun else "", switchable=not begun)
+    begun = held_config(store) is not None
+    place = store.at("") if begun else ""
+    require_engine(config.physics.engine, place, switchable=not begun)
     if config.physics.other_engine is not None:
         require_engine(config.physics.other_engine, "cross-check")
 
@@ -456,7 +458,7 @@ def _hopeless(store: Store, count: int, reason: str) -> QuarantineError:
     return QuarantineError(f"none of {count} scenes could be made: {reason}; nothing was written")
 
 
-def _interruption(out: Path, progress: GenerationProgress) -> str:
+def _interruption(out: str, progress: GenerationProgress) -> str:
     done = progress.scenes_before + progress.scenes
     readable = (
         f"the first {progress.readable} can be read" if progress.readable else "they are kept"

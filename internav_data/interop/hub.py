@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from internav_data.core.extras import require
-from internav_data.core.storage import store_of
+from internav_data.core.storage import FolderStore, store_of
 from internav_data.dataset.location import folder_to_read
 from internav_data.dataset.manifest import read_manifest
 from internav_data.dataset.metadata_files import METADATA
@@ -94,13 +94,17 @@ def plan_upload(
     CorruptDataError
         There is no dataset, or a file is missing, truncated or edited.
     UsageError
-        The repository's name is none.
+        The repository's name is none, or the dataset is in a bucket.
     """
     if not _REPOSITORY.fullmatch(repository):
         raise UsageError(f"repository {repository!r}: expected USER/NAME, as in me/my-houses")
     folder = folder_to_read(dataset)
+    if not isinstance(store := store_of(folder), FolderStore):
+        raise UsageError(
+            f"{store.at('')}: upload sends a folder: copy the dataset into one (`aws s3 sync`)"
+        )
     manifest = read_manifest(folder)
-    damage = find_damage(store_of(folder))
+    damage = find_damage(store)
     if damage is not None:
         raise CorruptDataError(
             f"{folder / damage.paths[0]}: edited or damaged since the dataset was made or missing: "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from internav_data.core.storage import FolderStore, file_sha256
+from internav_data.core.storage import FolderStore, file_sha256, store_of
 from internav_data.dataset import logical_digest, read_manifest
 from internav_data.dataset.journal import journal_names
 from internav_data.dataset.manifest import MANIFEST
@@ -34,6 +34,11 @@ def check_manifest(root: Path, report: FindingCollector) -> Manifest | None:
         The folder holds no finished dataset.
 
     """
+    if not isinstance(store_of(root), FolderStore):
+        raise UsageError(
+            f"{store_of(root).at('')}: validate reads a folder: copy the dataset into one "
+            "(`aws s3 sync`) and validate that"
+        )
     if not root.is_dir():
         raise UsageError(f"{root}: no such folder: give the folder that `generate` wrote")
     try:

@@ -4,13 +4,25 @@ import multiprocessing
 import os
 import pickle
 import socket
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from memory_store import KilledError, MemoryStore
+from pyarrow import fs
 from test_commit import ASSETS, IDENTITY, build, staging_of
 
-from internav_data.core import storage
-from internav_data.core.storage import FolderStore, LockedError, OutsideError, Store, exists
+from internav_data.core import object_store, storage
+from internav_data.core.object_store import ObjectStore
+from internav_data.core.storage import (
+    FolderStore,
+    LockedError,
+    OutsideError,
+    Store,
+    StoreError,
+    exists,
+    store_of,
+)
 from internav_data.dataset import (
     assemble,
     compute_stats,
@@ -18,18 +30,72 @@ from internav_data.dataset import (
     has_manifest,
     load_dataset,
     open_staging,
+    parquet,
     read_manifest,
     shards,
 )
 from internav_data.records.errors import CorruptDataError, UsageError
 
 
-@pytest.fixture(params=["folder", "memory"])
-def store(request, tmp_path):
-    return FolderStore(tmp_path / "store") if request.param == "folder" else MemoryStore()
+class Bucket:
+    """A client of a bucket that is a folder: pyarrow's calls, without a server."""
+
+    def __init__(self, root):
+        self.files = fs.SubTreeFileSystem(str(root), fs.LocalFileSystem())
+        self.reads, self.cut = [], False
+
+    def __getattr__(self, name):
+        return getattr(self.files, name)
+
+    def open_output_stream(self, key):
+        self.files.create_dir(key.rpartition("/")[0])
+        return self.files.open_output_stream(key)
+
+    def open_input_file(self, key):
+        return Opened(self, self.files.open_input_file(key))
 
 
-def test_both_are_stores(store):
+class Opened:
+    """A file of a bucket, which notes each read."""
+
+    def __init__(self, bucket, file):
+        self.bucket, self.file = bucket, file
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.file.close()
+
+    def __getattr__(self, name):
+        return getattr(self.file, name)
+
+    def read_at(self, size, at):
+        self.bucket.reads.append((at, size))
+        if self.bucket.cut:
+            raise OSError("AWS Error NETWORK_CONNECTION during GetObject operation: curlCode: 56")
+        return self.file.read_at(size, at)
+
+
+@pytest.fixture
+def client(tmp_path, monkeypatch):
+    client = Bucket(tmp_path)
+    monkeypatch.setattr(object_store, "_client", lambda *_: client)
+    return client
+
+
+@pytest.fixture
+def bucket(client):
+    return ObjectStore("s3://bucket/prefix")
+
+
+@pytest.fixture(params=["folder", "memory", "bucket"])
+def store(request, tmp_path, bucket):
+    made = {"folder": FolderStore(tmp_path / "store"), "memory": MemoryStore(), "bucket": bucket}
+    return made[request.param]
+
+
+def test_all_are_stores(store):
     assert isinstance(store, Store)
 
 
@@ -74,6 +140,102 @@ def test_a_dataset_in_memory_is_that_in_a_folder(tmp_path, monkeypatch):
         open_staging(memory, type(IDENTITY)("other", "1", 0, 1, "0", {}))
     with pytest.raises(CorruptDataError, match="no dataset here"):
         read_manifest(MemoryStore())
+
+
+def test_a_dataset_in_a_bucket_is_that_in_a_folder(bucket, tmp_path, monkeypatch):
+    monkeypatch.setattr(shards, "SCENES_PER_SHARD", {"episodes": 8, "scenes": 20})
+    folder = FolderStore(tmp_path / "d")
+    for store in (bucket, folder):
+        for low, high in ((0, 10), (10, 24)):
+            build(store, range(low, high), quarantined={5})
+            assemble(store, IDENTITY, ASSETS, high)
+    assert bucket.names() == folder.names()
+    assert all(bucket.read(name) == folder.read(name) for name in folder.names())
+    ours, theirs = load_dataset("s3://bucket/prefix"), load_dataset(folder)
+    assert list(ours) == list(theirs)
+    assert ours[5] == theirs[5]
+    assert ours.to_table(["index"]) == theirs.to_table(["index"])
+    assert repr(ours).startswith("Dataset('s3://bucket/prefix', ")
+    with bucket.lock("busy"), pytest.raises(LockedError, match="s3://bucket/prefix: come back"):
+        bucket.lock("come back").__enter__()
+
+
+def test_a_row_group_far_away_is_one_request(bucket, client, monkeypatch):
+    monkeypatch.setattr(parquet, "ROWS_PER_GROUP", 20)
+    build(bucket, range(24))
+    assemble(bucket, IDENTITY, ASSETS, 24)
+    dataset = load_dataset(bucket, "train")
+    dataset[0]
+    client.reads.clear()
+    assert dataset[25].index == 1
+    assert len(client.reads) == 1, "all chunks in one request"
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        (
+            "When uploading part for key 'x': AWS Error ACCESS_DENIED during UploadPart operation",
+            r"access is denied \(UploadPart\): give these credentials the right to do it",
+        ),
+        (
+            "AWS Error UNKNOWN (HTTP status 503) during HeadObject operation: No response body.",
+            r"requests are throttled \(HeadObject\): what is finished is kept, .*fewer --workers",
+        ),
+        (
+            "AWS Error NETWORK_CONNECTION during PutObject operation: curlCode: 56",
+            r"the connection was lost \(PutObject\): what is finished is kept, run the same",
+        ),
+        ("AWS Error ODD during GetObject operation: x", r"ODD \(GetObject\): what is finished"),
+        ("Something\nelse", "Something else: what is finished is kept"),
+    ],
+)
+def test_errors_of_a_bucket_are_one_line(bucket, monkeypatch, text, line):
+    def fail(*_):
+        raise OSError(text)
+
+    failing = SimpleNamespace(
+        **dict.fromkeys(
+            ("get_file_info", "open_input_file", "open_output_stream", "delete_file"), fail
+        )
+    )
+    monkeypatch.setattr(object_store, "_client", lambda *_: failing)
+    for call in (
+        lambda: bucket.size("a"),
+        lambda: bucket.read("a"),
+        lambda: bucket.source("a"),
+        lambda: bucket.put("a", b"1"),
+        bucket.names,
+        lambda: bucket.remove("a"),
+    ):
+        with pytest.raises(StoreError, match=f"^s3://bucket/prefix.*: {line}"):
+            call()
+
+
+def test_a_connection_lost_while_reading_is_no_damage(bucket, client):
+    build(bucket, range(24))
+    assemble(bucket, IDENTITY, ASSETS, 24)
+    dataset = load_dataset(bucket, "train")
+    client.cut = True
+    with pytest.raises(StoreError, match="the connection was lost"):
+        dataset[0]
+    client.cut = False
+    assert dataset[0] == load_dataset(bucket, "train")[0]
+
+
+def test_an_object_of_another_size_than_was_sent_is_refused(bucket, monkeypatch):
+    monkeypatch.setattr(ObjectStore, "size", lambda *_: 2)
+    with pytest.raises(StoreError, match="2 of 3 bytes arrived: what is finished is kept"):
+        bucket.put("a", b"123")
+
+
+def test_urls_of_buckets_are_known_as_paths_too(tmp_path):
+    for given in ("s3://b/a/c", "s3://b/a/c/", Path("s3://b/a/c")):
+        assert store_of(given) == ObjectStore("s3://b/a/c")
+    assert store_of("s3x/a") == FolderStore(Path("s3x/a"))
+    for wrong in ("s3://", "s3:///a", "s3://bucket", "s3://bucket/"):
+        with pytest.raises(UsageError, match=r"expected s3://bucket/prefix"):
+            store_of(wrong)
 
 
 @pytest.mark.parametrize("first", [0, 10])

@@ -67,13 +67,23 @@ def stub(payload):
             raise QuarantineError("nothing can be blocked")
         if orders.get("full") == scene:
             raise OSError(28, "No space left on device", payload.staging.store.at(STAGING))
-        home = house(payload.config.seed, scene)
-        count = payload.config.episodes_of(home.split)
-        episodes = [episode(home, k) for k in range(count)]
-        stage_scene(payload.staging, scene, home, episodes, redraws={"spot": scene % 3})
-        return count
+        return staged(payload, scene)
 
     return make
+
+
+def staged(payload, scene):
+    """Stage a scene and count its episodes."""
+    home = house(payload.config.seed, scene)
+    count = payload.config.episodes_of(home.split)
+    episodes = [episode(home, k) for k in range(count)]
+    stage_scene(payload.staging, scene, home, episodes, redraws={"spot": scene % 3})
+    return count
+
+
+def plain(payload):
+    """Make scenes in any store, without orders."""
+    return lambda scene: staged(payload, scene)
 
 
 @dataclass
