@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from internav_data.core.arithmetic import plain_sum
@@ -86,10 +87,50 @@ def best_tree(candidate: PlanCandidate, rng: Generator) -> list[RoomEdge] | None
         tree = door_tree(candidate.types, edges, rng, jitter)
         if tree is None:
             return None
-        score = plain_sum(score_terms(candidate, tree, TREE_SCORE).values())
+        score = _tree_score(candidate, tree)
         if best is None or score < best[0]:
             best = (score, tree)
     return best[1] if best is not None else None
+
+
+def improved_tree(candidate: PlanCandidate, tree: Sequence[RoomEdge]) -> list[RoomEdge]:
+    """Swap doors of a tree, one at a time and the best swap first, while that lowers its score.
+
+    Hill climbing over the spanning trees of the rooms; it draws no random number.
+    """
+    best = sorted(tree)
+    score = _tree_score(candidate, best)
+    while True:
+        swaps = ((_tree_score(candidate, other), other) for other in _swaps(candidate, best))
+        lowest, other = min(swaps, default=(score, best))
+        if lowest >= score:
+            return best
+        score, best = lowest, other
+
+
+def _tree_score(candidate: PlanCandidate, tree: Sequence[RoomEdge]) -> float:
+    return plain_sum(score_terms(candidate, tree, TREE_SCORE).values())
+
+
+def _swaps(candidate: PlanCandidate, tree: Sequence[RoomEdge]) -> list[list[RoomEdge]]:
+    """Return all spanning trees that differ from one by one door, each in ascending order."""
+    # A further door closes a loop of doors, of which any other may go.
+    return [
+        sorted({*tree, new} - {old})
+        for new in sorted(set(candidate.spans) - set(tree))
+        for old in _doors_between(tree, *new)
+    ]
+
+
+def _doors_between(tree: Sequence[RoomEdge], first: int, last: int) -> list[RoomEdge]:
+    """Return the doors that one passes from a room to another along a tree."""
+    paths: dict[int, list[RoomEdge]] = {first: []}
+    while last not in paths:
+        for a, b in tree:
+            for here, there in ((a, b), (b, a)):
+                if here in paths and there not in paths:
+                    paths[there] = [*paths[here], (a, b)]
+    return paths[last]
 
 
 def scored_plan(candidate: PlanCandidate | None, rng: Generator) -> FloorPlan | None:
@@ -133,6 +174,14 @@ def _will_do(plan: FloorPlan, tries: int) -> bool:
     return tries >= MAX_TRIES_HOME or not any(plan.score_terms[name] for name in MUST_NOT)
 
 
+def _improved(plan: FloorPlan, candidate: PlanCandidate) -> FloorPlan:
+    """Return a plan with better doors, where a depth is asked for: few drawn trees have it."""
+    if candidate.rooms_on_path is None:
+        return plan
+    tree = improved_tree(candidate, plan.tree)
+    return replace(plan, tree=tuple(tree), score_terms=score_terms(candidate, tree))
+
+
 def choose_floor_plan(key: SceneKey, config: HouseConfig, specs: Sequence[RoomSpec]) -> FloorPlan:
     """Draw `config.candidates` floor plans and return the best one; a plain row if all fail.
 
@@ -145,19 +194,23 @@ def choose_floor_plan(key: SceneKey, config: HouseConfig, specs: Sequence[RoomSp
         the error guards against standards that exclude each other.
     """
     rng = key.generator(Purpose.FLOOR_PLAN, draw=FloorPlanStream.CANDIDATES)
-    best: FloorPlan | None = None
+    best: tuple[FloorPlan, PlanCandidate] | None = None
     for k in range(config.candidates * MAX_TRIES):
-        if k >= config.candidates and best is not None and _will_do(best, k // config.candidates):
+        rounds = k // config.candidates
+        if rounds and best is not None and _will_do(best[0], rounds):
             break
-        layout = draw_layout(specs, rng, config.wings)
-        found = scored_plan(plan_candidate(layout, specs, config), rng)
-        if found is not None and (best is None or found.score < best.score):
-            best = found
-    if best is None:
-        best = scored_plan(plan_candidate(row_layout(specs), specs, config, lenient=True), rng)
-    if best is None:
+        candidate = plan_candidate(draw_layout(specs, rng, config.wings), specs, config)
+        found = scored_plan(candidate, rng)
+        if candidate is None or found is None:
+            continue
+        if best is None or found.score < best[0].score:
+            best = found, candidate
+    plan = None if best is None else _improved(*best)
+    if plan is None:
+        plan = scored_plan(plan_candidate(row_layout(specs), specs, config, lenient=True), rng)
+    if plan is None:
         raise QuarantineError(
             f"scene {key.scene}: no floor plan keeps the {config.preset} standards for "
             f"{', '.join(spec.type for spec in specs)}; try another seed or programme"
         )
-    return best
+    return plan

@@ -47,7 +47,7 @@ class HouseConfig:
     """Further factor for houses of 1-2 rooms."""
     scale_medium: Annotated[float, Bounds(0.7, 2.0)] = 0.95
     """Further factor for houses of 3-5 rooms."""
-    scale_large: Annotated[float, Bounds(0.7, 2.0)] = 0.975
+    scale_large: Annotated[float, Bounds(0.7, 2.0)] = 0.985
     """Further factor for houses of 6-10 rooms."""
     furnishing: Annotated[float, Bounds(0.0, 2.0)] = 1.0
     """Amount of furniture beyond the indispensable: 0 bare, 1 lived in, 2 crowded."""

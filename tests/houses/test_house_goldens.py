@@ -16,8 +16,8 @@ SCENES = 33
 ALL_TYPES = "hall,living,dining,kitchen,laundry,office,storage,studio,bathroom,bedroom"
 
 GOLDEN = {
-    "paper": "5d7cbfb0b9d43ac603ec00f0669183ad53c4342157b658e844f74dce10507862",
-    "paper, every type": "f953480da3e402c4bc50a9850f20ec7c5226aeaab1a221c52771e53f7e92f9b9",
+    "paper": "dedb73257b2681f0a2cbb14b9bd84331ada3f117c8abd6ac04a779d20eb2c239",
+    "paper, every type": "d7edad40c665911eaf2b1b76a7b6ea044ad1c85376f9f590a33ccc38ab8e7e0a",
     "realistic": "b669efd270c42ab33fe756fdeab53651d2218284ddaae5535683987b3a07b89f",
     "realistic, every type": "0b6e8876a9d2acc7e39bd756a203497e98f9af286f5721140d44d3737c2a9b54",
 }
