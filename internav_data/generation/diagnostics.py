@@ -196,8 +196,8 @@ def _result_cache() -> list[Check]:
         return [Check(name, "good", f"none kept: {result_cache.FOLDER_VARIABLE} is empty", "")]
     path = folder / result_cache.FILE_NAME
     if result_cache.ResultCache(folder).is_open:
-        mb, most = path.stat().st_size / 1e6, result_cache.MAX_BYTES / 1e6
-        return [Check(name, "good", f"{mb:.0f} of at most {most:.0f} MB at {path}", "")]
+        held, most = path.stat().st_size / 2**20, result_cache.MAX_BYTES / 2**30
+        return [Check(name, "good", f"{held:.0f} MiB, at most {most:.0f} GiB, at {path}", "")]
     remedy = f"set {result_cache.FOLDER_VARIABLE} to a folder of yours, or to nothing to keep none"
     return [Check(name, "warning", f"{path} cannot be written: none are kept", remedy)]
 

@@ -277,7 +277,7 @@ def test_doctor_shows_the_result_cache(tmp_path, where):
     check = next(c for c in json.loads(result.stdout) if c["name"] == "solved pushes")
     state, found = {
         "": ("good", "none kept"),
-        "cache": ("good", "MB at"),
+        "cache": ("good", "MiB, at most 2 GiB, at"),
         "file/below": ("warning", "none are kept"),
     }[where]
     assert check["state"] == state
