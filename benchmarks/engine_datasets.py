@@ -21,6 +21,7 @@ import numpy as np
 
 from internav_data.dataset import load_dataset
 from internav_data.generation import generate, load_config
+from internav_data.records.physics import FORCE_N
 
 if TYPE_CHECKING:
     from internav_data.records import Episode
@@ -59,6 +60,8 @@ def made(engine: str, args: argparse.Namespace, preset: str, push_model: str) ->
         f"test_episodes_per_scene={args.episodes_per_scene}",
         f"physics.engine={engine}",
         f"world.push_model={push_model}",
+        # A kick has no force; `dense` sets one.
+        *([f"world.force_n={FORCE_N}"] if push_model == "kick" else []),
     ]
     with tempfile.TemporaryDirectory(prefix="internav-engines-") as folder:
         out = Path(folder) / "dataset"
