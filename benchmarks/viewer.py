@@ -14,6 +14,7 @@ import argparse
 import dataclasses
 import hashlib
 import json
+import os
 import re
 import shutil
 import statistics
@@ -64,8 +65,9 @@ TARGETS = {"first_picture_s": 2.0, "filter_s": 1.0, "memory_mb": 500}
 class _Replica:
     """Writer of a dataset whose scenes are those of a small one again and again."""
 
-    def __init__(self, base: Path, out: Path) -> None:
+    def __init__(self, base: Path, out: Path, *, link: bool) -> None:
         self._out, self._store = out, store_of(base)
+        self._copy = os.link if link else shutil.copyfile
         self._manifest = read_manifest(self._store)
         self._tables = {
             spec.name: pa.concat_tables(
@@ -110,7 +112,7 @@ class _Replica:
         """Add a shard's bytes under another number: its scenes are those of the other."""
         other = self._files[number % DISTINCT]
         path = re.sub(r"-\d{5}-", f"-{number:05d}-", other.path)
-        shutil.copyfile(self._out / other.path, self._out / path)
+        self._copy(self._out / other.path, self._out / path)
         self._files.append(dataclasses.replace(other, path=path))
 
     def _shard(self, spec: TableSpec[Any], number: int, scenes: range, per: int) -> None:
@@ -138,9 +140,12 @@ class _Replica:
         self._files.append(DataFile(table=spec.name, split="train", **info))
 
 
-def replicated(base: Path, out: Path, episodes: int) -> Manifest:
-    """Write a dataset of many episodes, those of a small one again and again."""
-    return _Replica(base, out).write(episodes)
+def replicated(base: Path, out: Path, episodes: int, *, link: bool = False) -> Manifest:
+    """Write a dataset of many episodes, those of a small one again and again.
+
+    With `link`, files of the same bytes are links to one, which saves the disk.
+    """
+    return _Replica(base, out, link=link).write(episodes)
 
 
 _WITHOUT_PANDAS = """

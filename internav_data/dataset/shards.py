@@ -57,6 +57,11 @@ class _Span:
     end: int
 
 
+def scene_number(scene_id: str) -> int:
+    """Return a scene's number: ids have six digits, or as many as they need."""
+    return int(scene_id.rpartition("-")[2])
+
+
 class SceneSource:
     """The rows of scenes: from an older version of the dataset, from parts of it, from staging.
 
@@ -95,7 +100,7 @@ class SceneSource:
         for state in self._states.values():
             self.scenes[state.split].append(state.scene_id)
         for scenes in self.scenes.values():
-            scenes.sort()  # by number, of six digits: a scene may be made long after its neighbours
+            scenes.sort(key=scene_number)  # a scene may be made long after its neighbours
 
     def _find_scenes(self, home: _Home) -> list[str]:
         """Note which rows of a file are a scene's, as they stand together; return the scenes."""

@@ -44,7 +44,7 @@ IDENTITY = f"{STAGING}identity.json"
 _FILE = FileLimits(remedy=f"move {STAGING} away and start anew")
 _SCENES = f"{STAGING}scenes/"
 _NAME = re.compile(
-    rf"{re.escape(IDENTITY)}|{re.escape(_SCENES)}(?:[0-9a-f]{{16}}/)?\d{{6}}/scene-\d{{6}}\.work"
+    rf"{re.escape(IDENTITY)}|{re.escape(_SCENES)}(?:[0-9a-f]{{16}}/)?\d{{6}}/scene-\d{{6,8}}\.work"
 )
 _MAGIC = b"INWORK02"
 _HEAD = len(_MAGIC) + 32

@@ -72,8 +72,8 @@ if TYPE_CHECKING:
 GENERATOR = "internav-gen"
 BUSY = f"another {GENERATOR} is writing this dataset; wait for it to end or choose another --out"
 """Reason for which a second run in the same folder is refused."""
-MAX_SCENES = 1_000_000
-"""Scene ids have six digits."""
+MAX_SCENES = 10_000_000
+"""Number of scenes of a dataset: the manifest of more would be too large (`MANIFEST_LIMITS`)."""
 MAX_FIRST_FAILURES = 20
 """Scenes that fail before one succeeds, after which the config is at fault."""
 MAX_NAMED_MESHES = 5

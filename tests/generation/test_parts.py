@@ -157,12 +157,22 @@ def test_a_part_may_hold_quarantined_scenes_alone(tmp_path):
     assert len(load_dataset(parts[1])) == 0
 
 
+def test_ids_go_on_beyond_a_million(tmp_path):
+    out = made(tmp_path / "part", range(999_998, 1_000_003), "here")
+    assert validate(out, level="files").ok
+    ids = load_dataset(out).scene_ids
+    assert ids == tuple(f"scene-{k}" for k in (999_998, 999_999, 1_000_000, 1_000_001, 1_000_002))
+    again = made(tmp_path / "again", range(999_998, 1_000_001), "here")
+    made(again, range(999_998, 1_000_003), "here")
+    assert content(again) == content(out), "staged, committed and extended by number"
+
+
 def test_the_command_takes_a_range_and_refuses_what_is_none(tmp_path):
     for given, message in (
         ("5", "expected A:B, as in 0:6000"),
         ("-1:5", "expected A:B, as in 0:6000"),
         ("5:5", "scene range is 5:5: expected A:B with 0 <= A < B"),
-        ("0:2000001", "scene range is 0:2000001"),
+        ("0:10000001", "scene range is 0:10000001"),
     ):
         found = CliRunner().invoke(
             cli, ["generate", "--out", str(tmp_path / "d"), f"--scene-range={given}"]
