@@ -32,14 +32,16 @@ file is that of a run in one piece. After a kill the same command goes on.""",
 @JSON
 def command(*, parts: tuple[Path, ...], out: Path, as_json: bool) -> int:
     """Join the parts of a dataset into one, with the bytes of a run in one piece."""
+    from internav_data.core.storage import store_of
     from internav_data.dataset import merge
 
+    place = store_of(out).at("").rstrip("/")
     manifest = merge(parts, out, lambda line: click.echo(line, err=True))
     episodes = sum(count.episodes for count in manifest.counts.values())
     click.echo(
-        f"{out}: {manifest.scenes} scenes, {episodes} episodes of {len(parts)} parts", err=True
+        f"{place}: {manifest.scenes} scenes, {episodes} episodes of {len(parts)} parts", err=True
     )
     if as_json:
-        figures = {"out": str(out), "scenes": manifest.scenes, "episodes": episodes}
+        figures = {"out": place, "scenes": manifest.scenes, "episodes": episodes}
         click.echo(json.dumps(figures | {"parts": [str(part) for part in parts]}))
     return 0

@@ -114,7 +114,7 @@ def test_parts_in_buckets_and_folders_are_merged(server, folder, tmp_path):
     parts = [made("s3://bucket/parts/a", range(9)), made(tmp_path / "b", range(9, SCENES))]
     found = CliRunner().invoke(cli, ["merge", *map(str, parts), "--out", "s3://bucket/parts/all"])
     assert found.exit_code == 0, found.output
-    assert "s3://bucket/parts/all" in found.output
+    assert f"s3://bucket/parts/all: {SCENES} scenes" in found.output
     assert content("s3://bucket/parts/all") == content(folder)
 
 
