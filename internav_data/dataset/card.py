@@ -131,8 +131,9 @@ def _interactions(stats: Stats) -> str:
 {100 * stats.openable_share_of_blocked:.1f} % of the blocked episodes open by a single one. An
 expert, replayed before it was stored, solves {100 * expert.solved_share:.1f} % of the episodes in
 {expert.steps.mean:.1f} steps on average ({expert.pushes:.2f} pushes, {expert.picks:.2f} picks); its
-SPL of {expert.spl:.3f} and STS of {expert.sts:.3f} are the ceiling to compare agents with. It
-refused {100 * expert.refused_share:.1f} % of the draws.
+SPL of {expert.spl:.3f} and STS of {expert.sts:.3f} are there to compare agents with,
+and no bound: its plans are not proven shortest. It refused
+{100 * expert.refused_share:.1f} % of the draws.
 {_agreement(stats)}"""
     )
 
