@@ -15,7 +15,7 @@ from scene_stubs import CATALOGUE, stub
 from internav_data.core.storage import FolderStore, LockedError
 from internav_data.dataset import open_staging, read_manifest
 from internav_data.generation.config import GenerationConfig, load_config
-from internav_data.generation.run import generate, identity_for
+from internav_data.generation.run import MAX_SCENES, generate, identity_for
 from internav_data.records.errors import (
     CorruptDataError,
     InternavError,
@@ -261,7 +261,7 @@ def test_a_read_only_folder(tmp_path):
         made(tmp_path / "d", 3)
 
 
-@pytest.mark.parametrize(("scenes", "workers"), [(0, 1), (-1, 1), (10**7, 1), (1, -1)])
+@pytest.mark.parametrize(("scenes", "workers"), [(0, 1), (-1, 1), (MAX_SCENES + 1, 1), (1, -1)])
 def test_invalid_counts_are_refused(tmp_path, scenes, workers):
     with pytest.raises(UsageError):
         made(tmp_path / "d", scenes, workers=workers)
