@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from internav_cli.streams import prepare_streams
+from internav_cli.streams import leave_unwritten, prepare_streams
 from internav_data.core.machine import END_SIGNALS
 
 if TYPE_CHECKING:
@@ -121,7 +121,9 @@ def launch(command: click.Command, program: str, arguments: list[str] | None = N
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - every one becomes one line
         if debug:
             traceback.print_exc()
-        sys.exit(_report(error, program, given))
+        code = _report(error, program, given)
+        leave_unwritten()
+        sys.exit(code)
     sys.exit(result if isinstance(result, int) else 0)
 
 

@@ -50,3 +50,14 @@ def prepare_streams() -> None:
                 errors="backslashreplace",
                 line_buffering=True,
             )
+
+
+def leave_unwritten() -> None:
+    """Leave out what stdout cannot take, as on a full device: the interpreter's end fails on it.
+
+    Since Python 3.13 it then exits with 120, after lines of its own.
+    """
+    try:
+        sys.stdout.flush()
+    except OSError:
+        sys.stdout = None

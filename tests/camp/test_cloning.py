@@ -20,6 +20,7 @@ from internav_data.camp.agents.hierarchy import (  # noqa: E402
 )
 from internav_data.camp.cloning import Demonstrations, update  # noqa: E402
 from internav_data.camp.ppo import set_rate  # noqa: E402
+from internav_data.physics import engines  # noqa: E402
 from internav_data.records.errors import UsageError  # noqa: E402
 from internav_data.world.actions import ACTIONS, actions_of_option  # noqa: E402
 
@@ -307,7 +308,9 @@ def test_episodes_without_an_expert_are_skipped_and_counted(houses, config, tmp_
 
     def clone(name, episodes):
         folder = tmp_path / name
-        identity = Identity("made by hand", "1", 0, 1, "0" * 64, {})
+        identity = Identity(
+            "made by hand", "1", 0, 1, "0" * 64, {"physics": {"engine": engines.DEFAULT_ENGINE}}
+        )
         store = open_staging(folder, identity)
         for number, scene in enumerate(given.scene_ids):
             own = [each for each in episodes if each.scene_id == scene]

@@ -16,6 +16,7 @@ from stderr_lines import beside_the_dataset
 
 from internav_data import load_dataset
 from internav_data.core import progress
+from internav_data.physics import engines
 
 EVAL = Path(sys.executable).with_name("camp-eval")
 
@@ -198,7 +199,7 @@ def test_a_dataset_without_experts_says_so(call, tmp_path_factory, dataset):
 
     whole = load_dataset(dataset)
     out = tmp_path_factory.mktemp("bare") / "data"
-    identity = Identity("test", "1", 0, 4, "0", {})
+    identity = Identity("test", "1", 0, 4, "0", {"physics": {"engine": engines.DEFAULT_ENGINE}})
     for scene in range(3):
         scene_id = f"scene-{scene:06d}"
         episodes = [replace(e, expert=None) for e in whole if e.scene_id == scene_id]

@@ -17,7 +17,7 @@ from scenery import ASSETS, Grid, brute_steps, write_dataset
 
 import internav_data.world.world
 from internav_data.navigation import Lattice
-from internav_data.physics import Body, wall_body
+from internav_data.physics import Body, engines, wall_body
 from internav_data.physics.fall_clearance import fall_clearance
 from internav_data.physics.narrow_phase import joined_prisms, prisms_of
 from internav_data.physics.result_cache import ResultCache
@@ -558,7 +558,8 @@ def test_another_build_is_noted(tmp_path, scenes):
     findings = judged(tmp_path, changed(scenes, 0, 0, physics=physics))
     assert findings.ok
     (note,) = findings.notes
-    assert "made by bullet of pybullet 9.9.9, checked by bullet of pybullet" in note
+    engine = engines.DEFAULT_ENGINE
+    assert f"made by {engine} of pybullet 9.9.9, checked by {engine} of " in note
     assert findings.notes[note] == 1
 
 
