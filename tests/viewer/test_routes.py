@@ -10,6 +10,7 @@ import pytest
 from internav_data.dataset import load_dataset
 from internav_data.dataset.location import MINI
 from internav_data.geometry import part_corners, transform
+from internav_data.physics.engines import ENGINES
 from internav_data.records import Outcome
 from internav_data.records.errors import CorruptDataError
 from internav_data.viewer import ViewedDataset, respond
@@ -132,7 +133,11 @@ def test_outcomes_need_no_physics(folder, monkeypatch):
 
 
 def test_an_expert_whose_engine_is_missing_is_a_line(monkeypatch):
+    def absent():
+        raise ModuleNotFoundError(name="pybullet")
+
     monkeypatch.setitem(sys.modules, "pybullet", None)
+    monkeypatch.setitem(ENGINES, "bullet", absent)  # other tests may have connected it
     viewed = ViewedDataset(MINI)
     # First pushes come from stored outcomes: some expert pushes again.
     several = (e.episode_id for e in viewed.dataset if e.expert and e.expert.pushes > 1)
