@@ -10,19 +10,19 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import io
 import os
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, BinaryIO, Final, cast
 
+from internav_data.core.ranges_file import PositionedFile
 from internav_data.core.storage import StoreError, hold_lock, lock_file_for
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from pyarrow import fs
+    from pyarrow import NativeFile, fs
 
 _URL: Final = re.compile(r"s3:/{1,2}([^/]+)/+(.*[^/])/*")
 """Bucket and prefix of a URL; as a `Path`, one has a single slash at its beginning."""
@@ -110,7 +110,8 @@ class ObjectStore:
     def source(self, name: str) -> BinaryIO:
         """Return an object as a file that can be read and sought: a request for each read."""
         with self._errors(name):
-            return cast("BinaryIO", _ObjectFile(self, name, self._client(), self._key(name)))
+            file = self._client().open_input_file(self._key(name))
+            return cast("BinaryIO", _ObjectFile(self.at(name), file))
 
     def put(self, name: str, data: bytes, *, beside: str = "") -> None:
         """Store an object: readers see the old one or the new one, never a part.
@@ -268,34 +269,16 @@ def _client(bucket: str, variables: tuple[str | None, ...], _process: int) -> fs
     )
 
 
-class _ObjectFile(io.RawIOBase):
+class _ObjectFile(PositionedFile):
     """An object that is read a range at a time; see `ObjectStore.source`."""
 
-    def __init__(self, store: ObjectStore, name: str, client: fs.S3FileSystem, key: str) -> None:
-        super().__init__()
-        self._place = store.at(name)
-        self._file = client.open_input_file(key)
-        self._size: int = self._file.size()
-        self._at = 0
+    def __init__(self, place: str, file: NativeFile) -> None:
+        super().__init__(file.size())
+        self._place, self._file = place, file
 
-    def read(self, size: int = -1, /) -> bytes:
-        end = self._size if size < 0 else min(self._at + size, self._size)
-        if end <= self._at:
-            return b""
+    def fetch(self, start: int, end: int) -> bytes:
         with store_errors(self._place):
-            data: bytes = self._file.read_at(end - self._at, self._at)
-        self._at += len(data)
-        return data
-
-    def seek(self, offset: int, whence: int = os.SEEK_SET, /) -> int:
-        self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at}.get(whence, self._size)
-        return self._at
-
-    def readable(self) -> bool:
-        return True
-
-    def seekable(self) -> bool:
-        return True
+            return cast("bytes", self._file.read_at(end - start, start))
 
     def close(self) -> None:
         self._file.close()

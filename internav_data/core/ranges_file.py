@@ -19,42 +19,30 @@ MAX_GAP_BYTES = 256 << 10
 """Bytes between two ranges below which both are fetched at once: a request costs as much."""
 
 
-class RangesFile(io.RawIOBase):
-    """A file that is read, sought and closed, with ranges of its bytes held in memory.
+class PositionedFile(io.RawIOBase):
+    """A file that is read and sought, whose bytes are fetched by `fetch`.
 
     Parameters
     ----------
-    file
-        File that the bytes are read from.
+    size
+        Number of its bytes.
 
     """
 
-    def __init__(self, file: BinaryIO) -> None:
+    def __init__(self, size: int) -> None:
         super().__init__()
-        self._file, self._at = file, 0
-        self._size = file.seek(0, os.SEEK_END)
-        self._held: list[tuple[int, bytes]] = []
+        self._size, self._at = size, 0
 
-    def hold(self, ranges: Iterable[tuple[int, int]]) -> None:
-        """Fetch ranges (start, end) of bytes, neighbours at once, and forget those held before."""
-        self._held = []
-        for start, end in joined(ranges):
-            self._file.seek(start)
-            self._held.append((start, self._file.read(end - start)))
-
-    def release(self) -> None:
-        """Forget the ranges that are held."""
-        self._held = []
+    def fetch(self, start: int, end: int) -> bytes:
+        """Return the bytes start … end - 1, which the file has."""
+        raise NotImplementedError
 
     def read(self, size: int = -1, /) -> bytes:
         """Return the next `size` bytes, all for -1; fewer at the end."""
         end = self._size if size < 0 else min(self._at + size, self._size)
-        start, self._at = self._at, max(self._at, end)
-        for first, data in self._held:
-            if first <= start and end <= first + len(data):
-                return data[start - first : end - first]
-        self._file.seek(start)
-        return self._file.read(max(end - start, 0))
+        data = self.fetch(self._at, end) if self._at < end else b""
+        self._at += len(data)
+        return data
 
     def seek(self, offset: int, whence: int = os.SEEK_SET, /) -> int:
         """Move to a place in the file and return it."""
@@ -69,6 +57,41 @@ class RangesFile(io.RawIOBase):
     def seekable(self) -> bool:
         """Return True."""
         return True
+
+
+class RangesFile(PositionedFile):
+    """A file of which ranges are held in memory.
+
+    Parameters
+    ----------
+    file
+        File that the bytes are read from.
+
+    """
+
+    def __init__(self, file: BinaryIO) -> None:
+        super().__init__(file.seek(0, os.SEEK_END))
+        self._file = file
+        self._held: list[tuple[int, bytes]] = []
+
+    def hold(self, ranges: Iterable[tuple[int, int]]) -> None:
+        """Fetch ranges (start, end) of bytes, neighbours at once, and forget those held before."""
+        self._held = []
+        for start, end in joined(ranges):
+            self._file.seek(start)
+            self._held.append((start, self._file.read(end - start)))
+
+    def release(self) -> None:
+        """Forget the ranges that are held."""
+        self._held = []
+
+    def fetch(self, start: int, end: int) -> bytes:
+        """Return bytes, from memory where a range that is held has all of them."""
+        for first, data in self._held:
+            if first <= start and end <= first + len(data):
+                return data[start - first : end - first]
+        self._file.seek(start)
+        return self._file.read(end - start)
 
     def close(self) -> None:
         """Close the file and forget what is held."""

@@ -11,6 +11,7 @@ forces, by contacts that are stiff enough, and nothing sleeps: what creeps is to
 from __future__ import annotations
 
 import math
+from contextlib import contextmanager
 from functools import cache, lru_cache
 from hashlib import sha256
 from importlib import import_module
@@ -23,7 +24,7 @@ from internav_data.verification.replay.standing import SOLID, obj_of, turned_deg
 from internav_data.verification.shapes import rotate
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from types import ModuleType
 
     from internav_data.core.typing import Floats
@@ -53,6 +54,22 @@ NEAR_M: Final = 0.02
 from farther has moved by more than may be."""
 
 
+@cache
+def _mujoco() -> ModuleType:
+    return import_module("mujoco")
+
+
+@contextmanager
+def _unlogged() -> Iterator[None]:
+    """Keep MuJoCo from writing a file of warnings: what becomes unstable ends far away."""
+    before = _mujoco().get_mju_user_warning()
+    _mujoco().set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        _mujoco().set_mju_user_warning(before)
+
+
 class MujocoHouse:
     """Floor and walls of a house, and objects that are put there and taken away again."""
 
@@ -71,6 +88,7 @@ class MujocoHouse:
         del self._objects[len(self._objects) - count :]
         self._compiled = None
 
+    @_unlogged()
     def contacts(self) -> list[tuple[Standing, str, float]]:
         """Return contacts now: an object that can move, the other's name, the depth in metres."""
         model, data = self._at_start()
@@ -88,6 +106,7 @@ class MujocoHouse:
             for (one, other), depth in deepest.items()
         ]
 
+    @_unlogged()
     def drifts(self, seconds: float) -> list[tuple[Standing, float, float]]:
         """Let time pass; return how far each object that can move went, metres and degrees."""
         model, data = self._at_start()
@@ -241,11 +260,3 @@ def _inertia(shapes: Shapes, one: Standing) -> Floats:
 def _wxyz(quaternion: Quaternion) -> Quaternion:
     x, y, z, w = quaternion
     return w, x, y, z
-
-
-@cache
-def _mujoco() -> ModuleType:
-    """Return MuJoCo. It writes no file of warnings: what becomes unstable ends far away."""
-    mujoco = import_module("mujoco")
-    mujoco.set_mju_user_warning(lambda _: None)
-    return mujoco
