@@ -93,6 +93,17 @@ def test_what_is_true_holds(crowded):
     assert found_in(*crowded) == (Counter(), [])
 
 
+def test_a_users_handler_of_mujocos_warnings_stays(crowded):
+    mujoco = mujoco_scene.mujoco
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        mine = mujoco.get_mju_user_warning()
+        found_in(*crowded)
+        assert mujoco.get_mju_user_warning() == mine
+    finally:
+        mujoco.set_mju_user_warning(None)
+
+
 def test_a_house_that_is_built_changes_no_solution(crowded, engine):
     """Bullet has globals that all of a process's clients share."""
     house, episode = crowded
