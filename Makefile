@@ -70,7 +70,7 @@ demo: $(STAMP) ## make a small dataset, prove it right, draw it: about three min
 .PHONY: mini
 mini: $(STAMP) ## make the small dataset that ships with the package again
 	rm -rf $(MINI)
-	$(BIN)/internav-gen generate --out $(MINI) --scenes 40 --episodes-per-scene 10
+	$(BIN)/internav-gen generate --out $(MINI) --scenes 40 --episodes-per-scene 10 --physics mujoco
 	$(BIN)/internav-gen validate $(MINI) --level physics
 
 DEMO_TRAIN := --device cpu --preset small --pretrain bc --steps 32768 \

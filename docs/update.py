@@ -20,11 +20,13 @@ from internav_cli.main import COMMANDS
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from internav_data.records import Asset, Episode, House
+
 ROOT = Path(__file__).resolve().parents[1]
-PICTURED = (0, 14, 4)
-"""Seed, scene and episode of the picture."""
-FILMED = (0, 2, 2)
-"""Seed, scene and episode of the replay."""
+PICTURED = (14, 4)
+"""Scene and episode of the picture, in the dataset that ships."""
+FILMED = (2, 2)
+"""Scene and episode of the replay."""
 
 
 def settings() -> str:
@@ -168,37 +170,30 @@ def updated() -> dict[Path, str]:
 
 
 def draw_pictures() -> None:
-    """Draw the pictures of the README."""
+    """Draw the pictures of README and tutorial, of the dataset that ships."""
     import cv2  # noqa: PLC0415 - seconds, all of these
 
-    from internav_data import generate_episodes, generate_house  # noqa: PLC0415
     from internav_data.catalog import catalogue  # noqa: PLC0415
-    from internav_data.views import draw_episode, write_png  # noqa: PLC0415
+    from internav_data.views import draw_episode, replay_frames, write_png, write_video  # noqa: PLC0415
     from internav_data.views.asset_sheet import draw_asset_sheet  # noqa: PLC0415
 
-    seed, scene, index = PICTURED
-    house = generate_house(seed=seed, scene=scene)
-    (episode,) = generate_episodes(house, count=1, first=index)
-    picture = draw_episode(house, episode, catalogue().assets, pixels=1000)
+    picture = draw_episode(*of_the_shipped(*PICTURED), pixels=1000)
     write_png(ROOT / "docs" / "episode.png", picture)
-    draw_replay()
+    frames = replay_frames(*of_the_shipped(*FILMED), size=280, fps=5.0)
+    write_video(ROOT / "docs" / "replay.gif", frames, 5.0)
     sheet = draw_asset_sheet(catalogue())
     height, width = sheet.shape[:2]
     smaller = cv2.resize(sheet, (1000, round(1000 * height / width)), interpolation=cv2.INTER_AREA)
     write_png(ROOT / "docs" / "catalogue.png", smaller)
 
 
-def draw_replay() -> None:
-    """Film an expert at work for the README."""
-    from internav_data import generate_episodes, generate_house  # noqa: PLC0415
-    from internav_data.catalog import catalogue  # noqa: PLC0415
-    from internav_data.views import replay_frames, write_video  # noqa: PLC0415
+def of_the_shipped(scene: int, index: int) -> tuple[House, Episode, dict[str, Asset]]:
+    """Return house, episode and assets of an episode of `mini`."""
+    from internav_data import load_dataset  # noqa: PLC0415
 
-    seed, scene, index = FILMED
-    house = generate_house(seed=seed, scene=scene)
-    (episode,) = generate_episodes(house, count=1, first=index)
-    frames = replay_frames(house, episode, catalogue().assets, size=280, fps=5.0)
-    write_video(ROOT / "docs" / "replay.gif", frames, 5.0)
+    wanted = f"scene-{scene:06}/{index:04}"
+    (episode,) = dataset = load_dataset("mini", filters=[("episode_id", "=", wanted)])
+    return dataset.scene(episode.scene_id), episode, dataset.assets
 
 
 def main() -> None:

@@ -134,16 +134,16 @@ def test_outcomes_need_no_physics(folder, monkeypatch):
 
 def test_an_expert_whose_engine_is_missing_is_a_line(monkeypatch):
     def absent():
-        raise ModuleNotFoundError(name="pybullet")
+        raise ModuleNotFoundError(name="mujoco")
 
-    monkeypatch.setitem(sys.modules, "pybullet", None)
-    monkeypatch.setitem(ENGINES, "bullet", absent)  # other tests may have connected it
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    monkeypatch.setitem(ENGINES, "mujoco", absent)  # other tests may have connected it
     viewed = ViewedDataset(MINI)
     # First pushes come from stored outcomes: some expert pushes again.
     several = (e.episode_id for e in viewed.dataset if e.expert and e.expert.pushes > 1)
     urls = (f"/api/episode/{scene}/{int(k)}/play" for scene, k in (e.split("/") for e in several))
     refused = next(url for url in urls if respond(viewed, url).status != 200)
-    assert "bullet is not installed: pip install" in error(viewed, refused, 501)
+    assert "mujoco is not installed: pip install" in error(viewed, refused, 501)
 
 
 def test_the_house_in_3d_holds_all_of_it(viewed, folder):
