@@ -239,7 +239,8 @@ class _AStar:
         x, y = self.points.T
         dx, dy = x - x[batch, None], y - y[batch, None]
         ahead = best[batch, None] + np.sqrt(dx * dx + dy * dy)
-        limit = np.minimum(best - EPSILON_M2, max_length - self.heuristic)
+        with np.errstate(invalid="ignore"):  # no goal in reach of a point: NaN, never less
+            limit = np.minimum(best - EPSILON_M2, max_length - self.heuristic)
         k, second = np.nonzero(ahead < limit)
         rays = np.column_stack([dx[k, second], dy[k, second]])
         touch = np.ones(len(k), dtype=np.bool_)
