@@ -6,8 +6,12 @@ code before each build.
 
 from __future__ import annotations
 
+import dataclasses
+import importlib
 import inspect
+import re
 import sys
+import typing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -79,9 +83,39 @@ def as_written(_app: Sphinx, context: click.Context, lines: list[str]) -> None:
     lines[:] = ["::", "", *(f"   {line}".rstrip() for line in text.splitlines()), ""]
 
 
+def options_as_typed(_app: Sphinx, _context: click.Context, lines: list[str]) -> None:
+    """Name an option's value by the option, not by the parameter of our function."""
+    for number, line in enumerate(lines):
+        named = re.sub(r"^(\.\. option:: --([a-z-]+)) <[a-z_]+>$", r"\1 <\2>", line)
+        lines[number] = re.sub(r":default: ``'(.*)'``", r":default: ``\1``", named)
+
+
+def attribute_as_written(
+    _app: Sphinx, what: str, _name: str, _value: object, _options: object, lines: list[str]
+) -> None:
+    """Undo numpy style's reading of "Noun: words." below an attribute as its type and text."""
+    kind = next((k for k, line in enumerate(lines) if line.startswith(":type: ")), None)
+    if what in {"attribute", "property"} and kind is not None:
+        lines[0] = f"{lines[kind].removeprefix(':type: ')}: {lines[0]}"
+        del lines[kind]
+
+
+def without_bounds(_app: Sphinx) -> None:
+    """Leave the bounds out of the settings' types, as Sphinx would print them field by field."""
+    for module in map(importlib.import_module, site_pages.MODULES):
+        for value in (getattr(module, name) for name in module.__all__):
+            if dataclasses.is_dataclass(value) and "Annotated[" in str(value.__annotations__):
+                types = typing.get_type_hints(value)
+                value.__annotations__ = types
+                value.__init__.__annotations__ = types | {"return": None}
+
+
 def setup(app: Sphinx) -> None:
     """Connect what happens before a build and when a page is read."""
     app.connect("builder-inited", written)
+    app.connect("builder-inited", without_bounds)
+    app.connect("autodoc-process-docstring", attribute_as_written)
+    app.connect("sphinx-click-process-options", options_as_typed)
     app.connect("source-read", leads_into_the_site)
     app.connect("source-read", parts_of_the_study)
     app.connect("sphinx-click-process-epilog", as_written)
