@@ -36,9 +36,11 @@ def _read(cls: type[Any]) -> tuple[str, Mapping[str, str]]:
 
 def _definition(cls: type[Any]) -> ast.ClassDef | None:
     try:
-        tree = ast.parse(inspect.cleandoc(inspect.getsource(cls)))
+        source = inspect.cleandoc(inspect.getsource(cls))
     except (OSError, TypeError):
         return None
+    # `ast.parse` drops docstrings under `python -OO` since Python 3.14.
+    tree = compile(source, cls.__name__, "exec", ast.PyCF_ONLY_AST, optimize=0)
     return tree.body[0] if isinstance(tree.body[0], ast.ClassDef) else None
 
 
