@@ -117,6 +117,14 @@ test-slow: $(STAMP) ## run the slow campaigns
 test-learning: $(STAMP) ## see every learner learn, two at a time: about three minutes
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -m learning -n 2 --dist load $(ARGS) tests/camp
 
+# All rows, one after the other, if none is named.
+ROW ?=
+BUDGET ?= 2h
+
+.PHONY: torture
+torture: $(STAMP) ## break runs and files in very many ways: make torture ROW=faults BUDGET=2h
+	nice $(BIN)/python tests/torture --row '$(ROW)' --budget $(BUDGET) $(ARGS)
+
 .PHONY: test-bare
 test-bare: ## run the loader's tests with nothing but numpy and pyarrow installed
 	@$(call VIRTUAL_ENVIRONMENT,$(BARE)); \

@@ -2,7 +2,8 @@
 
 A kill leaves files behind that no manifest names: shards that were put but not committed, shards
 that were replaced but not yet removed, temporary files. They are told from a stranger's files by
-their names in the journal, which the next commit reads: nothing else is ever removed.
+their names in the journal, which the next commit reads: nothing else is ever removed. The journal
+holds its own digest: with one flipped bit it might name a stranger's file.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
-from internav_data.core.files import FileLimits, parse_json
+from internav_data.core.files import FileLimits, check_sha256, parse_json, with_sha256
 from internav_data.core.storage import exists, final_of, temporary_of
 from internav_data.dataset.manifest import inner_path
 from internav_data.dataset.staging import STAGING
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
     from internav_data.dataset.manifest import Manifest
 
 JOURNAL = f"{STAGING}journal.json"
-"""Name of the journal: a list of names, in JSON."""
+"""Name of the journal: a list of names, with its digest, in JSON."""
+_NAMES = "names"
 _LIMITS = FileLimits(
     max_bytes=64 << 20,
     max_values=500_000,
@@ -58,8 +60,7 @@ class Journal:
         """Note names of files that are to be put or removed."""
         if not self._names.issuperset(names := set(names)):
             self._names |= names
-            text = json.dumps(sorted(self._names), indent=1) + "\n"
-            self.store.put(JOURNAL, text.encode())
+            self.store.put(JOURNAL, journal_bytes(self._names))
 
     def sweep(self, manifest: Manifest | None) -> None:
         """Remove all files that are noted and that the manifest in place does not name."""
@@ -70,6 +71,11 @@ class Journal:
             if final_of(name) == JOURNAL:  # its own temporary file, after a kill
                 self.store.remove(name)
         self._names.clear()
+
+
+def journal_bytes(names: Iterable[str]) -> bytes:
+    """Return the content of a journal that notes names."""
+    return (json.dumps(with_sha256({_NAMES: sorted(names)}), indent=1) + "\n").encode()
 
 
 def journal_names(store: Store) -> tuple[str, ...]:
@@ -84,7 +90,10 @@ def journal_names(store: Store) -> tuple[str, ...]:
     if not exists(store, JOURNAL):
         return ()
     place = store.at(JOURNAL)
-    names = parse_json(store.read(JOURNAL, stop=_LIMITS.max_bytes + 1), place, _LIMITS)
+    values = parse_json(store.read(JOURNAL, stop=_LIMITS.max_bytes + 1), place, _LIMITS)
+    values = values if isinstance(values, dict) else {}
+    check_sha256(values, place, _LIMITS, ())
+    names = values.get(_NAMES)
     if not isinstance(names, list) or not all(map(_inside, names)):
         raise _LIMITS.refusal(place, "expected a list of names of files of the dataset")
     return tuple(names)

@@ -11,6 +11,7 @@ from memory_store import KilledError, MemoryStore
 from test_commit import ASSETS, IDENTITY, build, staging_of
 
 from internav_data.core import storage
+from internav_data.core.files import with_sha256
 from internav_data.core.storage import FolderStore
 from internav_data.dataset import (
     assemble,
@@ -23,6 +24,7 @@ from internav_data.dataset import (
     read_manifest,
     shards,
 )
+from internav_data.dataset.journal import journal_bytes, journal_names
 from internav_data.dataset.metadata_files import METADATA
 from internav_data.records.errors import CorruptDataError, UsageError
 
@@ -147,7 +149,7 @@ def test_what_a_kill_left_of_ours_goes_and_no_more(tmp_path):
     theirs = ["data/episodes/train-00001-76543210.parquet", ".stats.json.99.tmp"]
     for name in (*left, *theirs, staging.name(30).replace("scene-", ".scene-") + ".7.tmp"):
         store.put(name, b"")
-    store.put(".work/journal.json", json.dumps(left).encode())
+    store.put(".work/journal.json", journal_bytes(left))
     assemble(store, IDENTITY, ASSETS, 12)
     assert not set(left) & set(store.names())
     assert set(theirs) < set(store.names())
@@ -161,11 +163,25 @@ def test_a_journal_that_names_anything_else_is_refused(tmp_path, names):
     store = FolderStore(tmp_path / "d")
     (tmp_path / "thesis.tex").write_text("precious")
     build(store, range(3))
-    store.put(".work/journal.json", names.encode())
-    for use in (lambda: assemble(store, IDENTITY, ASSETS, 3), lambda: end_staging(store)):
-        with pytest.raises(CorruptDataError, match=r"journal\.json"):
-            use()
+    values = json.loads(names) if names != "[" else {}
+    for text in (names, json.dumps(with_sha256({"names": values}))):
+        store.put(".work/journal.json", text.encode())
+        for use in (lambda: assemble(store, IDENTITY, ASSETS, 3), lambda: end_staging(store)):
+            with pytest.raises(CorruptDataError, match=r"journal\.json"):
+                use()
     assert (tmp_path / "thesis.tex").read_text() == "precious"
+
+
+def test_a_flipped_bit_of_the_journal_removes_no_file_of_somebody_else(tmp_path):
+    store = FolderStore(tmp_path)
+    build(store, range(3))
+    whole = journal_bytes(["data/mine.parquet.tmp"])
+    for bit in range(8 * len(whole)):
+        damaged = bytearray(whole)
+        damaged[bit // 8] ^= 1 << bit % 8
+        store.put(".work/journal.json", bytes(damaged))
+        with pytest.raises(CorruptDataError, match=r"journal\.json"):
+            journal_names(store)
 
 
 def test_later_scenes_stay_staged_after_a_commit(tmp_path):

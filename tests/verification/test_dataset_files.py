@@ -1,6 +1,5 @@
 """Files beside the data, files of strangers, and files of a generator that is at work."""
 
-import json
 import shutil
 import sys
 from pathlib import Path
@@ -9,6 +8,7 @@ import pytest
 
 from internav_data.core.storage import FolderStore
 from internav_data.dataset import read_manifest
+from internav_data.dataset.journal import journal_bytes
 from internav_data.records.errors import InternavError
 from internav_data.verification import levels, validate
 
@@ -69,7 +69,7 @@ def test_a_strangers_file_among_the_data_is_named(dataset):
 def test_files_of_a_commit_under_way_are_no_findings(dataset):
     names = ["data/episodes/train-00000-01234567.parquet", "README.md"]
     store = FolderStore(dataset)
-    store.put(".work/journal.json", json.dumps(names).encode())
+    store.put(".work/journal.json", journal_bytes(names))
     for name in names:
         store.put(name, b"the next version")
     findings = validate(dataset, "files")

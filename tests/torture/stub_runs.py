@@ -1,0 +1,110 @@
+"""Runs over scenes that cost nothing, in small shards, and what they leave in their folder."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import traceback
+from dataclasses import dataclass
+from unittest import mock
+
+from scene_stubs import CATALOGUE, plain
+
+from internav_data.core.messages import Failed, Fatal
+from internav_data.core.worker import run_task
+from internav_data.dataset import has_manifest, load_dataset, read_manifest, shards
+from internav_data.generation.config import load_config
+from internav_data.generation.run import generate
+from internav_data.records.errors import InternavError
+
+CONFIG = load_config(overrides=["episodes_per_scene=1"])
+OTHER = load_config(overrides=["episodes_per_scene=1", "seed=3"])
+SHARDS = {"episodes": 1, "scenes": 2}
+"""Scenes a shard: a run of four commits twice on its way."""
+
+
+@dataclass
+class InOrder:
+    """Runs every task in this process, one after the other; the workers of some die."""
+
+    dies: tuple[int, ...] = ()
+    slots: int = 1
+
+    def run(self, recipe, tasks, tick):
+        work = recipe.setup(recipe.payload)
+        for task in sorted(tasks):
+            if not tick():
+                return
+            if task in self.dies:
+                yield Failed(task, "its worker was killed by SIGKILL, 3 times", 3, died=True)
+                continue
+            result = run_task(work, task)
+            if isinstance(result, Fatal):
+                raise result.error()
+            yield result
+
+
+def made(out, scenes, config=CONFIG, executor=None, setup=plain):
+    """Generate stub scenes in small shards."""
+    with mock.patch.object(shards, "SCENES_PER_SHARD", SHARDS):
+        return generate(
+            out, config, scenes, executor=executor or InOrder(), assets=CATALOGUE, setup=setup
+        )
+
+
+def contents(folder):
+    """Return all that lies below a folder: bytes of files, None for folders."""
+    return {
+        path.relative_to(folder).as_posix(): None if path.is_dir() else path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+    }
+
+
+def difference(found, wanted):
+    """Return in what two contents differ, in a line; empty if in nothing."""
+    missing, left = wanted.keys() - found.keys(), found.keys() - wanted.keys()
+    other = {name for name in wanted.keys() & found.keys() if wanted[name] != found[name]}
+    kinds = {"missing": missing, "left over": left, "of other bytes": other}
+    return "; ".join(f"{kind}: {', '.join(sorted(some))}" for kind, some in kinds.items() if some)
+
+
+def check_readable(folder, whole):
+    """Check that a folder holds no dataset, or one of the first scenes of a whole one."""
+    if not has_manifest(folder):
+        return 0
+    manifest = read_manifest(folder)
+    scenes, lost = manifest.scenes, {entry.scene for entry in manifest.quarantined}
+    table = load_dataset(folder).to_table().sort_by("episode_id")
+    wanted = load_dataset(whole).to_table().sort_by("episode_id")
+    ids = {f"scene-{k:06d}" for k in range(scenes) if k not in lost}
+    kept = wanted.filter([row in ids for row in wanted["scene_id"].to_pylist()])
+    assert table.equals(kept), f"the dataset in place is not that of the first {scenes} scenes"
+    return scenes
+
+
+def forked(work):
+    """Do work in a copy of this process; return the text it returned or how it ended.
+
+    An error for users is its message after `error: `; any other its last lines.
+    """
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(reader)
+        try:
+            text = str(work() or "")
+        except InternavError as error:
+            text = f"error: {error}"
+        except BaseException:  # noqa: BLE001 - it is the result
+            text = f"bug: {traceback.format_exc()}"
+        with contextlib.suppress(BaseException):
+            os.write(writer, text.encode()[-60_000:])
+        os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader, "rb") as file:
+        text = file.read().decode()
+    _, status = os.waitpid(child, 0)
+    if os.WIFSIGNALED(status):
+        return f"killed by {signal.Signals(os.WTERMSIG(status)).name}"
+    return text

@@ -1,0 +1,65 @@
+"""Some cases of each row of `make torture`, and the frame itself."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import bits
+import faults
+from campaign import Row, lines_of, run_row, seconds_of, summary
+
+
+@pytest.mark.parametrize("fault", ["EIO", "ENOSPC", "SIGKILL"])
+def test_a_fault_at_a_call_loses_nothing(tmp_path, fault):
+    calls = faults.calls("extend")
+    assert {kind for kind, _ in calls} >= {"open", "write", "fsync", "rename", "unlink", "mkdir"}
+    first = {kind: calls.index((kind, path)) for kind, path in reversed(calls)}
+    chosen = {"EIO": "fsync", "ENOSPC": "write", "SIGKILL": "rename"}[fault]
+    for at in (first[chosen], calls.index((chosen, "d/.manifest.json"))):
+        faults.run_one("extend", fault, at, tmp_path / str(at), f"{chosen} {at}")
+
+
+def test_a_damaged_journal_is_noticed(tmp_path):
+    assert bits.run("journal cuts", tmp_path)["unnoticed_but_right"] <= 1, "the last line break"
+    assert bits.run("journal 0 40:72", tmp_path)["unnoticed_but_right"] == 0
+
+
+def test_a_campaign_goes_on_where_it_was_stopped(tmp_path):
+    def run(key, folder):
+        assert not list(folder.iterdir())
+        assert key != "b" or (tmp_path / "mended").exists(), "broken"
+        return {"runs": 2}
+
+    row, later = Row("some", lambda: ["a", "b", "c"], run), time.monotonic() + 1000
+    said: list[str] = []
+    arguments = {"results": tmp_path / "r", "say": said.append}
+    assert run_row(row, time.monotonic() - 1, **arguments) == []
+    assert run_row(row, later, **arguments) == ["b"]
+    assert "broken" in said[2]
+    (tmp_path / "mended").touch()
+    said.clear()
+    assert run_row(row, later, **arguments) == []
+    assert said == ["some: b: passed"]
+    assert summary(row, tmp_path / "r").startswith("some: 3 cases, 6 runs, 0 cases failed")
+    assert run_row(row, later, only="a", **arguments) == []
+    assert len(lines_of(tmp_path / "r" / "some.jsonl")) == 3
+
+
+def test_budgets():
+    assert [seconds_of(text) for text in ("90s", "30m", "2h", "1.5h")] == [90, 1800, 7200, 5400]
+    for text in ("2", "h", "2 days"):
+        with pytest.raises(ValueError, match="expected a number"):
+            seconds_of(text)
+
+
+def test_results_are_lines_of_json():
+    for path in (Path(__file__).parent / "results").glob("*.jsonl"):
+        for line in map(json.loads, path.read_text().splitlines()):
+            assert {"case", "ok", "seconds", "of", "machine"} <= line.keys()
