@@ -28,7 +28,13 @@ Examples:
   internav-gen assets --sheet assets.png           a picture of all types""",
 )
 @click.option("--type", "kind", help="List the assets of this type.")
-@click.option("--assets", "folders", multiple=True, metavar="DIR", help="Your own.  [repeatable]")
+@click.option(
+    "--assets",
+    "folders",
+    multiple=True,
+    metavar="DIR",
+    help="A folder of your own meshes, to be listed too.  [repeatable]",
+)
 @click.option("--sheet", type=click.Path(path_type=Path), help="Write a contact sheet (PNG).")
 @JSON
 def command(

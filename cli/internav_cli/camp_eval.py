@@ -80,31 +80,48 @@ tables.md, tables.json, report.html.""",
     type=click.Choice(["train", "val", "test", "all"]),
     default="test",
     show_default=True,
-    help="Which episodes.",
+    help="Split to evaluate on.",
 )
 @click.option(
     "--filter",
     "conditions",
     multiple=True,
     metavar="COLUMN=VALUE",
-    help="Only these, as in room_count<=3; != < > >= and 'expert is not null' too.  [repeatable]",
+    help="Only such episodes, as in room_count<=3; != < > >= and 'expert is not null' too."
+    "  [repeatable]",
 )
-@click.option("--episodes-per-scene", type=int, callback=positive, help="The first of each house.")
-@click.option("--limit", type=int, callback=positive, help="A fixed random choice of so many.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Actions derive from it.")
-@click.option("--greedy", is_flag=True, help="The likeliest actions instead of drawn ones.")
+@click.option(
+    "--episodes-per-scene",
+    type=int,
+    callback=positive,
+    help="Only the first episodes of each house, at most this many.",
+)
+@click.option(
+    "--limit", type=int, callback=positive, help="A fixed random choice of this many episodes."
+)
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of drawn actions.")
+@click.option("--greedy", is_flag=True, help="Take the likeliest actions, draw none.")
 @click.option("--without-intent", is_flag=True, help="Feed the trained agent no intent (Table 4).")
 @click.option(
-    "--max-steps", type=int, default=500, show_default=True, help="Longer episodes are cut off."
+    "--max-steps",
+    type=int,
+    default=500,
+    show_default=True,
+    help="Steps after which an episode is cut off.",
 )
 @click.option(
     "--batch", type=int, default=16, show_default=True, help="Episodes played side by side."
 )
-@click.option("--workers", type=int, default=0, help="Processes that step them.  [default: none]")
+@click.option(
+    "--workers",
+    type=int,
+    default=0,
+    help="Processes that step episodes; they change no number.  [default: none]",
+)
 @click.option(
     "--reference-policies/--no-reference-policies",
     default=True,
-    help="Rows of expert and shortest_path beside.",
+    help="Whether tables have rows of expert and shortest_path.  [default: they do]",
 )
 @click.option("--video", is_flag=True, help="Film the best, the median and the worst episode.")
 @click.option(
@@ -194,9 +211,9 @@ training seeds are the unit; with one run each, only these checkpoints are compa
     "--dataset",
     "data",
     type=click.Path(path_type=Path),
-    help="To draw episodes of in the report; without it there are none.",
+    help="Dataset of the episodes; with it the report draws some of them.",
 )
-@click.option("--out", type=click.Path(path_type=Path), help="Folder to write; nothing without it.")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder to write.  [default: none]")
 @click.option("--force", is_flag=True, help="Write over a comparison that is there.")
 @JSON
 def compare_command(

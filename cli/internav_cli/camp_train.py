@@ -94,7 +94,8 @@ Exit codes: 0 good, 1 error, 2 usage, 5 corrupt data, 6 NaN or infinity,
 @click.option(
     "--stages",
     metavar="PARTS",
-    help="Some of auxiliary,single,all, in order, or cloning alone.  [default: all three]",
+    help="Some of auxiliary,single,all, in order, or cloning alone.  [default: all three; no "
+    "auxiliary below stages.min_auxiliary_timesteps]",
 )
 @click.option(
     "--pretrain",
@@ -106,7 +107,11 @@ Exit codes: 0 good, 1 error, 2 usage, 5 corrupt data, 6 NaN or infinity,
     type=click.Choice(["integrated", "policy", "recursive", "none"]),
     help="Intent input of the global policy (Table 4).  [default: integrated]",
 )
-@click.option("--sync-every", type=int, help="Rollouts between copies of global.  [default: 3]")
+@click.option(
+    "--sync-every",
+    type=int,
+    help="Rollouts between copies of the global policy into the intent policy.  [default: 3]",
+)
 @click.option(
     "--workers",
     type=int,

@@ -20,7 +20,7 @@ Examples:
     "--out",
     type=click.Path(path_type=Path),
     default=Path(),
-    help="Where datasets would go, to look at its space.  [default: here]",
+    help="Folder for datasets, whose free space is checked.  [default: here]",
 )
 @JSON
 def command(*, out: Path, as_json: bool) -> int:

@@ -96,7 +96,11 @@ workers gives the same bytes.""",
     callback=_scene_range,
     help="Make scenes A to B - 1 instead: a part of a dataset, for `internav-gen merge`.",
 )
-@click.option("--episodes-per-scene", type=int, help="A tenth of it in test scenes.  [default: 50]")
+@click.option(
+    "--episodes-per-scene",
+    type=int,
+    help="Episodes of a house; a tenth of that in test scenes.  [default: 50]",
+)
 @click.option("--workers", type=int, callback=positive, help="Processes.  [default: one a core]")
 @click.option(
     "--executor",
@@ -138,8 +142,8 @@ workers gives the same bytes.""",
     "--push-model",
     "world__push_model",
     type=click.Choice(["force", "kick", "step"]),
-    help="200 N up to 2 m/s; 2 m/s at once for every mass; or 200 N held at 0.5 m/s for 0.22 m.  "
-    "[default: force]",
+    help="force: 200 N up to 2 m/s; kick: 2 m/s at once for every mass; step: 0.5 m/s for 0.22 m, "
+    "by at most 200 N.  [default: force]",
 )
 @click.option(
     "--attributes",

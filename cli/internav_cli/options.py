@@ -41,18 +41,19 @@ _CONFIG = (
     click.option(
         "--preset",
         type=click.Choice(["paper", "realistic"]),
-        help="Generous rooms calibrated to the paper, or those of real homes.  [default: paper]",
+        help="Houses. paper: generous rooms, calibrated to the paper; realistic: those of real "
+        "homes.  [default: paper]",
     ),
     click.option(
         "--episode-preset",
         type=click.Choice(["paper", "balanced", "dense", "long"]),
-        help="As in the paper, types of obstacles balanced, obstacles that all matter, or "
-        "interactions of several actions.  [default: paper]",
+        help="Episodes. paper: as in the paper; balanced: all types of obstacles alike; dense: "
+        "only obstacles that matter; long: interactions of several actions.  [default: paper]",
     ),
     click.option(
         "--rooms",
         metavar="ROOMS",
-        help="A count (4), a range (2-5) or a programme (kitchen,living,bedroom:2).",
+        help="Rooms: a count (4), a range (2-5) or a programme (kitchen,living,bedroom:2).",
     ),
     click.option(
         "--physics",

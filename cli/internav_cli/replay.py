@@ -54,7 +54,7 @@ GIF plays anywhere.""",
     "formats",
     type=click.Choice(["mp4", "gif"]),
     multiple=True,
-    help="Of the file named after the episode.  [repeatable; default: mp4]",
+    help="Format of the file that is named after the episode.  [repeatable; default: mp4]",
 )
 @click.option(
     "--size",

@@ -25,7 +25,7 @@ Examples:
 )
 @DATASET
 @click.option("--scene", type=int, default=0, show_default=True, help="Index of the scene.")
-@click.option("--episode", type=int, help="Draw this episode; the bare house without.")
+@click.option("--episode", type=int, help="Draw this episode; without it, the house alone.")
 @click.option(
     "--out",
     type=click.Path(path_type=Path),

@@ -20,7 +20,7 @@ Examples:
   internav-gen stats data/demo --split test --json""",
 )
 @DATASET
-@click.option("--split", type=click.Choice(["train", "val", "test"]), help="This split only.")
+@click.option("--split", type=click.Choice(["train", "val", "test"]), help="Count this split only.")
 @JSON
 def command(*, dataset: Path | None, split: str | None, as_json: bool) -> int:
     """Tell what DATASET is like: the columns of the paper's Table 2 and more."""

@@ -43,10 +43,13 @@ Exit code 3 when something in the dataset is not true, 5 when it cannot be read.
     type=click.Choice(LEVELS),
     default="geometry",
     show_default=True,
-    help="Each level runs those before it.",
+    help="Extent of the checks; each level runs those before it.",
 )
 @click.option(
-    "--sample", type=int, callback=positive, help="Geometry and physics of so many scenes only."
+    "--sample",
+    type=int,
+    callback=positive,
+    help="Check geometry and physics of this many scenes only.",
 )
 @click.option(
     "--physics",

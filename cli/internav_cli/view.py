@@ -39,7 +39,7 @@ From another machine: ssh -L 8437:127.0.0.1:8437 HOST.""",
     "--sample",
     type=int,
     callback=positive,
-    help="Episodes in the file of --html.  [default: 12]",
+    help="Number of episodes in the file of --html.  [default: 12]",
 )
 @click.option("--force", is_flag=True, help="Write over a file that is there.")
 @click.option(

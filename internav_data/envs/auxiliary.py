@@ -34,7 +34,9 @@ class AuxiliaryStart(NamedTuple):
     """Pose of the agent from which Push or Pick acts on a certain obstacle."""
 
     i: int
+    """Index of the node along x."""
     j: int
+    """Index of the node along y."""
     quarter: int
     """Quarter turns counter-clockwise from +x."""
     obstacle: int

@@ -52,7 +52,7 @@ class InterNavEnv(Rebuilt, gymnasium.Env[dict[str, Any], np.int64]):
     sensors
         Sensors to observe: names in `internav_data.envs.sensors.SENSORS`, or one's own `Sensor`.
     **arguments
-        Arguments by name; see `Arguments`.
+        Further arguments by name: those of `docs/environment.md`.
 
     Raises
     ------
