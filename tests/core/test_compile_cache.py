@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from internav_data.physics.engines import DEFAULT_ENGINE
+
 COMMAND = "import sys; from internav_cli.main import main; sys.exit(main(sys.argv[1:]))"
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -94,7 +96,10 @@ def test_doctor_says_where_kernels_lie(read_only_package, tmp_path):
 
 @pytest.mark.slow
 def test_everything_runs_without_a_home(read_only_package, tmp_path):
-    generate = ("generate", "--out", "d", "--scenes", "1", "--episodes-per-scene", "1")
+    generate = (
+        "generate", "--physics", DEFAULT_ENGINE,
+        "--out", "d", "--scenes", "1", "--episodes-per-scene", "1",
+    )  # fmt: skip
     for words in ((*generate, "--rooms", "1"), ("show", "d", "--scene", "0", "--out", "h.png")):
         done = run(read_only_package, tmp_path, "-c", COMMAND, *words)
         assert done.returncode == 0, done.stderr

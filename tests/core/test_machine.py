@@ -33,6 +33,7 @@ for module, names in (
     for name in names.split():
         if hasattr(module, name):
             delattr(module, name)
+os.process_cpu_count = os.cpu_count  # which asks sched_getaffinity where that was
 sys.modules["fcntl"] = sys.modules["resource"] = None
 sys.modules["msvcrt"] = SimpleNamespace(locking=lambda *_: None, LK_NBLCK=2)
 real = os.open
