@@ -13,10 +13,13 @@ import sys
 import time
 
 import bits
+import digests
 import faults
+import kills
+import states
 from campaign import run_row, seconds_of, summary
 
-ROWS = {module.ROW.name: module.ROW for module in (faults, bits)}
+ROWS = {module.ROW.name: module.ROW for module in (faults, bits, kills, states, digests)}
 """Rows of the campaign by name, in the order in which they run."""
 
 

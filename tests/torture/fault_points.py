@@ -33,11 +33,16 @@ _EVENTS = {
 
 
 class FaultPoints:
-    """Counts the calls below a folder from the first one on; the call of number `at` fails."""
+    """Counts the calls below a folder from the first one on; the call of number `at` fails.
 
-    def __init__(self, folder: Path, at: int | None = None, fault: str = "SIGKILL") -> None:
+    With `only`, calls of that kind alone count.
+    """
+
+    def __init__(
+        self, folder: Path, at: int | None = None, fault: str = "SIGKILL", only: str = ""
+    ) -> None:
         self.folder = os.path.realpath(folder)
-        self.at, self.fault = at, fault
+        self.at, self.fault, self.only = at, fault, only
         self.log: list[tuple[str, str]] = []
 
     def install(self) -> None:
@@ -63,12 +68,16 @@ class FaultPoints:
 
     def reach(self, kind, path, *, named=True, before=lambda: None) -> None:
         """Count a call; let it fail if it is the one. `before` does a part of its work first."""
+        if self.only and kind != self.only:
+            return
         self.log.append((kind, os.path.relpath(path, self.folder)))
         if len(self.log) - 1 != self.at:
             return
         before()
         if self.fault == "SIGKILL":
             os.kill(os.getpid(), signal.SIGKILL)
+        if self.fault == "SIGKILL of the group":
+            os.killpg(0, signal.SIGKILL)
         number = getattr(errno, self.fault)
         raise OSError(number, os.strerror(number), *([str(path)] if named else []))
 

@@ -16,15 +16,13 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
-from unittest import mock
 
 from campaign import Row
 from fault_points import FAULTS, FaultPoints
-from stub_runs import InOrder, check_readable, contents, difference, forked, made, plain
+from stub_runs import InOrder, check_readable, contents, difference, forked, made, merged, plain
 from system_calls import strace, system_calls
 
 from internav_data.core.storage import write_atomically
-from internav_data.dataset import merge, shards
 from internav_data.generation.executors import LocalExecutor
 
 if TYPE_CHECKING:
@@ -80,8 +78,7 @@ def _parts(folder):
 
 
 def _merged(folder):
-    with mock.patch.object(shards, "SCENES_PER_SHARD", {"episodes": 1, "scenes": 2}):
-        merge(sorted(folder.glob("part-*")), folder / "d")
+    merged(sorted(folder.glob("part-*")), folder / "d")
 
 
 def _whole(folder):

@@ -13,7 +13,7 @@ from scene_stubs import CATALOGUE, plain
 
 from internav_data.core.messages import Failed, Fatal
 from internav_data.core.worker import run_task
-from internav_data.dataset import has_manifest, load_dataset, read_manifest, shards
+from internav_data.dataset import has_manifest, load_dataset, merge, read_manifest, shards
 from internav_data.generation.config import load_config
 from internav_data.generation.run import generate
 from internav_data.records.errors import InternavError
@@ -51,6 +51,12 @@ def made(out, scenes, config=CONFIG, executor=None, setup=plain):
         return generate(
             out, config, scenes, executor=executor or InOrder(), assets=CATALOGUE, setup=setup
         )
+
+
+def merged(parts, out):
+    """Join parts in small shards."""
+    with mock.patch.object(shards, "SCENES_PER_SHARD", SHARDS):
+        return merge(parts, out)
 
 
 def contents(folder):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import sys
 import time
@@ -12,7 +13,10 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 import bits
+import digests
 import faults
+import kills
+import states
 from campaign import Row, lines_of, run_row, seconds_of, summary
 
 
@@ -29,6 +33,22 @@ def test_a_fault_at_a_call_loses_nothing(tmp_path, fault):
 def test_a_damaged_journal_is_noticed(tmp_path):
     assert bits.run("journal cuts", tmp_path)["unnoticed_but_right"] <= 1, "the last line break"
     assert bits.run("journal 0 40:72", tmp_path)["unnoticed_but_right"] == 0
+
+
+@pytest.mark.slow
+def test_a_group_killed_at_an_fsync_goes_on(tmp_path):
+    assert kills.run("fsync 60", tmp_path)["runs"] == 1
+
+
+def test_a_folder_is_what_a_model_of_it_says():
+    states.run_machine(seed=0, runs=2, steps=10)
+
+
+def test_cases_of_digests_hold_every_pair_of_circumstances():
+    cases = [dict(item.split("=") for item in key.split()) for key in digests.cases()]
+    for a, b in itertools.combinations(digests.AXES, 2):
+        pairs = {(case[a], case[b]) for case in cases}
+        assert pairs == set(itertools.product(digests.AXES[a], digests.AXES[b]))
 
 
 def test_a_campaign_goes_on_where_it_was_stopped(tmp_path):

@@ -1,0 +1,223 @@
+"""A state machine over generate, kill, resume, extend, delete, corrupt, another config, merge and
+validate, against a model: the bytes of runs in one piece.
+
+A case is a seed: five runs of twenty steps.
+"""
+
+from __future__ import annotations
+
+import functools
+import shutil
+import tempfile
+from pathlib import Path
+
+import hypothesis
+from campaign import Row
+from fault_points import FaultPoints
+from hypothesis import HealthCheck, Phase, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import (
+    RuleBasedStateMachine,
+    initialize,
+    precondition,
+    rule,
+    run_state_machine_as_test,
+)
+from stub_runs import CONFIG, OTHER, check_readable, contents, difference, forked, made, merged
+
+from internav_data.core.storage import write_atomically
+from internav_data.dataset import has_manifest, load_dataset
+from internav_data.records.errors import InternavError
+from internav_data.verification import validate
+
+MAX_SCENES, RUNS, STEPS = 5, 5, 20
+STRANGERS = {"notes.txt": b"precious", "data/mine.txt": b"precious"}
+_MANIFEST = "manifest.json"
+
+
+@functools.cache
+def whole(scenes: int, *, other: bool = False) -> Path:
+    """Return a dataset that was made in one piece."""
+    folder = Path(tempfile.mkdtemp(prefix="torture-whole-"))
+    made(folder / "d", scenes, OTHER if other else CONFIG)
+    return folder / "d"
+
+
+class Folder(RuleBasedStateMachine):
+    """A folder and what it must hold."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.place = Path(tempfile.mkdtemp(prefix="torture-states-"))
+        self.out = self.place / "d"
+        self.steps = 0
+
+    @initialize()
+    def begin(self):
+        """Hold nothing: no scenes, no damage, nothing half done."""
+        self.held, self.killed, self.strange = 0, False, False
+        self.damaged: dict[str, bytes] = {}
+
+    def teardown(self):
+        shutil.rmtree(self.place)
+
+    @property
+    def files(self):
+        """Contents of the folder without strangers' files."""
+        found = contents(self.out)
+        if self.strange:
+            assert {name: found.pop(name) for name in STRANGERS} == STRANGERS
+        return found
+
+    def _is_whole(self, scenes):
+        found = difference(self.files, contents(whole(scenes)))
+        assert not found, f"expected the {scenes} scenes of a run in one piece: {found}"
+        self.held, self.killed, self.damaged = scenes, False, {}
+
+    @rule(scenes=st.integers(1, MAX_SCENES))
+    def generate(self, scenes):
+        """Make, resume, extend or mend a dataset."""
+        before, broken = contents(self.out), _MANIFEST in self.damaged
+        try:
+            made(self.out, scenes)
+        except InternavError as error:
+            lost = self.killed and "would be lost" in str(error)
+            if not lost and not broken:
+                raise
+            assert not difference(contents(self.out), before), "a refused run changed something"
+            return
+        assert not broken, "a damaged manifest was believed"
+        self._is_whole(max(scenes, self.held))
+
+    @rule(scenes=st.integers(1, MAX_SCENES), share=st.floats(0, 1))
+    @precondition(lambda self: not self.damaged)
+    def kill(self, scenes, share):
+        """Kill a run at a call that changes the disk."""
+        calls = 20 + 100 * max(0, scenes - self.held)
+
+        def run():
+            FaultPoints(self.out, int(share * calls), "SIGKILL").install()
+            made(self.out, scenes)
+
+        said = forked(run)
+        assert said in {"", "killed by SIGKILL"} or "would be lost" in said, said
+        if "SIGKILL" in said:
+            self.killed = True
+            self.held = max(self.held, check_readable(self.out, whole(MAX_SCENES)))
+        elif not said:
+            self._is_whole(max(scenes, self.held))
+
+    @rule(scenes=st.integers(1, MAX_SCENES))
+    @precondition(lambda self: self.held)
+    def another_config(self, scenes):
+        """Try another config in the same folder."""
+        before = contents(self.out)
+        try:
+            made(self.out, scenes, OTHER)
+        except InternavError:
+            assert not difference(contents(self.out), before), "a refused run changed something"
+        else:
+            raise AssertionError("another config went into the folder of this one")
+
+    @rule(number=st.integers(0, 99), cut=st.booleans(), at=st.floats(0, 1, exclude_max=True))
+    @precondition(lambda self: self.held and not self.damaged and not self.killed)
+    def corrupt(self, number, cut, at):
+        """Delete a file of the dataset, or flip one of its bits."""
+        files = {name: data for name, data in self.files.items() if data is not None}
+        name = sorted(files)[number % len(files)]
+        place = int(at * len(files[name]))
+        self.damaged = {name: files[name]}
+        if cut and name != _MANIFEST:
+            (self.out / name).unlink()
+        else:
+            data = bytearray(files[name])
+            data[place] ^= 1 << number % 8
+            (self.out / name).write_bytes(bytes(data))
+
+    @rule()
+    @precondition(lambda self: self.damaged)
+    def restore(self):
+        """Put the file back that was damaged."""
+        for name, data in self.damaged.items():
+            write_atomically(self.out / name, data)
+        self.damaged = {}
+
+    @rule()
+    @precondition(lambda self: self.held or self.killed)
+    def validate(self):
+        """Find the damage, and nothing else."""
+        if not has_manifest(self.out):
+            return
+        found = {finding.file for finding in validate(self.out, "files").found}
+        # Files of a commit that was cut off are noted instead.
+        assert found == set(self.damaged), found
+
+    @rule()
+    @precondition(lambda self: self.held)
+    def load(self):
+        """Read the first scenes, or be refused."""
+        try:
+            assert len(load_dataset(self.out).to_table()) > 0
+            check_readable(self.out, whole(MAX_SCENES))
+        except InternavError:
+            assert self.damaged
+
+    @rule(cut=st.integers(1, MAX_SCENES - 1))
+    def merge(self, cut):
+        """Join two parts into the folder, which may hold the first scenes already."""
+        before = contents(self.out)
+        try:
+            merged([_part(0, cut), _part(cut, MAX_SCENES)], self.out)
+        except InternavError:
+            if not self.killed and not self.damaged and not self.held:
+                raise
+            if not self.killed:
+                assert not difference(contents(self.out), before), "a refused merge changed it"
+            return
+        if not self.damaged:
+            self._is_whole(MAX_SCENES)
+        self.held = MAX_SCENES
+
+    @rule()
+    @precondition(lambda self: self.held and not self.strange)
+    def strangers(self):
+        """Put files of somebody else beside the dataset."""
+        for name, data in STRANGERS.items():
+            write_atomically(self.out / name, data)
+        self.strange = True
+
+    @rule()
+    def remove(self):
+        """Remove the folder."""
+        shutil.rmtree(self.out, ignore_errors=True)
+        self.begin()
+
+
+@functools.cache
+def _part(first: int, end: int) -> Path:
+    folder = Path(tempfile.mkdtemp(prefix="torture-part-"))
+    made(folder / "d", range(first, end))
+    return folder / "d"
+
+
+def run_machine(seed: int, runs: int, steps: int) -> None:
+    """Run the state machine with a seed."""
+    profile = settings(
+        max_examples=runs,
+        stateful_step_count=steps,
+        database=None,
+        deadline=None,
+        phases=[Phase.generate, Phase.shrink],
+        suppress_health_check=list(HealthCheck),
+    )
+    machine = hypothesis.seed(seed)(type(f"Folder{seed}", (Folder,), {}))
+    run_state_machine_as_test(machine, settings=profile)
+
+
+def run(key: str, _folder: Path):
+    """Run five runs of a seed."""
+    run_machine(int(key), RUNS, STEPS)
+    return {"runs": RUNS, "steps_a_run": STEPS}
+
+
+ROW = Row("states", lambda: map(str, range(200 // RUNS)), run)
