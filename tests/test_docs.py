@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import runpy
 import subprocess
@@ -37,6 +38,8 @@ def small_run(tmp_path_factory):
 
     run, config = tmp_path_factory.mktemp("docs-run"), preset("small")
     save(run, Checkpoint("camp", config, make_agent("camp", config).state_dict()))
+    rows = [{"step": 64 * k, "episode": {"success": 0.1 * k}} for k in range(4)]
+    (run / "log.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
     return run
 
 
@@ -150,6 +153,7 @@ def test_examples_run(example, small_dataset, small_run, tmp_path):
         pytest.importorskip("submitit")
     ranges = ["--scenes", "2", "--parts", "2", "--workers", "1", "--local"]
     arguments = {
+        "draw_curve": [small_run, "--out", tmp_path / "curve.png"],
         "ship_agent": [small_run, tmp_path / "agent"],
         "contact_sheet": [small_dataset, tmp_path / "sheet.png", "--pixels", "120"],
         "stream_episodes": [small_dataset],

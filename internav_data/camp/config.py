@@ -25,6 +25,13 @@ class NetworkConfig:
 
     image_size: Annotated[int, Bounds(16, 1024)] = 64
     """Size of the camera's pictures, pixels a side."""
+    observation: Literal["camera", "map"] = "camera"
+    """Pictures, or a map of the house around the agent (docs/environment.md): for research on
+    interaction rather than on seeing."""
+    map_occlusion: bool = False
+    """Show only what the agent has seen so far on the map."""
+    privileged: tuple[Literal["mass", "movable"], ...] = ()
+    """Hidden attributes that the map shows besides, for oracles; every table names them."""
     encoder: TrainPreset = "small"
     """"paper": one network for colour and one for depth, fused; "small": one network
     over all four channels."""
@@ -273,6 +280,13 @@ class CampConfig:
                 f"run.workers is {self.run.workers}: there are {most} environments (ppo.num_envs) "
                 f"to step; ask for {most} processes at most"
             )
+        network = self.network
+        if network.observation == "camera" and (network.map_occlusion or network.privileged):
+            key = "privileged" if network.privileged else "map_occlusion"
+            raise UsageError(
+                f"network.{key}: pictures have no use for it; leave it out, or set "
+                "network.observation to 'map'"
+            )
         least = 36 if self.network.encoder == "paper" else 16
         if self.network.image_size < least:
             raise UsageError(
@@ -321,7 +335,7 @@ def from_mapping(config: CampConfig, changes: Mapping[str, Any], where: str) -> 
 
 _PRESETS: Final = {
     "paper": CampConfig(
-        network=NetworkConfig(300, "paper", hidden=512, shared_encoder=False),
+        network=NetworkConfig(300, encoder="paper", hidden=512, shared_encoder=False),
         ppo=PPOConfig(
             num_envs=12, num_steps=30, update_epochs=1, num_minibatches=1, clip_coef=0.1,
             clip_vloss=True, scale_values=False,

@@ -19,6 +19,7 @@ from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
     from internav_data.envs.loop import Environments
+    from internav_data.envs.sensors import Sensor
 
 _SINGLE = ("room_count", "==", 1)
 _MEANS = ("success", "spl", "sts", "distance_m", "steps")
@@ -110,7 +111,11 @@ class TrainingData:
         return len(self.episodes()) - len(self.demonstrated)
 
     def environments(
-        self, stage: TrainingStage, config: CampConfig, local: range, sensors: Sequence[str]
+        self,
+        stage: TrainingStage,
+        config: CampConfig,
+        local: range,
+        sensors: Sequence[str | Sensor],
     ) -> Environments:
         """Return a stage's environments with the numbers in `local`."""
         from internav_data.envs.make import make_vector  # noqa: PLC0415 - the camera's kernels

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,15 +19,18 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from internav_data.camp.config import NetworkConfig
-from internav_data.envs.sensors import DEFAULT_SENSORS
+from internav_data.catalog.asset_types import ASSET_TYPES
+from internav_data.envs.house_map import MAP_SIZE, NOTHING_HERE, PICK, PICK_FAILED, PUSH, UNSEEN
+from internav_data.envs.sensors import DEFAULT_SENSORS, Sensor, observed, sensor_names
 from internav_data.world.actions import HORIZONS_DEG
 
 _LAYERS: Final = {
     "paper": ((32, 8, 4, 0), (64, 4, 2, 0), (32, 3, 1, 0)),
     "small": ((32, 4, 4, 0), (32, 3, 2, 1), (32, 3, 1, 1)),
+    "map": ((16, 4, 4, 0), (32, 3, 2, 1)),
 }
 """Channels, kernel, stride and padding of each convolution. `paper` is the released code's; `small`
-is made for 64x64 or 32x32 pixels on a CPU."""
+is made for 64x64 or 32x32 pixels on a CPU, `map` for 52x52 cells."""
 _ACTOR_GAIN: Final = 0.01
 _SCALE_RATE: Final = 0.2
 """Weight of a rollout's variance in the running one of returns."""
@@ -37,6 +41,12 @@ _RIDGE: Final = 0.01
 EMBEDDED: Final = 12
 """Length of an embedded intent (section 5.2)."""
 _RGB, _DEPTH = 3, 1
+_LOG_MASS: Final = 5.0
+"""Divisor of log(1 + mass in kg)."""
+_TALL: Final = 125.0
+"""Divisor of a map's heights: 2.5 m."""
+_NEAR_CELLS: Final = slice(MAP_SIZE // 2 - 12, MAP_SIZE // 2 + 12)
+"""Rows and columns of a map within 1.5 m of the agent: its reach and a thing's own size."""
 _NEAR_M: Final = 0.25
 """Distance over which the goal's nearness falls to 1/e, metres: a step of the agent."""
 _NEAR_WEIGHT: Final = 3.0
@@ -68,7 +78,10 @@ class CameraEncoder(SensorEncoder):
         self._depth_limit_m, self._bf16 = config.depth_limit_m, config.bf16
         separate = config.encoder == "paper"
         self._channels = (_RGB, _DEPTH) if separate else (_RGB + _DEPTH,)
-        self.eyes = nn.ModuleList(_convolutions(count, config) for count in self._channels)
+        self.eyes = nn.ModuleList(
+            _convolutions(config.encoder, count, config.image_size, config.hidden)
+            for count in self._channels
+        )
         self.fuse = _linear(2 * config.hidden, config.hidden) if separate else nn.Identity()
 
     def forward(self, rgb: Tensor, depth: Tensor) -> Tensor:
@@ -86,6 +99,50 @@ class CameraEncoder(SensorEncoder):
             views = [eye(view) for eye, view in zip(self.eyes, views, strict=True)]
             fused = views[0] if len(views) == 1 else self.fuse(torch.cat(views, 1)).relu()
         return fused.float().view(*steps, -1)
+
+
+class MapEncoder(SensorEncoder):
+    """Convolutional features of a map, and what failed with things round the agent.
+
+    Planes are the height of what stands there, the usual mass of its type, whether it is of a type
+    to push, or to pick up, the goal, and whether anything failed there; with occlusion what has not
+    been seen yet, and an oracle's privileged channels.
+    """
+
+    sensors = ("map",)
+    masses: Tensor
+    bits: Tensor
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__(config)
+        self._occlusion, self._bf16 = config.map_occlusion, config.bf16
+        self._planes = 6 + config.map_occlusion + len(config.privileged)
+        self.eye = _convolutions("map", self._planes, MAP_SIZE, config.hidden)
+        masses = torch.zeros(256)
+        for known in ASSET_TYPES.values():
+            masses[known.number + 1] = math.log1p(known.mass_kg) / _LOG_MASS
+        self.register_buffer("masses", masses, persistent=False)
+        bits = torch.tensor([1, 2, 4, 8, PICK_FAILED, NOTHING_HERE], dtype=torch.uint8)
+        self.register_buffer("bits", bits, persistent=False)
+        self.size = config.hidden + len(bits)
+
+    def forward(self, shown: Tensor) -> Tensor:
+        """Return features of `map` (T, n, channels, 52, 52) uint8, as `map_sensor` writes it."""
+        steps, shown = shown.shape[:2], shown.flatten(0, 1)
+        height, kind, types, goal, tried, *told = shown.unbind(1)
+        hidden = [kind == UNSEEN] if self._occlusion else []
+        scaled = [torch.log1p(each.float()) / _LOG_MASS for each in told]
+        known = [kind == PUSH, kind == PICK, goal, tried > 0, *hidden, *scaled]
+        planes = self.masses.new_empty(*height.shape, self._planes)  # channels last, as of pictures
+        torch.div(height, _TALL, out=planes[..., 0])
+        planes[..., 1] = self.masses[types.int()]
+        for number, plane in enumerate(known, 2):
+            planes[..., number] = plane
+        with torch.autocast("cuda", torch.bfloat16, enabled=self._bf16 and planes.is_cuda):
+            features = self.eye(planes.permute(0, 3, 1, 2)).float()
+        near = tried[:, _NEAR_CELLS, _NEAR_CELLS].flatten(1).unsqueeze(1)  # (T n, 1, cells)
+        failed = (near & self.bits.unsqueeze(1)).amax(-1) > 0
+        return torch.cat([features, failed.float()], -1).view(*steps, -1)
 
 
 class GoalEncoder(SensorEncoder):
@@ -135,11 +192,22 @@ class HorizonEncoder(SensorEncoder):
 
 ENCODERS: Final[dict[str, type[SensorEncoder]]] = {
     "camera": CameraEncoder,
+    "map": MapEncoder,
     "goal": GoalEncoder,
     "held": HeldEncoder,
     "horizon": HorizonEncoder,
 }
 """Encoders of sensors by name."""
+
+
+def observation_sensors(
+    config: NetworkConfig, sensors: Sequence[str | Sensor] = DEFAULT_SENSORS
+) -> tuple[str | Sensor, ...]:
+    """Return an agent's sensors as a config observes the house: a map may replace the pictures."""
+    if config.observation == "camera":
+        return tuple(sensors)
+    seen = observed("map", map_occlusion=config.map_occlusion, privileged=config.privileged)
+    return (*seen, *(sensor for sensor in sensors if sensor not in DEFAULT_SENSORS))
 
 
 class Encoder(nn.Module):
@@ -150,12 +218,15 @@ class Encoder(nn.Module):
     config
         Sizes of the networks.
     sensors
-        Names of the agent's sensors. Those of no encoder are left to the agent.
+        The agent's sensors, or their names. Those of no encoder are left to the agent.
     """
 
-    def __init__(self, config: NetworkConfig, sensors: Sequence[str] = DEFAULT_SENSORS) -> None:
+    def __init__(
+        self, config: NetworkConfig, sensors: Sequence[str | Sensor] = DEFAULT_SENSORS
+    ) -> None:
         super().__init__()
-        found = {name: kind for name, kind in ENCODERS.items() if {*kind.sensors} <= {*sensors}}
+        names = sensor_names(sensors)
+        found = {name: kind for name, kind in ENCODERS.items() if {*kind.sensors} <= names}
         parts = {name: kind(config) for name, kind in found.items()}
         self.parts, self.size = nn.ModuleDict(parts), sum(part.size for part in parts.values())
         self._taken = {name: part.sensors for name, part in parts.items()}
@@ -436,14 +507,13 @@ def divergence(first: Tensor, second: Tensor) -> float:
     return float((first * ratio).sum(-1).mean())
 
 
-def _convolutions(channels: int, config: NetworkConfig) -> nn.Sequential:
+def _convolutions(kind: str, channels: int, size: int, features: int) -> nn.Sequential:
     layers: list[nn.Module] = []
-    size = config.image_size
-    for out, kernel, stride, padding in _LAYERS[config.encoder]:
+    for out, kernel, stride, padding in _LAYERS[kind]:
         layer = nn.Conv2d(channels, out, kernel, stride, padding)
         layers += [_initialised(layer, nn.init.calculate_gain("relu")), nn.ReLU()]
         channels, size = out, (size + 2 * padding - kernel) // stride + 1
-    full = _linear(channels * size * size, config.hidden, nn.init.calculate_gain("relu"))
+    full = _linear(channels * size * size, features, nn.init.calculate_gain("relu"))
     return nn.Sequential(*layers, nn.Flatten(), full, nn.ReLU())
 
 

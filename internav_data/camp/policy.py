@@ -163,7 +163,7 @@ def candidate(
     # Networks of 16 small pictures are no work for two threads, which wait for each other.
     torch.set_num_threads(agent_config(agent, "run", "threads", 1))
     about = replace(_facts(agent, about), greedy=greedy, without_intent=without_intent)
-    about = replace(about, name=row_name(about))
+    about = replace(about, name=row_name(about) + _observation(agent))
     size = agent_config(agent, "network", "image_size", 64)
     if without_intent:
         agent = agent.without_intent()
@@ -190,6 +190,15 @@ def row_name(about: About) -> str:
 def agent_config(agent: object, part: str, name: str, default: Any) -> Any:  # noqa: ANN401
     """Return a value of an agent's config; the default where it has none."""
     return getattr(getattr(getattr(agent, "config", None), part, None), name, default)
+
+
+def _observation(agent: object) -> str:
+    """Return what a row's name says of an agent's map and of hidden attributes that it shows."""
+    if agent_config(agent, "network", "observation", "camera") == "camera":
+        return ""
+    told = agent_config(agent, "network", "privileged", ())
+    seen = " as seen" if agent_config(agent, "network", "map_occlusion", default=False) else ""
+    return f" (map{seen}{'; privileged: ' if told else ''}{', '.join(told)})"
 
 
 def _facts(agent: object, about: About) -> About:

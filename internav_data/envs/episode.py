@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from internav_data.envs.house_map import HouseMap, MapMoment
 from internav_data.envs.tasks import InteractiveNavigation, TaskConfig, TaskStep
 from internav_data.records.errors import UsageError
 from internav_data.render.camera import CameraView
@@ -76,6 +77,8 @@ class EpisodeRun:
         Whether the episode has ended.
     stale : bool
         Whether the picture has changed since it was drawn; the drawing code sets it to False.
+    moments : list of MapMoment
+        State at the start and after every action, for maps.
 
     Raises
     ------
@@ -85,11 +88,13 @@ class EpisodeRun:
 
     __slots__ = (
         "_config",
+        "_maps",
         "actions",
         "done",
         "episode",
         "last",
         "loaded_house",
+        "moments",
         "props",
         "stale",
         "start",
@@ -125,6 +130,8 @@ class EpisodeRun:
         self.actions: list[int] = []
         self.done, self.stale = False, True
         self.last: StepResult | None = None
+        self.moments = [self._moment()]
+        self._maps: dict[bool, HouseMap] = {}
 
     def step(self, action: int) -> TaskStep:
         """Take an action; return the reward and whether the episode ends.
@@ -141,6 +148,7 @@ class EpisodeRun:
             check_actions([action])
         self.last = result = self.world.step(action)
         self.actions.append(action)
+        self.moments.append(self._moment())
         if result.success and result.action.changes_picture:
             self.stale = True
             self._update_props(result)
@@ -149,6 +157,22 @@ class EpisodeRun:
         truncated = not terminated and len(self.actions) >= self._config.max_steps
         self.done = terminated or truncated
         return TaskStep(reward, terminated, truncated)
+
+    def house_map(self, *, occlusion: bool) -> HouseMap:
+        """Return the map of the house as it is now, or (occlusion) as the agent has seen it."""
+        found = self._maps.get(occlusion)
+        if found is None:
+            home, goal = self.loaded_house, self.world.goal
+            found = HouseMap(
+                *(home.raster, home.affordances, goal, self.moments[0]), occlusion=occlusion
+            )
+            self._maps[occlusion] = found
+        found.follow(self.moments)
+        return found
+
+    def _moment(self) -> MapMoment:
+        world = self.world
+        return MapMoment(world.i, world.j, world.quarter, world.items, self.last)
 
     def _place_agent(self, start: Sequence[int]) -> None:
         """Put the agent on another free node."""

@@ -10,7 +10,7 @@ import os
 import sys
 import tempfile
 import weakref
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -18,8 +18,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from internav_data.core.main_module import dumped, loaded
 from internav_data.core.processes import GRACE_S, Child
 from internav_data.envs.copies import PlainSpec, with_absolute_path
-from internav_data.envs.sensors import DEFAULT_SENSORS
-from internav_data.envs.slot import EpisodeSnapshot, check_options, task_names
+from internav_data.envs.slot import EpisodeSnapshot, check_options, take_sensors, task_names
 from internav_data.envs.spaces import buffer_shapes
 from internav_data.envs.vector import (
     OPTIONS,
@@ -41,6 +40,7 @@ if TYPE_CHECKING:
     from internav_data.core.typing import Bools
     from internav_data.dataset import Dataset
     from internav_data.envs.sensors import Sensor
+    from internav_data.envs.slot import Arguments
     from internav_data.envs.types import Observations, Stepped
     from internav_data.records import Episode
 
@@ -180,9 +180,10 @@ class InterNavProcesses(PlainSpec, VectorEnv[Any, Any, Any]):
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
         copy: bool = True,
-        sensors: Sequence[str | Sensor] = DEFAULT_SENSORS,
+        sensors: Sequence[str | Sensor] | None = None,
         **arguments: Any,  # noqa: ANN401 - those of `InterNavVectorEnv`
     ) -> None:
+        sensors = take_sensors(sensors, cast("Arguments", arguments))
         if not 1 <= workers <= num_envs:
             raise UsageError(f"workers: expected 1 … {num_envs} (num_envs), got {workers}")
         self._mode = declare_spaces(

@@ -9,18 +9,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 from gymnasium import spaces
 
+from internav_data.envs.house_map import CHANNELS, LAYERS, MAP_SIZE, Privilege, map_layers
 from internav_data.geometry.headings import HEADINGS
 from internav_data.navigation import SPACING_M
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import HORIZONS_DEG
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -33,6 +35,8 @@ FAR_M: Final = 1000.0
 MIN_INSTANCE_ID: Final = -5
 """Lower bound of instance ids: see the table of `internav_data.render.camera`."""
 
+Observation = Literal["camera", "map"]
+"""Way to observe the house: pictures, or a map."""
 SpaceOfSize = Callable[[int], "spaces.Space[Any]"]
 Write = Callable[["EpisodeRun", "Frames", "NDArray[Any]"], None]
 
@@ -119,6 +123,65 @@ def _write_horizon(run: EpisodeRun, _: Frames, out: NDArray[Any]) -> None:
     out[...] = HORIZONS_DEG.index(run.world.horizon_deg)
 
 
+def _map_space(_: int, channels: int) -> spaces.Box:
+    return spaces.Box(0, 255, (channels, MAP_SIZE, MAP_SIZE), np.uint8)
+
+
+def _write_map(
+    run: EpisodeRun, _: Frames, out: NDArray[Any], *, occlusion: bool, layers: NDArray[np.int64]
+) -> None:
+    run.house_map(occlusion=occlusion).write(out, layers)
+
+
+def map_sensor(*, occlusion: bool = False, privileged: Sequence[Privilege] = ()) -> Sensor:
+    """Return the sensor `map`: a map of the house around the agent, who looks up in it.
+
+    An observation is (channels, 52, 52) uint8, cells of 0.125 m: row 0 lies farthest ahead, column
+    0 farthest to the left, and the agent stands in the middle, on the corner of four cells. A cell
+    shows a thing that blocks the agent and overlaps it; of several the one whose type can be
+    handled, else the highest.
+
+    | channel | unit | value |
+    |---|---|---|
+    | 0 `height` | 0.02 m | top of the thing above the floor; 255 for 5.1 m and more |
+    | 1 `kind` | | 0 nothing, 1 wall, 2 furniture, 3 of a type to push, 4 of a type to pick up, \
+5 not seen yet |
+    | 2 `type` | | number of its type in the catalogue plus 1; 254 a user's own, 255 wall |
+    | 3 `goal` | | 1 in the four cells round the goal |
+    | 4 `tried` | bits | what failed with the thing since it lies there: 1, 2, 4, 8 a push ahead, \
+to the left, back, to the right, as the agent looks now; 16 a pick-up; 32, round a node: there was \
+nothing to act on, or no room to drop, and nothing has moved since |
+    | `mass` | kg | privileged: mass of the thing; 255 for a wall and for 255 kg and more |
+    | `movable` | bits | privileged: 1 it can be pushed, 2 picked up |
+
+    Parameters
+    ----------
+    occlusion
+        Whether it shows only what the agent has seen so far, as it was then: what lies within 90
+        degrees and what is within 0.25 m, behind nothing as high as the camera. The camera's
+        horizon does not count.
+    privileged
+        Hidden attributes to show besides, a channel each, in this order: for oracles alone.
+
+    Raises
+    ------
+    UsageError
+        An attribute is unknown, or given twice.
+    """
+    if not set(privileged) <= LAYERS.keys() or len({*privileged}) < len(privileged):
+        raise UsageError(f"privileged: expected some of {list(LAYERS)}, got {list(privileged)}")
+    layers = map_layers(privileged)
+    words = "map of the house around the agent: see [maps](#maps)"
+    if privileged:
+        words += f", privileged input: {', '.join(privileged)}"
+    return Sensor(
+        "map",
+        partial(_map_space, channels=CHANNELS + len(privileged)),
+        partial(_write_map, occlusion=occlusion, layers=layers),
+        description=words,
+    )
+
+
 SENSORS: Final = {
     sensor.name: sensor
     for sensor in (
@@ -143,11 +206,50 @@ SENSORS: Final = {
             "ids", _ids_space, _write_ids, camera=True,
             description="instance of each pixel (`internav_data.render.camera`), privileged input",
         ),
+        map_sensor(),
     )
 }  # fmt: skip
 """Sensors by name."""
 DEFAULT_SENSORS: Final = ("rgb", "depth", "goal", "held", "horizon")
 """Sensors of an environment unless it is given others. Instance ids are privileged input."""
+
+
+def observed(
+    observation: Observation = "camera",
+    *,
+    map_occlusion: bool = False,
+    privileged: Sequence[Privilege] = (),
+) -> tuple[str | Sensor, ...]:
+    """Return the sensors of a way to observe: pictures or a map, and what the agent feels.
+
+    Parameters
+    ----------
+    observation
+        "camera": `DEFAULT_SENSORS`; "map": a map in place of the pictures.
+    map_occlusion, privileged
+        Arguments of `map_sensor`.
+
+    Raises
+    ------
+    UsageError
+        There is no such way, or pictures are given arguments of a map.
+    """
+    if observation == "map":
+        shown = map_sensor(occlusion=map_occlusion, privileged=privileged)
+        return (shown, *(name for name in DEFAULT_SENSORS if not SENSORS[name].camera))
+    if observation != "camera":
+        raise UsageError(f"observation: expected 'camera' or 'map', got {observation!r}")
+    if map_occlusion or privileged:
+        raise UsageError(
+            "map_occlusion and privileged: pictures have no use for them; leave them out, or set "
+            "observation='map'"
+        )
+    return DEFAULT_SENSORS
+
+
+def sensor_names(sensors: Iterable[str | Sensor]) -> set[str]:
+    """Return the names of sensors, some of which may be names already."""
+    return {sensor if isinstance(sensor, str) else sensor.name for sensor in sensors}
 
 
 def find_sensors(chosen: Sequence[str | Sensor]) -> tuple[Sensor, ...]:

@@ -9,7 +9,6 @@ import numpy as np
 
 from internav_data.dataset.location import MINI
 from internav_data.envs.copies import Rebuilt, with_absolute_path
-from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.envs.slot import (
     Arguments,
     EnvSlot,
@@ -17,6 +16,7 @@ from internav_data.envs.slot import (
     check_options,
     check_render_mode,
     step_info,
+    take_sensors,
 )
 from internav_data.envs.spaces import RENDER_SIZE, ObservationBuffer, observation_space
 from internav_data.render.camera import Camera
@@ -50,7 +50,8 @@ class InterNavEnv(Rebuilt, gymnasium.Env[dict[str, Any], np.int64]):
     render_mode
         None or "rgb_array".
     sensors
-        Sensors to observe: names in `internav_data.envs.sensors.SENSORS`, or one's own `Sensor`.
+        Sensors to observe: names in `internav_data.envs.sensors.SENSORS`, or one's own `Sensor`;
+        those of `observation` if not given.
     **arguments
         Further arguments by name: those of `docs/environment.md`.
 
@@ -70,12 +71,12 @@ class InterNavEnv(Rebuilt, gymnasium.Env[dict[str, Any], np.int64]):
         image_size: int = 64,
         render_mode: str | None = None,
         *,
-        sensors: Sequence[str | Sensor] = DEFAULT_SENSORS,
+        sensors: Sequence[str | Sensor] | None = None,
         **arguments: Unpack[Arguments],
     ) -> None:
         check_render_mode(render_mode)
         self.render_mode = render_mode
-        dataset = with_absolute_path(dataset)
+        dataset, sensors = with_absolute_path(dataset), take_sensors(sensors, arguments)
         self._arguments = dict(
             arguments, dataset=dataset, image_size=image_size, render_mode=render_mode,
             sensors=sensors,

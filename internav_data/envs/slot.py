@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, TypedDict
 
 from internav_data.envs.auxiliary import next_start
 from internav_data.envs.episode import EpisodeRun
+from internav_data.envs.sensors import observed
 from internav_data.envs.source import HOUSE_CACHE_SIZE, LOADED_HOUSES, Source, open_source
 from internav_data.envs.tasks import TASKS, TaskConfig
 from internav_data.records.errors import CorruptDataError, UsageError
@@ -17,7 +18,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from internav_data.dataset import Dataset
+    from internav_data.envs.house_map import Privilege
     from internav_data.envs.order import EpisodeOrder
+    from internav_data.envs.sensors import Observation, Sensor
     from internav_data.envs.tasks import Task, TaskStep
     from internav_data.records import Episode, PushModel
     from internav_data.world.config import Hands
@@ -37,6 +40,9 @@ class Arguments(TypedDict, total=False):
     episodes_per_house: int
     shuffle: bool
     house_cache_size: int
+    observation: Observation
+    map_occlusion: bool
+    privileged: Sequence[Privilege]
 
 
 _RENAMED: Final = {
@@ -282,6 +288,27 @@ def task_names(arguments: Mapping[str, Any], count: int) -> list[str]:
     if len(names) != count or not set(names) <= set(TASKS):
         raise UsageError(f"task: expected one of {list(TASKS)}, or {count} of them; got {given!r}")
     return names
+
+
+def take_sensors(
+    sensors: Sequence[str | Sensor] | None, arguments: Arguments
+) -> Sequence[str | Sensor]:
+    """Return an environment's sensors; take `observation` and what belongs to it out of arguments.
+
+    Raises
+    ------
+    UsageError
+        Both `sensors` and `observation` are given, or one of them cannot be.
+    """
+    given = arguments.keys() & {"observation", "map_occlusion", "privileged"}
+    if sensors is not None and given:
+        raise UsageError(f"{min(given)}: sensors are given, too; leave one of them out")
+    found = observed(
+        arguments.pop("observation", "camera"),
+        map_occlusion=arguments.pop("map_occlusion", False),
+        privileged=arguments.pop("privileged", ()),
+    )
+    return found if sensors is None else sensors
 
 
 def step_info(run: EpisodeRun, step: TaskStep) -> dict[str, Any]:

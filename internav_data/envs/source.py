@@ -22,24 +22,28 @@ from internav_data.dataset.location import folder_to_read
 from internav_data.dataset.manifest import read_manifest_and_digest
 from internav_data.dataset.select import joined
 from internav_data.envs.auxiliary import auxiliary_starts
+from internav_data.envs.house_map import house_raster
 from internav_data.envs.order import EpisodeOrder, scene_bounds
 from internav_data.geometry import round_m
 from internav_data.navigation import SPACING_M
 from internav_data.physics.config import PhysicsConfig
 from internav_data.physics.engines.installed import require_engine
+from internav_data.records import type_affordances
 from internav_data.records.errors import UsageError
 from internav_data.render.camera import StaticScene
 from internav_data.world import HouseModel
 from internav_data.world.config import WorldConfig
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import pyarrow as pa
     from numpy.typing import NDArray
 
     from internav_data.dataset import Dataset, Manifest
     from internav_data.dataset.select import Filters
     from internav_data.envs.auxiliary import AuxiliaryStart, InteractionKind
-    from internav_data.records import Episode, House
+    from internav_data.records import Affordance, Episode, House
 
 
 FIELDS_KEPT: Final = 64
@@ -76,7 +80,7 @@ class ShortestPathField:
         return known
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(eq=False)
 class LoadedHouse:
     """House prepared for episodes: model, camera scene and distance fields."""
 
@@ -84,16 +88,26 @@ class LoadedHouse:
     static_scene: StaticScene
     instances: tuple[int, ...]
     """Instance number, among the camera's props, of each movable object of the model."""
+    affordances: Mapping[str, Affordance]
+    """Affordance of each type that can be handled."""
     _fields: LRUCache[tuple[int, int], ShortestPathField] = field(
         default_factory=lambda: LRUCache(FIELDS_KEPT)
     )
 
     @staticmethod
-    def of(house: House) -> LoadedHouse:
-        """Prepare a house."""
+    def of(house: House, affordances: Mapping[str, Affordance] | None = None) -> LoadedHouse:
+        """Prepare a house; the affordances of types are those of its own assets if not given."""
         model = HouseModel.of(house)
         rows = {placed.object_id: row for row, placed in enumerate(house.objects)}
-        return LoadedHouse(model, StaticScene.of(house), tuple(rows[t] for t in model.object_ids))
+        if affordances is None:
+            affordances = type_affordances(house.assets.values())
+        instances = tuple(rows[t] for t in model.object_ids)
+        return LoadedHouse(model, StaticScene.of(house), instances, affordances)
+
+    @cached_property
+    def raster(self) -> NDArray[np.uint8]:
+        """Raster of the house without what can move, (6, a, b) uint8: see `house_raster`."""
+        return house_raster(self.model, self.affordances)
 
     def distance_field(self, goal: tuple[int, int]) -> ShortestPathField:
         """Return the distance field of a goal."""
@@ -141,6 +155,10 @@ class Source:
     def world_config(self) -> WorldConfig:
         """Settings of the world that the dataset's outcomes and experts were made with."""
         return WorldConfig.of_dataset(self.dataset.manifest.config)
+
+    @cached_property
+    def _affordances(self) -> Mapping[str, Affordance]:
+        return type_affordances(self.dataset.assets.values())
 
     @cached_property
     def _same_arithmetic(self) -> bool:
@@ -191,7 +209,7 @@ class Source:
         """Return the house of an episode, ready for the environment."""
         house = self.dataset.scene(episode.scene_id)
         return LOADED_HOUSES.get(
-            (self.dataset.digest, house.scene_id), lambda: LoadedHouse.of(house)
+            (self.dataset.digest, house.scene_id), lambda: LoadedHouse.of(house, self._affordances)
         )
 
     def _auxiliary_starts(self, number: int, kind: InteractionKind) -> tuple[AuxiliaryStart, ...]:

@@ -10,7 +10,6 @@ from gymnasium.vector.utils import batch_space
 
 from internav_data.envs.copies import Rebuilt, with_absolute_path
 from internav_data.envs.episode import check_actions
-from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.envs.slot import (
     Arguments,
     EnvSlot,
@@ -18,6 +17,7 @@ from internav_data.envs.slot import (
     check_options,
     check_render_mode,
     step_info,
+    take_sensors,
 )
 from internav_data.envs.spaces import RENDER_SIZE, ObservationBuffer, observation_space
 from internav_data.records.errors import UsageError
@@ -153,11 +153,11 @@ class InterNavVectorEnv(Rebuilt, VectorEnv[Any, Any, Any]):
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
         copy: bool = True,
-        sensors: Sequence[str | Sensor] = DEFAULT_SENSORS,
+        sensors: Sequence[str | Sensor] | None = None,
         buffers: Observations | None = None,
         **arguments: Unpack[Arguments],
     ) -> None:
-        dataset = with_absolute_path(dataset)
+        dataset, sensors = with_absolute_path(dataset), take_sensors(sensors, arguments)
         self._arguments = dict(
             arguments, num_envs=num_envs, dataset=dataset, image_size=image_size,
             autoreset_mode=autoreset_mode, render_mode=render_mode, copy=copy, sensors=sensors,

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from internav_data.core.typing import Bools
     from internav_data.dataset import Dataset
+    from internav_data.envs.sensors import Sensor
     from internav_data.envs.types import Actions, Observations
     from internav_data.records import Episode
 
@@ -47,8 +48,8 @@ class Policy(Protocol):
     name: str
     image_size: int
     """Size of the pictures, pixels a side."""
-    sensors: Sequence[str]
-    """Names of the sensors that it takes; see `internav_data.envs.sensors`."""
+    sensors: Sequence[str | Sensor]
+    """Sensors that it takes, or their names; see `internav_data.envs.sensors`."""
 
     def begin(self, count: int, seed: int) -> None:
         """Begin with `count` slots; randomness derives from `seed` and the episode alone."""

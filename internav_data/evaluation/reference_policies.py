@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from internav_data.dataset import Dataset
+    from internav_data.envs.sensors import Sensor
     from internav_data.evaluation.evaluator import Policy
     from internav_data.navigation import Lattice
     from internav_data.records import Episode
@@ -77,7 +78,7 @@ class ScriptedPolicy:
     """
 
     image_size = 1
-    sensors: Sequence[str] = ()
+    sensors: Sequence[str | Sensor] = ()
 
     def __init__(self, name: str, plan: ActionPlanner) -> None:
         self.name = name
@@ -102,7 +103,7 @@ class RandomPolicy:
 
     name = "random"
     image_size = 1
-    sensors: Sequence[str] = ()
+    sensors: Sequence[str | Sensor] = ()
 
     def __init__(self) -> None:
         self._seed = 0

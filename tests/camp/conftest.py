@@ -24,12 +24,12 @@ def _one_thread():
 class FakeEnvironments:
     """Noise to look at; episodes of fixed lengths, ended by Done or cut off; it notes actions."""
 
-    def __init__(self, count=4, size=16, length=7, seed=0, done_ends=True):
+    def __init__(self, count=4, size=16, length=7, seed=0, done_ends=True, shown=None):
         self.num_envs, self._size, self._seed = count, size, seed
         self._lengths = [length + 3 * k for k in range(count)]
         self._ages = np.zeros(count, int)
         self._rng = np.random.default_rng(seed)
-        self._done_ends = done_ends
+        self._done_ends, self._map = done_ends, shown
         self.actions = []
 
     def _look(self):
@@ -41,6 +41,7 @@ class FakeEnvironments:
             "held": self._rng.integers(0, 2, n),
             "horizon": self._rng.integers(0, 4, n),
             "ids": self._rng.integers(-3, 6, (n, s, s)).astype(np.int32),
+            **({"map": self._rng.integers(0, 256, (n, *self._map), np.uint8)} if self._map else {}),
         }
 
     def reset(self, *, seed=None, options=None):

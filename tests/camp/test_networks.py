@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import copy
+import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 from torch import nn
 
-from internav_data.camp import networks
-from internav_data.camp.config import preset
-from internav_data.envs.sensors import DEFAULT_SENSORS
+from internav_data.camp import agents, networks
+from internav_data.camp.agents import make_agent
+from internav_data.camp.agents.flat import PPOAgent
+from internav_data.camp.config import config_of, preset
+from internav_data.envs.house_map import MAP_SIZE
+from internav_data.envs.sensors import DEFAULT_SENSORS, sensor_names
+from internav_data.records.errors import UsageError
 
 
 class GridEncoder(networks.SensorEncoder):
@@ -135,3 +141,58 @@ def test_a_fitted_critic_is_the_ridge_regression_of_numpy(scale):
     halves.fit(out[:4], returns[:4], lambda _: next(totals))
     torch.testing.assert_close(halves.weight, head.weight)
     torch.testing.assert_close(halves.bias, head.bias)
+
+
+def test_the_maps_encoder_sees_every_channel():
+    """A change of any value that an agent must tell apart changes the features."""
+    torch.manual_seed(0)
+    network = replace(
+        preset("small").network, observation="map", map_occlusion=True, privileged=("movable",)
+    )
+    encoder = networks.MapEncoder(network)
+    middle = MAP_SIZE // 2
+    here = (0, 0, slice(None), middle, middle)
+    empty = torch.zeros(1, 1, 6, MAP_SIZE, MAP_SIZE, dtype=torch.uint8)
+    chair = (45, 3, 4, 0, 0, 1)
+    seen = {"nothing": empty}
+    others = [(45, 2, 4, 0, 0, 1), (45, 4, 4, 0, 0, 1), (60, 3, 4, 0, 0, 1), (45, 3, 8, 0, 0, 1)]
+    others += [(45, 3, 4, 1, 0, 1), (45, 3, 4, 0, 0, 0), (0, 5, 0, 0, 0, 0)]
+    others += [(45, 3, 4, 0, 1 << bit, 1) for bit in range(6)]
+    for values in (chair, *others):
+        seen[values] = empty.clone()
+        seen[values][here] = torch.tensor(values, dtype=torch.uint8)
+    found = [encoder(shown) for shown in seen.values()]
+    assert all(each.shape == (1, 1, encoder.size) for each in found)
+    apart = [(a - b).abs().max() for a, b in itertools.combinations(found, 2)]
+    assert min(apart) > 1e-4
+
+
+def test_an_agent_takes_a_map_in_place_of_pictures():
+    network = replace(preset("small").network, observation="map", privileged=("mass",))
+    config = replace(preset("small"), network=network)
+    for method in ("ppo", "camp"):
+        agent = make_agent(method, config)
+        assert sensor_names(agent.sensors) == {"map", "goal", "held", "horizon"}
+        assert "mass" in agent.sensors[0].description
+        assert sensor_names(make_agent(method, preset("small")).sensors) == {*DEFAULT_SENSORS}
+    with pytest.raises(UsageError, match="nie sees objects in pictures"):
+        make_agent("nie", config)
+
+
+def test_an_agent_of_ones_own_that_takes_no_map_is_refused(monkeypatch):
+    class Blind(PPOAgent):
+        def __init__(self, config):
+            super().__init__(replace(config, network=preset("small").network))
+
+    method = agents.Method(Blind, "takes pictures whatever it is asked for")
+    monkeypatch.setitem(agents.AGENTS, "blind", method)
+    config = replace(preset("small"), network=replace(preset("small").network, observation="map"))
+    with pytest.raises(UsageError, match="'blind' takes no map"):
+        make_agent("blind", config)
+
+
+@pytest.mark.parametrize("setting", ["map_occlusion=true", 'privileged=["mass"]'])
+def test_pictures_are_given_no_settings_of_maps(setting):
+    with pytest.raises(UsageError, match="pictures have no use for it"):
+        config_of("small", overrides=[f"network.{setting}"])
+    assert config_of("small", overrides=["network.observation=map", f"network.{setting}"])

@@ -9,6 +9,8 @@ torch = pytest.importorskip("torch")
 from internav_data.camp.agents import AGENTS, make_agent  # noqa: E402
 from internav_data.camp.agents.hierarchy import AuxiliaryAgent  # noqa: E402
 from internav_data.camp.networks import EpisodeSegments  # noqa: E402
+from internav_data.envs.house_map import MAP_SIZE  # noqa: E402
+from internav_data.envs.sensors import sensor_names  # noqa: E402
 
 VARIANTS = [
     *((method, {}) for method in AGENTS),
@@ -46,6 +48,19 @@ def test_log_probabilities_and_values_are_those_of_the_rollout(
     assert any(rollout.batch.episode_starts[1:].any() for rollout in lived)
     if method == "camp":
         assert any(rollout.batch.state["open"].any() for rollout in lived[1:])
+
+
+@pytest.mark.parametrize("method", ["ppo", "ppo-intent", "camp", "hrl"])
+def test_maps_are_replayed_too(collected, fake, method):
+    network = {"observation": "map", "map_occlusion": True, "privileged": ["mass"]}
+    env, changes = fake(shown=(6, MAP_SIZE, MAP_SIZE)), {"network": network}
+    agent, _, lived = collected(method, rollouts=2, env=env, changes=changes)
+    assert "map" in sensor_names(agent.sensors)
+    for rollout in lived:
+        now = agent.evaluate(rollout.batch)
+        torch.testing.assert_close(now.log_prob, rollout.log_probs, atol=1e-5, rtol=0)
+        torch.testing.assert_close(now.value, rollout.values, atol=1e-5, rtol=0)
+    assert lived[0].log_probs.std() > 0.01
 
 
 @pytest.mark.parametrize("shared", [True, False])

@@ -336,7 +336,7 @@ def test_instance_ids_are_seen_by_who_asks_for_them(small):
     (seen, _), (more, _) = plain.reset(seed=3), told.reset(seed=3)
     assert "ids" not in seen
     assert told.single_observation_space.contains({name: v[0] for name, v in more.items()})
-    ids = more.pop("ids")
+    ids, _ = more.pop("ids"), more.pop("map")
     same(seen, more)
     assert ids.shape == (2, 16, 16)
     assert {-1, -3} <= set(ids.ravel().tolist()), "floor and walls"

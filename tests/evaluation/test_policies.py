@@ -141,8 +141,8 @@ def test_what_led_to_an_action_can_be_shown(played_data, make):
 def stored(monkeypatch, make, tmp_path):
     """A run's folder whose checkpoint holds an agent."""
 
-    def store(method, **changes):
-        agent = make(method, **changes)
+    def store(method, agent=None, **changes):
+        agent = agent or make(method, **changes)
         agent.progress = {"environment_steps": 300, "cloned_frames": 0, "training_s": 2.5}
         module = types.ModuleType("internav_data.camp.checkpoint")
         module.load_agent = lambda _: agent
@@ -160,6 +160,20 @@ def test_a_runs_facts_are_told(played_data, stored):
     assert (found.environment_steps, found.training_s, found.training_seed) == (300, 2.5, 0)
     assert found.parameters > 0
     assert found.dataset == played_data.fingerprint
+
+
+def test_an_agents_map_and_what_it_is_told_stand_in_its_name(played_data, stored, make):
+    network = dataclasses.replace(make("ppo").config.network, observation="map")
+    config = dataclasses.replace(make("ppo").config, network=network)
+    oracle = dataclasses.replace(network, map_occlusion=True, privileged=("mass", "movable"))
+    names = []
+    for own in (network, oracle):
+        agent = agents.make_agent("ppo", dataclasses.replace(config, network=own))
+        agent.config, agent.method = dataclasses.replace(config, network=own), "ppo"
+        found = candidate(str(stored("ppo", agent=agent)), played_data, SHORT)
+        names.append(found.about.name)
+        assert len(evaluate(found.policy, played_data, SHORT)) == 6
+    assert names == ["ppo (map)", "ppo (map as seen; privileged: mass, movable)"]
 
 
 def test_the_intent_can_be_left_out_where_there_is_one(played_data, stored):

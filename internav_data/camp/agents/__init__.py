@@ -19,6 +19,7 @@ from internav_data.camp.agents.hierarchy import Hierarchy
 from internav_data.camp.agents.nie import NIEAgent
 from internav_data.camp.agents.protocol import Agent
 from internav_data.camp.config import AgentConfig, CampConfig
+from internav_data.envs.sensors import sensor_names
 from internav_data.records import Purpose, TrainingStream, generator
 from internav_data.records.errors import UsageError
 
@@ -126,4 +127,10 @@ def make_agent(name: str, config: CampConfig) -> Agent[Any]:
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(int(seed))
         agent: Agent[Any] = make(config)
+    observation = config.network.observation
+    if observation == "map" and "map" not in sensor_names(agent.sensors):
+        raise UsageError(
+            f"network.observation is 'map': method {name!r} takes no map; leave it out, or let the "
+            "agent's `sensors` be `observation_sensors(config.network)`"
+        )
     return agent

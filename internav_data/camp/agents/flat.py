@@ -81,6 +81,7 @@ class PPOAgent(RecurrentAgent[FlatRecord]):
     def __init__(self, config: CampConfig, extra: int = 0) -> None:
         super().__init__()
         self.hidden = config.network.hidden
+        self.sensors = networks.observation_sensors(config.network, self.sensors)
         self.encoder = networks.Encoder(config.network, self.sensors)
         done = config.agent.initial_done_probability
         other = (1.0 - done) / (ACTION_COUNT - 1)

@@ -291,6 +291,7 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
         self.hand_back_step = temporally_extended and agent.hand_back_step
         variant = agent.intent if temporally_extended else "none"
         self.uses_intent = variant != "none"
+        self.sensors = networks.observation_sensors(network)
         count = 1 if network.shared_encoder else 3
         encoders = [networks.Encoder(network, self.sensors) for _ in range(count)]
         self.encoders, size = nn.ModuleList(encoders), encoders[0].size

@@ -35,6 +35,11 @@ class NIEAgent(PPOAgent):
     sensors = (*DEFAULT_SENSORS, "ids")
 
     def __init__(self, config: CampConfig) -> None:
+        if config.network.observation != "camera":
+            raise UsageError(
+                f"network.observation is {config.network.observation!r}: nie sees objects in "
+                "pictures; choose 'camera', or another method"
+            )
         super().__init__(config, extra=SUMMARY)
         self._objects, self._weight = config.agent.nie_objects, config.agent.nie_weight
         self.object = nn.Sequential(nn.Linear(3 * _CORNERS, SUMMARY), nn.ReLU())

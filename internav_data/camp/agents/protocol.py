@@ -11,13 +11,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, ClassVar, Generic, Self, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 import torch
 from torch import Tensor, nn
 
 from internav_data.camp.networks import EpisodeSegments
-from internav_data.envs.sensors import DEFAULT_SENSORS
+from internav_data.envs.sensors import DEFAULT_SENSORS, Sensor
 from internav_data.records.errors import UsageError
 
 ObservationTensors = dict[str, Tensor]
@@ -125,8 +125,8 @@ class Evaluated:
 class Agent(nn.Module, ABC, Generic[R]):
     """Learner; see `internav_data.camp.agents` for how to add one's own."""
 
-    sensors: ClassVar[tuple[str, ...]] = DEFAULT_SENSORS
-    """Names of the sensors that the agent takes; see `internav_data.envs.sensors`."""
+    sensors: tuple[str | Sensor, ...] = DEFAULT_SENSORS
+    """Sensors that the agent takes, or their names; see `internav_data.envs.sensors`."""
     uses_intent: bool = False
     """Whether its decisions take an intent P(i)."""
 
