@@ -144,8 +144,9 @@ def update(
 ) -> dict[str, float]:
     """Make the experts' next T steps likelier.
 
-    The loss is the mean of -log pi_Omega(omega*) where the agent decides, and -log pi_omega(a*)
-    everywhere. Hidden states go on from one update to the next, without gradient.
+    The loss is the mean of the negated log-probability that the ratio of PPO has too: an agent
+    of options decides, ends an option or does not, and acts. Hidden states go on from one update
+    to the next, without gradient.
 
     Parameters
     ----------

@@ -180,7 +180,7 @@ class EpisodeWindow:
 
 
 def _reward_parts(means: Mapping[str, float]) -> Row:
-    """Return the mean return of an episode by its sources."""
+    """Return the mean return of an episode by its sources; `reward_moves` is what they leave."""
     names = ("interaction_reward_m", "openings", "closings")
     metres, openings, closings = (means.get(name, 0.0) for name in names)
     parts = {

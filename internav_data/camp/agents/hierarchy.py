@@ -441,8 +441,9 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
     def mixed(self, intended: Tensor, action_log_probs: Tensor) -> Tensor:
         """Return P(i), (T, n, A), equation 7: the policies' actions, weighted by P(omega').
 
-        Rotations of Navigate and Pick add; so do the four Dones. Of `--intent policy` it is
-        P(omega') itself, (T, n, 4).
+        Rotations of Navigate and Pick add; so do the Dones of Navigate and global, and those of
+        Push and Pick where a step hands back. Of `--intent policy` it is P(omega') itself,
+        (T, n, 4).
         """
         if self.intends_options:
             return intended
