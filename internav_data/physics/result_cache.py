@@ -242,7 +242,7 @@ class ResultCache:
             return self._file.execute(question, values).fetchall()
         except sqlite3.OperationalError:  # locked, full, read-only
             return None
-        except sqlite3.Error:  # damaged
+        except (sqlite3.Error, UnicodeDecodeError):  # damaged, its error's text perhaps too
             self._give_up()
         return None
 
@@ -252,8 +252,9 @@ def _opened(path: Path) -> sqlite3.Connection:
         return _connected(path)
     except sqlite3.OperationalError:
         raise
-    except sqlite3.DatabaseError:
-        # No database, a damaged or another one: solving its entries again costs little.
+    except (sqlite3.DatabaseError, UnicodeDecodeError):
+        # No database, a damaged or another one: solving its entries again costs little. SQLite's
+        # errors quote what is damaged, which need not be text.
         path.unlink()
         return _connected(path)
 
@@ -261,6 +262,7 @@ def _opened(path: Path) -> sqlite3.Connection:
 def _connected(path: Path) -> sqlite3.Connection:
     # In any thread: `ResultCache` lets in one at a time.
     file = sqlite3.connect(path, timeout=OPENING_S, isolation_level=None, check_same_thread=False)
+    file.text_factory = bytes  # the schema's text, too, may be damaged
     file.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _MAX_VALUE_BYTES + _CHECK)
     file.execute("PRAGMA trusted_schema = OFF")
     # No waiting for the disk: a lost solution is solved again, and the checksums find the damage
@@ -280,7 +282,7 @@ def _connected(path: Path) -> sqlite3.Connection:
         raise sqlite3.OperationalError(
             f"{path} is locked or read-only"
         )  # in use elsewhere: keep it
-    if found != [("table", table) for table in _TABLES]:
+    if found != [(b"table", table.encode()) for table in _TABLES]:
         file.close()
         raise sqlite3.DatabaseError(f"{path} holds something else: {found}")
     file.execute(f"PRAGMA busy_timeout = {round(1000 * WAIT_S)}")

@@ -36,6 +36,22 @@ def known(held, numbers, size=3000):
     return there
 
 
+def test_a_damaged_schema_is_made_anew(tmp_path):
+    path = tmp_path / FILE_NAME
+    fill(held := ResultCache(tmp_path), range(3))
+    held.flush()
+    whole = path.read_bytes()
+    at = whole.index(b"CREATE TABLE batches")
+    for place in range(at - 40, at + 72):
+        damaged = bytearray(whole)
+        damaged[place] ^= 0x80
+        path.write_bytes(bytes(damaged))
+        known(held := ResultCache(tmp_path), range(3))
+        fill(held, [7])
+        held.flush()
+        assert known(ResultCache(tmp_path), [7]), place
+
+
 def test_of_a_full_file_those_go_that_nobody_asked_for_longest(tmp_path, monkeypatch):
     module = sys.modules["internav_data.physics.result_cache"]
     monkeypatch.setattr(module, "MAX_BYTES", 3_000_000)

@@ -15,11 +15,15 @@ import time
 import bits
 import digests
 import faults
+import fuzz
 import kills
+import mutants
 import states
 from campaign import run_row, seconds_of, summary
 
-ROWS = {module.ROW.name: module.ROW for module in (faults, bits, kills, states, digests)}
+ROWS = {
+    module.ROW.name: module.ROW for module in (faults, bits, kills, states, digests, fuzz, mutants)
+}
 """Rows of the campaign by name, in the order in which they run."""
 
 

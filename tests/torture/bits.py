@@ -27,6 +27,7 @@ from internav_data.dataset import (
     load_dataset,
     open_staging,
     read_manifest,
+    read_table,
     shards,
     staged_scenes,
 )
@@ -36,7 +37,7 @@ from internav_data.dataset.repair import find_damage
 from internav_data.dataset.staging import IDENTITY
 from internav_data.dataset.tables import SPECS
 from internav_data.evaluation.archive import About, Evaluation, read_evaluation, write_evaluation
-from internav_data.evaluation.metrics import EpisodeResult
+from internav_data.evaluation.metrics import RESULTS, EpisodeResult
 from internav_data.generation.run import identity_for
 from internav_data.physics.result_cache import FILE_NAME, ResultCache
 from internav_data.records.errors import InternavError
@@ -318,6 +319,38 @@ KINDS = {
     "schema": _beside("schemas/manifest.schema.json"),
     "croissant": _beside("croissant.json"),
 }
+
+
+def _read_staged(path):
+    staging = Staging(FolderStore(path.parents[5]), IDENTITY_OF_RUN.digest())
+    return staged_scenes(staging), staged_scenes(staging, [1])
+
+
+def _read_checkpoint(path):
+    from internav_data.camp.checkpoint import read
+
+    for other in _run().rglob("*.*"):  # what stands beside it
+        place = path.parents[2] / other.relative_to(_run())
+        place.parent.mkdir(parents=True, exist_ok=True)
+        if other.is_file() and place != path:
+            place.write_bytes(other.read_bytes())
+    return read(path.parent)
+
+
+def _read_cache(path):
+    cache = ResultCache(path.parent)
+    return [cache.get(key) for key in VALUES]
+
+
+READERS = {
+    "staged": _read_staged,
+    "weights": _read_checkpoint,
+    "training": _read_checkpoint,
+    "journal": lambda path: journal_names(FolderStore(path.parents[1])),
+    "evaluation.parquet": lambda path: read_table(path, RESULTS),
+    "cache": _read_cache,
+}
+"""Readers of some kinds of file as it is, for `fuzz`."""
 
 
 @functools.cache

@@ -188,8 +188,10 @@ def cases():
         for name in SCENARIOS
         for fault in FAULTS
     ]
-    for blocks in itertools.zip_longest(*rows):
-        yield from filter(None, blocks)
+    workers = rows[-len(FAULTS) :]  # a second for each run, as processes start
+    for some in (rows[: -len(FAULTS)], workers):
+        for blocks in itertools.zip_longest(*some):
+            yield from filter(None, blocks)
 
 
 def run(key: str, folder: Path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import itertools
 import json
 import sys
@@ -15,9 +16,12 @@ sys.path.insert(0, str(Path(__file__).parent))
 import bits
 import digests
 import faults
+import fuzz
 import kills
+import mutants
 import states
 from campaign import Row, lines_of, run_row, seconds_of, summary
+from stub_runs import forked
 
 
 @pytest.mark.parametrize("fault", ["EIO", "ENOSPC", "SIGKILL"])
@@ -42,6 +46,21 @@ def test_a_group_killed_at_an_fsync_goes_on(tmp_path):
 
 def test_a_folder_is_what_a_model_of_it_says():
     states.run_machine(seed=0, runs=2, steps=10)
+
+
+@pytest.mark.parametrize("name", ["journal", "staged", "parquet", "cache", "stl"])
+def test_changed_bytes_are_read_or_refused(tmp_path, name):
+    said = forked(lambda: fuzz.hammer(name, 0, 0.1, tmp_path / "place"))
+    assert said.isdigit(), said
+    assert int(said) > 0
+
+
+def test_mutants_are_all_different():
+    target = mutants.TARGETS["advantages"]
+    _, _, count = mutants.mutated(target, None)
+    texts = {ast.unparse(mutants.mutated(target, number)[0]) for number in range(count)}
+    as_it_is = ast.unparse(ast.parse(mutants.place_of(target).read_text()))
+    assert len(texts - {as_it_is}) == count > 10
 
 
 def test_cases_of_digests_hold_every_pair_of_circumstances():
