@@ -48,7 +48,7 @@ def test_a_folder_is_what_a_model_of_it_says():
     states.run_machine(seed=0, runs=2, steps=10)
 
 
-@pytest.mark.parametrize("name", ["journal", "staged", "parquet", "cache", "stl"])
+@pytest.mark.parametrize("name", ["journal", "staged", "parquet", "cache"])
 def test_changed_bytes_are_read_or_refused(tmp_path, name):
     said = forked(lambda: fuzz.hammer(name, 0, 0.1, tmp_path / "place"))
     assert said.isdigit(), said
