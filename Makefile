@@ -12,6 +12,7 @@ BARE := .venv-bare
 OTHER := .venv-other
 LOWEST := .venv-lowest
 INTEROP := .venv-interop
+RAY := .venv-ray
 # The interpreter to use; empty: CPython 3.11 if there is one, else the newest of 3.12 to 3.14.
 PYTHON ?=
 # More for pytest, as in `make test ARGS='-k lattice -x'`.
@@ -150,6 +151,17 @@ test-interop: ## the newest datasets, mlcroissant and huggingface_hub read and s
 	  --editable '.[generate]' pytest hypothesis datasets huggingface_hub mlcroissant 'moto[server]' pyyaml
 	$(INTEROP)/bin/python -m pytest -q $(ARGS) tests/interop tests/dataset/test_hugging_face.py \
 	  tests/generation/test_object_store.py
+
+.PHONY: test-ray
+test-ray: ## a Ray cluster of two nodes on this machine makes the bytes of processes; skipped where Ray has no wheel
+	@$(call VIRTUAL_ENVIRONMENT,$(RAY)); \
+	$(RAY)/bin/python -m pip install -qq --disable-pip-version-check --no-input \
+	  --constraint constraints.txt --editable '.[generate]' pytest hypothesis jsonschema pyyaml; \
+	if ! $(RAY)/bin/python -m pip install -qq --disable-pip-version-check --no-input --only-binary ray \
+	  --editable '.[generate,ray]'; then \
+	  echo "Ray cannot be installed on $$($(RAY)/bin/python --version) here: its tests are skipped" >&2; \
+	fi; \
+	$(RAY)/bin/python -m pytest -q $(ARGS) tests/generation/test_ray.py tests/generation/test_executors.py
 
 LOWEST_TESTS := tests/dataset/test_loader.py tests/dataset/test_stream.py tests/core \
   tests/geometry tests/catalog tests/evaluation/test_statistics.py tests/verification/test_mutations.py \

@@ -104,10 +104,15 @@ workers gives the same bytes.""",
 @click.option("--workers", type=int, callback=positive, help="Processes.  [default: one a core]")
 @click.option(
     "--executor",
-    type=click.Choice(["local"]),
-    default="local",
+    type=click.Choice(["processes", "ray"]),
+    default="processes",
     show_default=True,
-    help="Where scenes are made: local is processes on this machine.",
+    help="Where scenes are made: processes on this machine, or a Ray cluster (docs/scale.md).",
+)
+@click.option(
+    "--ray-address",
+    metavar="HOST:PORT",
+    help="Head of the Ray cluster.  [default: $RAY_ADDRESS, else the one that runs here]",
 )
 @config_options
 @click.option(
@@ -174,6 +179,7 @@ def command(
     scene_range: range | None,
     workers: int | None,
     executor: str,
+    ray_address: str | None,
     retry_quarantined: bool,
     dry_run: bool,
     print_config: bool,
@@ -193,11 +199,7 @@ def command(
     keep = engine_is_named(**settings)
     if scene is not None:
         config = config if keep or out is None else _with_held_engine(config, out)
-        from internav_data.generation.reproduce import scene_again
-
-        text, verdict = scene_again(config, scene, episode, out)
-        click.echo(text)
-        click.echo(verdict, err=True)
+        _print_scene(config, scene, episode, out)
         return 0
     if episode is not None:
         raise click.UsageError("--episode needs --scene: say which scene it belongs to")
@@ -218,8 +220,19 @@ def command(
         progress(),
         executor=executor,
         retry_quarantined=retry_quarantined,
+        ray_address=ray_address,
     )
     return _print_report(report, as_json=as_json)
+
+
+def _print_scene(
+    config: GenerationConfig, scene: int, episode: int | None, out: Path | None
+) -> None:
+    from internav_data.generation.reproduce import scene_again
+
+    text, verdict = scene_again(config, scene, episode, out)
+    click.echo(text)
+    click.echo(verdict, err=True)
 
 
 def _forecast(

@@ -25,6 +25,7 @@ EXTRAS: Final = {
     "torch": "train",
     "tensorboard": "tensorboard",
     "huggingface_hub": "hub",
+    "ray": "ray",
 }
 """Extra that installs each module on every machine; none for what every installation has."""
 DISTRIBUTIONS: Final = {"cv2": "opencv-python-headless", "mujoco": "mujoco-core"}

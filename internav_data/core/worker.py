@@ -22,17 +22,23 @@ def serve(pipe: Connection[Any, Any]) -> None:
     """Do the tasks that come through a pipe until its other end closes."""
     recipe: Recipe = pipe.recv()
     began = time.perf_counter()
-    try:
-        work = recipe.setup(recipe.payload)
-    except InternavError as error:
-        pipe.send(Fatal(type(error).__name__, str(error)))
-        return
-    except Exception as error:  # noqa: BLE001 - any error must reach the parent
-        pipe.send(Fatal("InternavError", f"a worker could not be set up: {_described(error)}"))
+    work = set_up(recipe)
+    if isinstance(work, Fatal):
+        pipe.send(work)
         return
     pipe.send(Ready(time.perf_counter() - began))
     while True:
         pipe.send(run_task(work, pipe.recv()))
+
+
+def set_up(recipe: Recipe) -> Callable[[Any], Any] | Fatal:
+    """Return a recipe's function for every task, or the error that its setup met."""
+    try:
+        return recipe.setup(recipe.payload)
+    except InternavError as error:
+        return Fatal(type(error).__name__, str(error))
+    except Exception as error:  # noqa: BLE001 - any error must reach the parent
+        return Fatal("InternavError", f"a worker could not be set up: {_described(error)}")
 
 
 def run_task(work: Callable[[Any], Any], task: Any) -> Done | Failed | Fatal:  # noqa: ANN401

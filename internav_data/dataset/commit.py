@@ -23,7 +23,6 @@ from collections import Counter
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
-from internav_data.core.hardware import hardware
 from internav_data.core.storage import StoreLike, exists, final_of, store_of
 from internav_data.dataset.compatibility import present_settings
 from internav_data.dataset.journal import Journal, journal_names
@@ -39,6 +38,7 @@ from internav_data.dataset.manifest import (
     write_manifest,
 )
 from internav_data.dataset.metadata_files import METADATA, put_metadata
+from internav_data.dataset.scene_hardware import hardware_of, hardware_scenes
 from internav_data.dataset.shards import SPLITS, SceneSource, assets_table, put_shards
 from internav_data.dataset.staging import (
     IDENTITY,
@@ -346,8 +346,7 @@ def commit_scenes(
             f"first {missing[0]}: generate again"
         )
     source = SceneSource(store, old, staging, states)
-    kinds = hardware_of([old] if old else [], hardware())
-    wanted = Wanted(identity, end_scene - first, kinds, part)
+    wanted = Wanted(identity, end_scene - first, part)
     manifest = put_dataset(
         journal, source, assets_table(assets), wanted, old, states=tuple(states.values())
     )
@@ -376,8 +375,6 @@ class Wanted:
     identity: Identity
     scenes: int
     """Number of scenes, quarantined ones included."""
-    hardware: tuple[str, ...]
-    """Names of the arithmetic that the scenes were made with; empty where it is not known."""
     part: DatasetPart | None = None
     """Range of a part; None for a dataset."""
 
@@ -445,7 +442,9 @@ def _manifest(
         )
         for split in SPLITS
     }
-    identity = wanted.identity
+    identity, names, part = wanted.identity, hardware_of(before, states), wanted.part
+    first, left_out = part.first_scene if part else 0, sorted(quarantined)
+    numbers = range(first, first + wanted.scenes)
     return Manifest(
         FORMAT_VERSION,
         identity.generator,
@@ -459,15 +458,9 @@ def _manifest(
         dict(sorted(redraws.items())),
         tuple(entry for _, entry in sorted(quarantined.items())),
         files,
-        requires=("part",) if wanted.part else (),
-        hardware=wanted.hardware,
+        requires=("part",) if part else (),
+        hardware=names,
         obstacle_shares=dict(identity.obstacle_shares) or None,
-        part=wanted.part,
+        part=part,
+        hardware_scenes=hardware_scenes(names, numbers, before, states, left_out),
     )
-
-
-def hardware_of(manifests: Sequence[Manifest], *more: str) -> tuple[str, ...]:
-    """Return the arithmetic of datasets and of further scenes; () where one is not known."""
-    if any(manifest.scenes and not manifest.hardware for manifest in manifests):
-        return ()
-    return tuple(sorted({*more, *(name for each in manifests for name in each.hardware)}))

@@ -10,6 +10,7 @@ import re
 from collections import Counter
 from typing import TYPE_CHECKING, get_args
 
+from internav_data.dataset.scene_hardware import wrong_scene_hardware
 from internav_data.dataset.tables import TABLES
 from internav_data.records import Split
 
@@ -38,6 +39,7 @@ def inconsistencies(manifest: Manifest) -> Iterator[str]:
     yield from _wrong_files(manifest)
     yield from _wrong_quarantine(manifest)
     yield from _wrong_counts(manifest)
+    yield from _wrong_hardware(manifest)
 
 
 def _wrong_types(manifest: Manifest) -> Iterator[str]:
@@ -122,6 +124,14 @@ def _wrong_counts(manifest: Manifest) -> Iterator[str]:
     held = _rows(manifest.of("scenes")) + len(manifest.quarantined)
     if type(manifest.scenes) is not int or manifest.scenes != held:
         yield f"scenes: {held} in its files and quarantined, but {manifest.scenes!r} stated"
+
+
+def _wrong_hardware(manifest: Manifest) -> Iterator[str]:
+    if manifest.hardware_scenes is not None:
+        left_out = [entry.scene for entry in manifest.quarantined]
+        yield from wrong_scene_hardware(
+            manifest.hardware_scenes, manifest.hardware, manifest.scene_numbers, left_out
+        )
 
 
 def _rows(files: tuple[DataFile, ...]) -> int:

@@ -150,6 +150,9 @@ class Manifest:
     part: DatasetPart | None = None
     """Range of a part of a dataset, which `internav-gen merge` joins with the others; null for a
     dataset, whose scenes begin at 0."""
+    hardware_scenes: Mapping[str, str] | None = None
+    """Scenes by the name of the arithmetic that made them, as ranges of numbers (`0:6,8:9`);
+    quarantined ones are left out. Null where one made all, or where it is not known."""
     sha256: str = ""
     """SHA-256 of the canonical text of all other keys (docs/dataset.md), 64 hexadecimal digits;
     filled in when the manifest is written."""

@@ -18,7 +18,6 @@ from internav_data.core.storage import Store, StoreLike, disk_errors, exists, fi
 from internav_data.dataset.commit import (
     Wanted,
     difference_of,
-    hardware_of,
     identity_of,
     names_to_write_into,
     put_dataset,
@@ -277,9 +276,5 @@ def _add(
     """Commit the scenes of further parts and return the manifest."""
     manifests = [part.manifest for part in parts]
     source = SceneSource(journal.store, held, parts=[(part.store, part.manifest) for part in parts])
-    wanted = Wanted(
-        identity_of(manifests[0]),
-        parts[-1].numbers.stop,
-        hardware_of([*([held] if held else []), *manifests]),
-    )
+    wanted = Wanted(identity_of(manifests[0]), parts[-1].numbers.stop)
     return put_dataset(journal, source, assets, wanted, held, parts=manifests)

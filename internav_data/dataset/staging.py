@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 
 from internav_data.core.files import FileLimits, parse_json
+from internav_data.core.hardware import hardware
 from internav_data.core.processes import end_if_orphaned
 from internav_data.core.storage import Store, StoreLike, exists, final_of, store_of
 from internav_data.dataset.encode import to_table
@@ -109,6 +110,9 @@ class Staging:
     store: Store
     digest: str
     """Digest of the identity, 64 hexadecimal digits."""
+    outbox: dict[str, bytes] | None = None
+    """Staged files by name that are kept here instead of being put into the store, where a worker
+    on another machine makes scenes: its executor puts them."""
 
     def name(self, scene: int) -> str:
         """Return the name of a scene's file: a thousand scenes a folder."""
@@ -154,6 +158,8 @@ class SceneState:
     """Reason for which the scene was given up; empty when it is good."""
     died: bool = False
     """Whether it was given up because the processes that made it died."""
+    hardware: str = ""
+    """Name of the arithmetic of the process that staged it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,7 +228,10 @@ def stage_scene(
 
     """
     counts = dict(sorted((redraws or {}).items()))
-    state = SceneState(scene, house.scene_id, house.split, len(episodes), counts, attempts, "")
+    state = SceneState(
+        *(scene, house.scene_id, house.split, len(episodes), counts, attempts, ""),
+        hardware=hardware(),
+    )
     tables = to_table([house], SCENES), to_table(episodes, EPISODES)
     _write(staging, StagedScene(state, *tables))
 
@@ -250,7 +259,9 @@ def stage_quarantine(
 
     """
     scene_id = f"scene-{scene:06d}"
-    state = SceneState(scene, scene_id, split, 0, {}, attempts, reason or "unknown", died)
+    state = SceneState(
+        *(scene, scene_id, split, 0, {}, attempts, reason or "unknown", died), hardware()
+    )
     _write(staging, StagedScene(state, to_table([], SCENES), to_table([], EPISODES)))
 
 
@@ -316,10 +327,28 @@ def _write(staging: Staging, scene: StagedScene) -> None:
         stream = _stream(table)
         parts += [len(stream).to_bytes(8, "little"), stream]
     body = b"".join(parts)
+    put_staged(
+        staging,
+        staging.name(scene.state.scene),
+        _MAGIC + hashlib.sha256(body).digest() + body,
+    )
+
+
+def put_staged(staging: Staging, name: str, data: bytes) -> None:
+    """Put the file of a finished scene into the store, or into the outbox where there is one.
+
+    Raises
+    ------
+    InternavError
+        The folder was removed or is another run's.
+
+    """
+    if staging.outbox is not None:
+        staging.outbox[name] = data
+        return
     end_if_orphaned()
     staging.check()
-    name = staging.name(scene.state.scene)
-    staging.store.put(name, _MAGIC + hashlib.sha256(body).digest() + body, beside=IDENTITY)
+    staging.store.put(name, data, beside=IDENTITY)
 
 
 def _stream(table: pa.Table) -> bytes:

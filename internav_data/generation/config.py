@@ -37,7 +37,7 @@ EPISODE_PRESETS: Final = ("paper", "balanced", "dense", "long")
 from the defaults, of any section."""
 TEST_SHARE = 10
 """A test scene has one episode for every ten of other scenes, as in the paper (5 for 50)."""
-COMMAND_LINE_ONLY = ("scenes", "workers", "executor", "out")
+COMMAND_LINE_ONLY = ("scenes", "workers", "executor", "ray_address", "out")
 """Options of a run that are no part of a dataset's config."""
 _TEST_ADVICE = "ask for 1 or more episodes, or 0 for a tenth of episodes_per_scene"
 

@@ -83,6 +83,7 @@ _USES = {
     "meshes": "needed only for meshes of your own: ",
     "train": "needed only for environments, training and evaluation: ",
     "tensorboard": "needed only for TensorBoard's files: ",
+    "ray": "needed only for `internav-gen generate --executor ray`: ",
     "hub": "needed only for `internav-gen upload`: ",
 }
 """Uses of the extras that generating and validating do without."""

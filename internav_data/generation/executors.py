@@ -1,7 +1,7 @@
 """Executors: where and how the scenes of a run are made.
 
 `generate` hands an executor a recipe and the scenes to make. It learns which scene ended and how,
-and nothing of processes or machines: another executor may submit the same recipe to a cluster.
+and nothing of processes or machines: they may be this machine's or a cluster's.
 Results may come in any order; the dataset's bytes do not depend on it.
 """
 
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
 from internav_data.core.machine import available_cores
 from internav_data.core.worker_pool import WorkerPool
+from internav_data.generation.ray_executor import ray_executor
 from internav_data.records.errors import UsageError
 
 if TYPE_CHECKING:
@@ -19,12 +20,12 @@ if TYPE_CHECKING:
 
     from internav_data.core.messages import Done, Failed, Recipe
 
-DEFAULT_EXECUTOR: Final = "local"
+DEFAULT_EXECUTOR: Final = "processes"
 
 
 @runtime_checkable
 class Executor(Protocol):
-    """Runs the tasks of a recipe; see `LocalExecutor`."""
+    """Runs the tasks of a recipe; see `ProcessExecutor`."""
 
     @property
     def slots(self) -> int:
@@ -60,7 +61,7 @@ class Executor(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class LocalExecutor:
+class ProcessExecutor:
     """Worker processes on this machine."""
 
     workers: int = 0
@@ -79,21 +80,33 @@ class LocalExecutor:
             yield from pool.run(tasks, tick)
 
 
-EXECUTORS: Final[Mapping[str, Callable[[int], Executor]]] = {DEFAULT_EXECUTOR: LocalExecutor}
-"""Executors by name: each takes the number of workers, 0 for its default."""
+def _processes(workers: int, address: str | None) -> Executor:
+    if address is not None:
+        raise UsageError(f"--ray-address {address}: is for --executor ray: ask for it, too")
+    return ProcessExecutor(workers)
 
 
-def get_executor(name: str, workers: int = 0) -> Executor:
+EXECUTORS: Final[Mapping[str, Callable[[int, str | None], Executor]]] = {
+    DEFAULT_EXECUTOR: _processes,
+    "ray": ray_executor,
+}
+"""Executors by name: each takes the number of workers, 0 for its default, and the address of a
+cluster."""
+
+
+def get_executor(name: str, workers: int = 0, address: str | None = None) -> Executor:
     """Return an executor by its name in `EXECUTORS`.
 
     Raises
     ------
+    ModuleNotFoundError
+        Its package is not installed.
     UsageError
-        There is no such executor, or `workers` is negative.
+        There is no such executor, `workers` is negative, or nobody answers at the address.
 
     """
     if workers < 0:
         raise UsageError(f"workers is {workers}: ask for 1 or more, or 0 for one a core")
     if name not in EXECUTORS:
         raise UsageError(f"executor is '{name}': expected one of {', '.join(EXECUTORS)}")
-    return EXECUTORS[name](workers)
+    return EXECUTORS[name](workers, address)

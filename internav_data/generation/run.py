@@ -95,6 +95,7 @@ def generate(
     setup: Callable[[ScenePayload], Callable[[int], int]] = scene_maker,
     *,
     retry_quarantined: bool = False,
+    ray_address: str | None = None,
 ) -> Report:
     """Make a dataset of scenes 0 to scenes - 1 or a part of one, continue it, or extend it.
 
@@ -123,15 +124,19 @@ def generate(
         Recipe of the workers; tests pass stubs.
     retry_quarantined
         Whether to try all quarantined scenes again, those too that failed by themselves.
+    ray_address
+        Address of the cluster of the executor "ray": `host:port`, `auto`, or None for the one that
+        runs on this machine.
 
     Raises
     ------
     ModuleNotFoundError
-        A package of the extra `generate` is missing.
+        A package of the extra `generate` is missing, or Ray where it is the executor.
     MissingEngineError
         The config's physics engine is not installed.
     UsageError
-        A count or setting out of its bounds, or a folder that holds something else.
+        A count or setting out of its bounds, or a folder that holds something else; a Ray cluster
+        that does not answer, or a node of it with other versions than this machine.
     LockedError
         Another generator is at work in the folder.
     InterruptedRunError
@@ -147,8 +152,9 @@ def generate(
     require("numba", "platformdirs", "scipy")
     progress = progress or GenerationProgress()
     numbers = check_scenes(scenes)
-    chosen = get_executor(executor, workers) if isinstance(executor, str) else executor
     config.check()
+    if isinstance(executor, str):
+        executor = get_executor(executor, workers, ray_address)
     store = store_of(out)
     place = store.at("").rstrip("/")
     with disk_errors(place):
@@ -171,8 +177,8 @@ def generate(
             queue = _SceneQueue(config, numbers, tuple(k for k in numbers if k not in done))
             recipe = Recipe(setup, ScenePayload(config, assets, staging))
             with Interrupts() as stop:
-                _repair(chosen, recipe, progress, stop)
-                _make(chosen, recipe, queue, commits, progress, stop)
+                _repair(executor, recipe, progress, stop)
+                _make(executor, recipe, queue, commits, progress, stop)
                 if stop():
                     commits.commit_all()
                     raise InterruptedRunError(_interruption(place, progress), stop.signum)

@@ -18,6 +18,7 @@ from internav_data.dataset import (
     Identity,
     Staging,
     assemble,
+    commit_scenes,
     done_scenes,
     has_manifest,
     load_dataset,
@@ -304,12 +305,44 @@ def test_all_hardware_that_made_a_dataset_is_named(tmp_path, monkeypatch):
         build(tmp_path, range(low, high))
         return assemble(tmp_path, IDENTITY, ASSETS, high)
 
-    assert extended(0, 3).hardware == (hardware(),)
-    monkeypatch.setattr("internav_data.dataset.commit.hardware", lambda: "another")
+    first, ours = extended(0, 3), hardware()
+    assert (first.hardware, first.hardware_scenes) == ((ours,), None)
+    monkeypatch.setattr("internav_data.dataset.staging.hardware", lambda: "another")
     manifest = extended(3, 5)
-    assert set(manifest.hardware) == {hardware(), "another"}
-    write_manifest(tmp_path, replace(manifest, hardware=()))
-    assert extended(5, 6).hardware == (), "who made its first scenes is not known"
+    assert manifest.hardware == tuple(sorted((ours, "another")))
+    assert manifest.hardware_scenes == {ours: "0:3", "another": "3:5"}
+    monkeypatch.undo()
+    manifest = extended(5, 6)
+    assert manifest.hardware_scenes == {ours: "0:3,5:6", "another": "3:5"}
+    assert read_manifest(tmp_path) == manifest
+    for wrong, message in (
+        ({ours: "0:3,5:6", "another": "3:4"}, "scene 4 is named 0 times"),
+        ({ours: "0:3,5:6", "another": "2:5"}, "scene 2 is named 2 times"),
+        ({ours: "0:3,5:6", "another": "3:7"}, "expected scenes of"),
+        ({ours: "5:6,0:3", "another": "3:5"}, "expected ranges that ascend"),
+        ({ours: "0:3,5:6", "another": 3}, "expected ranges of scenes"),
+        ({ours: "0:6"}, "expected an object with the keys"),
+    ):
+        with pytest.raises(CorruptDataError, match=message):
+            write_manifest(tmp_path, replace(manifest, hardware_scenes=wrong))
+    write_manifest(tmp_path, replace(manifest, hardware=(), hardware_scenes=None))
+    assert extended(6, 7).hardware == (), "who made its first scenes is not known"
+
+
+def test_scenes_that_a_run_staged_on_another_machine_are_told_apart(tmp_path, monkeypatch):
+    """One began on another machine, where the last of its scenes failed; it goes on here."""
+    monkeypatch.setattr("internav_data.dataset.staging.hardware", lambda: "another")
+    staging = open_staging(tmp_path, IDENTITY)
+    build(tmp_path, range(2))
+    stage_quarantine(staging, 2, "no way", split="train", attempts=3, died=True)
+    commit_scenes(staging, IDENTITY, ASSETS, 3)
+    monkeypatch.undo()
+    build(tmp_path, range(3, 5))
+    manifest = assemble(tmp_path, IDENTITY, ASSETS, 5)
+    assert manifest.hardware_scenes == {"another": "0:2", hardware(): "3:5"}
+    build(tmp_path, range(2, 3))  # tried again
+    manifest = assemble(tmp_path, IDENTITY, ASSETS, 5)
+    assert manifest.hardware_scenes == {"another": "0:2", hardware(): "2:5"}
 
 
 @pytest.mark.usefixtures("few_scenes_a_shard")

@@ -66,6 +66,17 @@ def whole():
         return store.blobs
 
 
+def test_parts_of_two_kinds_of_processors_say_which_scenes_are_whose(monkeypatch):
+    monkeypatch.setattr("internav_data.dataset.staging.hardware", lambda: "one")
+    first = part_of(MemoryStore(), 0, 4)
+    monkeypatch.setattr("internav_data.dataset.staging.hardware", lambda: "two")
+    last = part_of(MemoryStore(), 4, 8)
+    out = MemoryStore()
+    held = merge([first, last], out)
+    assert held.hardware == ("one", "two")
+    assert held.hardware_scenes == {"one": "0:4", "two": "4:5,6:8"}, "5 is quarantined"
+
+
 @pytest.mark.parametrize("count", RANGES)
 def test_parts_merged_are_a_run_in_one_piece(parts, whole, count):
     before = [dict(part.blobs) for part in parts[count]]

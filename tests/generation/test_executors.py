@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 
 import pytest
 import worker_stubs
@@ -14,9 +15,10 @@ from internav_data.generation.config import load_config
 from internav_data.generation.executors import (
     EXECUTORS,
     Executor,
-    LocalExecutor,
+    ProcessExecutor,
     get_executor,
 )
+from internav_data.generation.ray_executor import RayExecutor
 from internav_data.generation.run import generate
 from internav_data.records.errors import InternavError, QuarantineError, UsageError
 
@@ -32,7 +34,7 @@ def made(out, executor, scenes=12, **orders):
 
 
 def test_another_executor_makes_the_same_bytes(tmp_path):
-    one, local = made(tmp_path / "a" / "d", "local", quarantine=[5])
+    one, local = made(tmp_path / "a" / "d", "processes", quarantine=[5])
     two, here = made(tmp_path / "b" / "d", InProcess(), quarantine=[5])
     assert here == local
     assert one.quarantined == two.quarantined == (("scene-000005", "nothing can be blocked"),)
@@ -51,21 +53,35 @@ def test_an_error_that_ends_the_run_is_the_callers(tmp_path):
 
 
 def test_executors_are_chosen_by_name():
-    for name, executor in EXECUTORS.items():
-        made = get_executor(name, 3)
-        assert isinstance(made, Executor)
-        assert isinstance(made, executor)
-        assert made.slots == 3
-        assert get_executor(name).slots == available_cores()
-    with pytest.raises(UsageError, match=r"executor is 'cluster': expected one of local"):
+    executor = get_executor("processes", 3)
+    assert isinstance(executor, Executor)
+    assert executor == ProcessExecutor(3)
+    assert executor.slots == 3
+    assert get_executor("processes").slots == available_cores()
+    assert isinstance(RayExecutor("auto", 2), Executor)
+    with pytest.raises(UsageError, match=r"executor is 'cluster': expected one of processes, ray"):
         get_executor("cluster")
     with pytest.raises(UsageError, match=r"workers is -1: ask for 1 or more"):
-        get_executor("local", -1)
+        get_executor("processes", -1)
+
+
+def test_a_cluster_is_refused_before_anything_is_written(tmp_path, monkeypatch):
+    with pytest.raises(UsageError, match="--ray-address a:1: is for --executor ray"):
+        generate(tmp_path / "d", CONFIG, 2, assets=CATALOGUE, setup=stub, ray_address="a:1")
+    monkeypatch.setattr("internav_data.generation.ray_executor.require", lambda _: None)
+    for wrong in ("ray://head:10001", "local", "head", "head:x"):
+        with pytest.raises(UsageError, match=r"expected host:port of a cluster's head, or auto"):
+            get_executor("ray", 1, wrong)
+    monkeypatch.undo()
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(ModuleNotFoundError, match=r"pip install 'internav-data\[ray\]'"):
+        generate(tmp_path / "d", CONFIG, 2, assets=CATALOGUE, executor="ray", setup=stub)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_local_workers_end_once_tick_says_so():
     seen = []
-    results = LocalExecutor(2).run(Recipe(worker_stubs.slow, 0.2), range(1000), lambda: not seen)
+    results = ProcessExecutor(2).run(Recipe(worker_stubs.slow, 0.2), range(1000), lambda: not seen)
     for result in results:
         assert isinstance(result, Done)
         seen.append(result.task)

@@ -94,7 +94,7 @@ def test_worker_processes_write_into_it_and_a_failure_loses_nothing(server, fold
     with pytest.raises(Exception, match="No space"):
         made(out, 12, setup=stopping)
     assert any(name.endswith(".work") for name in store_of(out).names())
-    made(out, 12, "local")
+    made(out, 12, "processes")
     made(out)
     assert content(out) == content(folder)
 

@@ -38,7 +38,7 @@ class Forwards(InProcess):
         return super().run(recipe, list(tasks)[::-1], tick)
 
 
-def made(out, scenes, executor="local", workers=0, config=CONFIG, **orders):
+def made(out, scenes, executor="processes", workers=0, config=CONFIG, **orders):
     out.parent.mkdir(parents=True, exist_ok=True)
     (out.parent / "stub.json").write_text(json.dumps({**ORDERS, **orders}))
     executor = {"here": InProcess(), "forwards": Forwards()}.get(executor, executor)
@@ -64,7 +64,7 @@ def whole(tmp_path_factory):
 def test_ranges_merged_are_a_run_in_one_piece(tmp_path, whole, ends):
     parts, first = [], 0
     for number, end in enumerate(ends):
-        where = ("local", 1 + end % 2) if end - first < 10 else ("here", 0)
+        where = ("processes", 1 + end % 2) if end - first < 10 else ("here", 0)
         parts.append(made(tmp_path / f"part-{number}", range(first, end), *where))
         assert validate(parts[-1], level="files").ok
         assert sum(1 for _ in load_dataset(parts[-1])) == len(load_dataset(parts[-1]))

@@ -80,7 +80,7 @@ def test_workers_and_an_extension_make_the_same_bytes(crossed, tmp_path):
         generate(tmp_path / "d", config_of(engine, cross_check=False), SCENES)
     other = config_of(second_engine(engine))
     # Processes of their own for one of the engines: they take seconds to begin.
-    executor = "local" if engine == "mujoco" else InProcess()
+    executor = "processes" if engine == "mujoco" else InProcess()
     generate(tmp_path / "d", with_held_engine(other, tmp_path / "d"), SCENES, 2, executor=executor)
     assert files_of(tmp_path / "d") == files_of(crossed)
 
