@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 SCENES = 3
 AXES = {
-    "executor": ("local", "ranges", *(("ray",) if importlib.util.find_spec("ray") else ())),
+    "executor": ("processes", "ranges", *(("ray",) if importlib.util.find_spec("ray") else ())),
     "workers": ("1", "2", "3"),
     "hash": ("0", "1", "random"),
     "zone": ("UTC", "Asia/Kolkata", "Pacific/Apia"),
@@ -91,7 +91,7 @@ def digest_of(case: dict[str, str], folder: Path) -> str:
     env = _environment(case, folder)
     out = folder / "d"
     common = ["--workers", case["workers"], "--physics", case["physics"]]
-    common += ["--executor", case["executor"] if case["executor"] == "ray" else "local"]
+    common += ["--executor", case["executor"] if case["executor"] == "ray" else "processes"]
     common += ["--episodes-per-scene", "1", "--rooms", "1-2"]
     if case["cache"] == "warm":
         _command(env, "generate", "--out", str(folder / "first"), "--scenes", str(SCENES), *common)

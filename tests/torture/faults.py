@@ -24,7 +24,7 @@ from stub_runs import InOrder, check_readable, contents, difference, forked, mad
 from system_calls import strace, system_calls
 
 from internav_data.core.storage import write_atomically
-from internav_data.generation.executors import LocalExecutor
+from internav_data.generation.executors import ProcessExecutor
 from internav_data.records.errors import CorruptDataError
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ SCENARIOS = {
     "merge": Scenario(_parts, _merged),
     "worker": Scenario(
         lambda _: None,
-        lambda f: made(f / "d", SCENES, executor=LocalExecutor(1), setup=watching),
+        lambda f: made(f / "d", SCENES, executor=ProcessExecutor(1), setup=watching),
         in_worker=True,
     ),
 }

@@ -21,7 +21,7 @@ from strategies import rng
 from stub_runs import CONFIG, OTHER, check_readable, contents, difference, made, plain
 
 from internav_data.core.storage import LockedError
-from internav_data.generation.executors import LocalExecutor
+from internav_data.generation.executors import ProcessExecutor
 from internav_data.records.errors import InternavError, UsageError
 
 SCENES, WORKERS = 6, 2
@@ -44,7 +44,7 @@ def noted(payload):
 
 
 def _run(out):
-    made(out, SCENES, executor=LocalExecutor(WORKERS), setup=noted)
+    made(out, SCENES, executor=ProcessExecutor(WORKERS), setup=noted)
 
 
 def _started(out: Path, *, fsync: int | None = None) -> int:
@@ -172,7 +172,7 @@ def _fsyncs() -> int:
             with contextlib.suppress(InternavError):
                 points = FaultPoints(Path(folder), None, only="fsync")
                 points.install()
-                made(Path(folder) / "d", SCENES, executor=LocalExecutor(WORKERS), setup=noted)
+                made(Path(folder) / "d", SCENES, executor=ProcessExecutor(WORKERS), setup=noted)
                 Path(folder, "count").write_text(str(len(points.log)))
             os._exit(0)
         os.waitpid(child, 0)
