@@ -53,7 +53,9 @@ COMMANDS = {
 
 
 def without(tmp_path, module, code, *arguments):
-    """Run code in a process that lacks a module."""
+    """Run code in a process that lacks a module, and that has the others of its extra."""
+    for other in (name for name, extra in EXTRAS.items() if extra == EXTRAS.get(module)):
+        pytest.importorskip(other)
     (tmp_path / "sitecustomize.py").write_text(f"BLOCKED = {{{module!r}}}{BLOCK}")
     path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
     return subprocess.run(

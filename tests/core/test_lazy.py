@@ -48,7 +48,8 @@ except AttributeError as error:
 @pytest.mark.parametrize("package", PACKAGES)
 def test_every_public_name_is_there(package):
     pytest.importorskip("click", reason="the extra 'generate' is not installed")
-    pytest.importorskip("gymnasium", reason="the extra 'train' is not installed")
+    for needed in ("gymnasium", "torch", "safetensors"):
+        pytest.importorskip(needed, reason="the extra 'train' is not installed")
     module = import_module(f"internav_data{package}")
     names = set(getattr(module, "__all__", ()))
     assert names <= set(dir(module))

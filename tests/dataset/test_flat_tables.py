@@ -80,6 +80,7 @@ def test_pandas_has_flat_frames(data):
 
 
 def test_another_word_is_refused_with_those_that_are_known(data):
+    pytest.importorskip("pandas")
     for read in (data.to_table, data.to_pandas):
         with pytest.raises(UsageError, match=r"one of \['obstacles', 'outcomes'\], got 'mode'"):
             read("mode")
