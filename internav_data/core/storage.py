@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from typing import BinaryIO
 
 _BLOCK = 1 << 20
+_PIECE = 4 << 20
+"""Bytes of a blob that are read at once: a request each, where it is in a bucket."""
 _ENDING_S = 1.0
 """Seconds that the children of a killed process, which hold its lock too, may take to end."""
 _POLL_S = 0.02
@@ -486,6 +488,14 @@ def sync(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def content_sha256(store: Store, name: str, size: int) -> str:
+    """Return the sha256 of a blob of `size` bytes, read a few megabytes at a time."""
+    digest = hashlib.sha256()
+    for start in range(0, size, _PIECE):
+        digest.update(store.read(name, start, min(start + _PIECE, size)))
+    return digest.hexdigest()
 
 
 def file_sha256(path: Path) -> str:

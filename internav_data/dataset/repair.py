@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
-from internav_data.core.storage import exists
+from internav_data.core.storage import content_sha256, exists
 from internav_data.dataset import shards
 from internav_data.dataset.journal import Journal
 from internav_data.dataset.manifest import MANIFEST, has_manifest, read_manifest, write_manifest
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from internav_data.dataset.manifest import DataFile, Manifest, MetadataFile
     from internav_data.dataset.staging import Staging
     from internav_data.records import Asset
-
-_BLOCK = 4 << 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,10 +90,7 @@ def find_damage(store: Store) -> Damage | None:
 def _is_intact(store: Store, file: DataFile | MetadataFile) -> bool:
     if not exists(store, file.path) or store.size(file.path) != file.bytes:
         return False
-    digest = hashlib.sha256()
-    for start in range(0, file.bytes, _BLOCK):
-        digest.update(store.read(file.path, start, start + _BLOCK))
-    return digest.hexdigest() == file.sha256
+    return content_sha256(store, file.path, file.bytes) == file.sha256
 
 
 def repair_files(staging: Staging, damage: Damage, assets: Sequence[Asset]) -> None:

@@ -70,6 +70,14 @@ def _connected(address: str) -> int | Fatal:
     before = signal.getsignal(signal.SIGTERM)
     try:
         ray.init(address, log_to_driver=False, configure_logging=False, logging_level="ERROR")
+    except ConnectionError as error:
+        if address != "auto":
+            return Fatal("UsageError", f"the Ray cluster at {address}: {_last_line(error)}")
+        return Fatal(
+            "UsageError",
+            "no Ray cluster runs on this machine: start one with `ray start --head`, or name one "
+            "of which it is a node by --ray-address HOST:PORT",
+        )
     except Exception as error:  # noqa: BLE001 - Ray has no base class for what it raises here
         return Fatal("UsageError", f"the Ray cluster at {address}: {_last_line(error)}")
     finally:

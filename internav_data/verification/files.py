@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from internav_data.core.storage import FolderStore, file_sha256, store_of
+from internav_data.core.storage import (
+    FolderStore,
+    Store,
+    StoreError,
+    StoreLike,
+    content_sha256,
+    store_of,
+)
 from internav_data.dataset import logical_digest, read_manifest
 from internav_data.dataset.journal import journal_names
 from internav_data.dataset.manifest import MANIFEST
@@ -23,7 +30,7 @@ if TYPE_CHECKING:
 CHANGING = "file that a generator is putting or replacing, or was when it was cut off: not checked"
 
 
-def check_manifest(root: Path, report: FindingCollector) -> Manifest | None:
+def check_manifest(root: StoreLike, report: FindingCollector) -> Manifest | None:
     """Check and return the manifest; None if it cannot be read.
 
     Raises
@@ -34,17 +41,13 @@ def check_manifest(root: Path, report: FindingCollector) -> Manifest | None:
         The folder holds no finished dataset.
 
     """
-    if not isinstance(store_of(root), FolderStore):
-        raise UsageError(
-            f"{store_of(root).at('')}: validate reads a folder: copy the dataset into one "
-            "(`aws s3 sync`) and validate that"
-        )
-    if not root.is_dir():
-        raise UsageError(f"{root}: no such folder: give the folder that `generate` wrote")
+    store = store_of(root)
+    if isinstance(store, FolderStore) and not store.root.is_dir():
+        raise UsageError(f"{store.root}: no such folder: give the folder that `generate` wrote")
     try:
-        manifest = read_manifest(root)
+        manifest = read_manifest(store)
     except CorruptDataError as error:
-        if not (root / MANIFEST).is_file():
+        if _size(store, MANIFEST) is None:
             raise
         report.file = MANIFEST
         report.expect(False, "files.manifest", "a manifest that is whole", error)  # noqa: FBT003
@@ -53,13 +56,14 @@ def check_manifest(root: Path, report: FindingCollector) -> Manifest | None:
     return manifest
 
 
-def check_listing(root: Path, manifest: Manifest, report: FindingCollector) -> None:
+def check_listing(root: StoreLike, manifest: Manifest, report: FindingCollector) -> None:
     """Check that `data/` holds only files of the manifest, and the files beside the data.
 
     Files that a commit puts or replaces, under way or cut off, are left out and noted.
     """
-    listed, changing = manifest.paths(), _changing(root)
-    for name in sorted(_names_below(root, "data", listed)):
+    store = store_of(root)
+    listed, changing = manifest.paths(), _changing(store)
+    for name in sorted(_data_names(store, listed)):
         if name in changing - listed:
             report.notes[CHANGING] += 1
             continue
@@ -77,14 +81,21 @@ def check_listing(root: Path, manifest: Manifest, report: FindingCollector) -> N
         else:
             report.file = file.path
             report.counts["files"] += 1
-            _check_bytes(root, file, report)
+            _check_bytes(store, file, report)
 
 
-def _changing(root: Path) -> frozenset[str]:
+def _changing(store: Store) -> frozenset[str]:
     try:
-        return frozenset(journal_names(FolderStore(root)))
+        return frozenset(journal_names(store))
     except (CorruptDataError, OSError):
         return frozenset()  # the generator that left it says so
+
+
+def _data_names(store: Store, listed: frozenset[str]) -> Iterator[str]:
+    if isinstance(store, FolderStore):
+        yield from _names_below(store.root, "data", listed)
+    else:  # it has no links
+        yield from store.names("data/")
 
 
 def _names_below(root: Path, folder: str, listed: frozenset[str]) -> Iterator[str]:
@@ -103,17 +114,19 @@ def _names_below(root: Path, folder: str, listed: frozenset[str]) -> Iterator[st
                 yield name
 
 
-def check_file(root: Path, file: DataFile) -> FindingCollector:
+def check_file(root: StoreLike, file: DataFile) -> FindingCollector:
     """Check one Parquet file: bytes, hashes, rows, checksums."""
     report = FindingCollector(file.path)
     report.counts["files"] += 1
-    path = root / file.path
-    if not _check_bytes(root, file, report):
+    store = store_of(root)
+    if not _check_bytes(store, file, report):
         return report
     spec = SPECS[file.table]
     try:
-        with open_parquet(path, spec) as opened:
+        with open_parquet(store.at(file.path), spec, store.source(file.path)) as opened:
             table = opened.read_as_written()
+    except StoreError:
+        raise  # of a bucket that cannot be reached nothing is known
     except InternavError as error:
         report.expect(False, "files.readable", "a whole Parquet file of its table", error)  # noqa: FBT003
         return report
@@ -126,13 +139,20 @@ def check_file(root: Path, file: DataFile) -> FindingCollector:
     return report
 
 
-def _check_bytes(root: Path, file: DataFile | MetadataFile, report: FindingCollector) -> bool:
+def _check_bytes(store: Store, file: DataFile | MetadataFile, report: FindingCollector) -> bool:
     """Check that a file is there, with its size and sha256; return whether it can be read."""
-    path = root / file.path
-    if not report.expect(path.is_file(), "files.present", "a file", "none"):
+    size = _size(store, file.path)
+    if not report.expect(size is not None, "files.present", "a file", "none"):
         return False
-    size = path.stat().st_size
     report.expect(size == file.bytes, "files.bytes", file.bytes, size)
-    digest = file_sha256(path)
+    digest = content_sha256(store, file.path, size or 0)
     report.expect(digest == file.sha256, "files.sha256", file.sha256, digest)
     return True
+
+
+def _size(store: Store, name: str) -> int | None:
+    """Return the number of bytes of a file; None where there is none."""
+    try:
+        return store.size(name)
+    except OSError:  # a folder or a pipe, too
+        return None

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from internav_data.core.hardware import hardware
 from internav_data.core.messages import Failed, Recipe
+from internav_data.core.storage import store_of
 from internav_data.core.worker_pool import WorkerPool
-from internav_data.dataset import ASSETS, EPISODES, SCENES, from_table, read_table
-from internav_data.dataset.manifest import MANIFEST
+from internav_data.dataset import ASSETS, EPISODES, SCENES, from_table
+from internav_data.dataset.manifest import MANIFEST, MANIFEST_LIMITS
 from internav_data.dataset.parquet import open_parquet
 from internav_data.records import LoaderStream, Purpose, generator
 from internav_data.records.errors import InternavError, UsageError
@@ -27,9 +29,11 @@ from internav_data.verification.tables import check_tables, number_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
-    from pathlib import Path
 
+    from internav_data.core.storage import Store, StoreLike
     from internav_data.dataset import DataFile, Manifest
+    from internav_data.dataset.parquet import TableFile
+    from internav_data.dataset.tables import TableSpec
     from internav_data.records import Episode, House
 
     Progress = Callable[[str, int, int], None]
@@ -62,7 +66,7 @@ WITHOUT_SOLID = {"schema.assets.parts", "schema.assets.corners"}
 class Unit:
     """Scenes that one worker checks."""
 
-    root: Path
+    store: Store
     assets: DataFile
     shard_refs: tuple[ShardRef, ...]
     catalogue_version: int
@@ -71,7 +75,7 @@ class Unit:
 
 
 def validate(
-    path: Path,
+    path: StoreLike,
     level: Level = "geometry",
     sample: int | None = None,
     workers: int = 1,
@@ -83,7 +87,8 @@ def validate(
     Parameters
     ----------
     path
-        Folder of a finished dataset.
+        Folder of a finished dataset, or `s3://bucket/prefix`, which is read as it is, without a
+        copy.
     level
         `files`: hashes, checksums, nothing unlisted. `schema`: columns, ranges, ids.
         `geometry`: every predicate of every house and episode, derived again by shapely, scipy
@@ -121,37 +126,38 @@ def validate(
 
     """
     _check_arguments(level, sample, workers)
+    store = store_of(path)
     if engine is not None:
         _check_engine(engine, level)
     for _ in range(MAX_STARTS):
-        before = _version(path)
+        before = _version(store)
         try:
             findings = _validate_once(
-                *(path, level, sample, workers, progress or (lambda *_: None), engine)
+                *(store, level, sample, workers, progress or (lambda *_: None), engine)
             )
         except (InternavError, OSError):
-            if before == _version(path):
+            if before == _version(store):
                 raise
             continue
-        if findings.ok or before == _version(path):
+        if findings.ok or before == _version(store):
             return findings
     raise InternavError(
-        f"{path}: a generator extended the dataset {MAX_STARTS} times while it was being "
+        f"{store.at('')}: a generator extended the dataset {MAX_STARTS} times while it was being "
         "validated: validate it once the generator has ended"
     )
 
 
-def _version(path: Path) -> tuple[int, int, int] | None:
-    """Return values that differ once another manifest has been put in place."""
+def _version(store: Store) -> str:
+    """Return a text that differs once another manifest has been put in place."""
     try:
-        stat = (path / MANIFEST).stat()
+        content = store.read(MANIFEST, stop=MANIFEST_LIMITS.max_bytes + 1)
     except OSError:
-        return None
-    return stat.st_ino, stat.st_mtime_ns, stat.st_size
+        return ""
+    return hashlib.sha256(content).hexdigest()
 
 
 def _validate_once(
-    path: Path,
+    store: Store,
     level: Level,
     sample: int | None,
     workers: int,
@@ -159,13 +165,13 @@ def _validate_once(
     engine: str | None,
 ) -> Findings:
     whole = FindingCollector()
-    manifest = check_manifest(path, whole)
+    manifest = check_manifest(store, whole)
     if manifest is None:
         return whole.findings(level)
-    check_listing(path, manifest, whole)
+    check_listing(store, manifest, whole)
     damaged: frozenset[str] = frozenset()
     for done, file in enumerate(manifest.files, start=1):
-        report = check_file(path, file)
+        report = check_file(store, file)
         if report.by_predicate:
             damaged |= {file.path}
         whole.absorb(report)
@@ -173,7 +179,7 @@ def _validate_once(
     tables = FindingCollector()
     if level != "files":
         progress_callback("schema", 0, 1)
-        tables, unsafe = check_tables(path, manifest, damaged)
+        tables, unsafe = check_tables(store, manifest, damaged)
         whole.absorb(tables)
         progress_callback("schema", 1, 1)
         damaged |= unsafe
@@ -185,11 +191,11 @@ def _validate_once(
             # The engine must not receive values that may not be numbers at all.
             physics = None
             whole.notes[UNTRUE] += sum(counts.episodes for counts in manifest.counts.values())
-        _check_scenes(path, manifest, damaged, whole, sample, workers, progress_callback, physics)
+        _check_scenes(store, manifest, damaged, whole, sample, workers, progress_callback, physics)
         if physics is not None and not physics.same_hardware:
             whole.judge_differences("; ".join(manifest.hardware) or "hardware that is not stated")
     found = whole.findings(level)
-    _account_for(manifest, found, sample, path)
+    _account_for(manifest, found, sample, store.at(""))
     return found
 
 
@@ -200,7 +206,7 @@ def _physics_of(manifest: Manifest, engine: str | None) -> CheckedConfig:
     return replace(config, same_hardware=here or other is not None, other_engine=other)
 
 
-def _account_for(manifest: Manifest, found: Findings, sample: int | None, path: Path) -> None:
+def _account_for(manifest: Manifest, found: Findings, sample: int | None, place: str) -> None:
     """Compare what was checked with what there is: nothing is called valid that nobody looked at.
 
     Raises
@@ -223,7 +229,7 @@ def _account_for(manifest: Manifest, found: Findings, sample: int | None, path: 
         checked = found.checked.get(name, 0)
         if found.ok and checked < count:
             raise InternavError(
-                f"{path}: {checked} of {count} {name} were checked and nothing says why; run the "
+                f"{place}: {checked} of {count} {name} were checked and nothing says why; run the "
                 "same command again, and report this if it comes back"
             )
 
@@ -246,7 +252,7 @@ def _check_engine(engine: str, level: str) -> None:
 
 
 def _check_scenes(
-    root: Path,
+    store: Store,
     manifest: Manifest,
     damaged: frozenset[str],
     whole: FindingCollector,
@@ -256,7 +262,7 @@ def _check_scenes(
     physics: CheckedConfig | None,
 ) -> None:
     assets = [file for file in manifest.of("assets") if file.path not in damaged]
-    shard_refs = _shard_refs(root, manifest, damaged)
+    shard_refs = _shard_refs(store, manifest, damaged)
     if not assets or not shard_refs:
         return
     if sample is not None and sample < len(shard_refs):
@@ -265,7 +271,7 @@ def _check_scenes(
         shard_refs = [shard_refs[k] for k in chosen]
     units = [
         Unit(
-            root,
+            store,
             assets[0],
             tuple(shard_refs[k : k + SCENES_A_UNIT]),
             manifest.catalogue_version,
@@ -310,17 +316,17 @@ def _unit_checker(units: Sequence[Unit]) -> Callable[[int], FindingCollector]:
 
 def _unchecked(unit: Unit, reason: str) -> str:
     first, last = unit.shard_refs[0].scene_id, unit.shard_refs[-1].scene_id
-    return f"{unit.root}: {first} … {last} could not be checked: {reason}"
+    return f"{unit.store.at('')}: {first} … {last} could not be checked: {reason}"
 
 
-def _shard_refs(root: Path, manifest: Manifest, damaged: frozenset[str]) -> list[ShardRef]:
+def _shard_refs(store: Store, manifest: Manifest, damaged: frozenset[str]) -> list[ShardRef]:
     """Find every scene's rows, in order of scenes."""
     found: dict[str, dict[str, tuple[str, int]]] = {"scenes": {}, "episodes": {}}
     for name, spec in (("scenes", SCENES), ("episodes", EPISODES)):
         for file in manifest.of(name):
             if file.path in damaged:
                 continue
-            with open_parquet(root / file.path, spec) as parquet:
+            with _opened(store, file.path, spec) as parquet:
                 for group in range(parquet.metadata.num_row_groups):
                     column = parquet.read_group(group, ["scene_id"])
                     for scene_id in column.column(0).unique().to_pylist():
@@ -331,18 +337,22 @@ def _shard_refs(root: Path, manifest: Manifest, damaged: frozenset[str]) -> list
     ]
 
 
+def _opened(store: Store, name: str, spec: TableSpec[Any]) -> TableFile:
+    return open_parquet(store.at(name), spec, store.source(name))
+
+
 class _Reader:
     """Reader of row groups as records; it caches the last one of each table."""
 
-    def __init__(self, root: Path) -> None:
-        self._root = root
+    def __init__(self, store: Store) -> None:
+        self._store = store
         self._last: dict[str, tuple[tuple[str, int], list[Any]]] = {}
 
     def _group(self, name: str, row_group: tuple[str, int]) -> list[Any]:
         if name not in self._last or self._last[name][0] != row_group:
             file, group = row_group
             spec = SCENES if name == "scenes" else EPISODES
-            with open_parquet(self._root / file, spec) as parquet:
+            with _opened(self._store, file, spec) as parquet:
                 table = parquet.read_group(group)
             extra: dict[str, Any] | None = {"assets": {}} if name == "scenes" else None
             self._last[name] = (row_group, from_table(table, spec, extra))
@@ -365,7 +375,7 @@ _SHAPES: dict[str, Shapes] = {}
 
 def check_unit(unit: Unit) -> FindingCollector:
     """Check the geometry of a unit's scenes, and the physics if the unit asks for it."""
-    reader, reports = _Reader(unit.root), []
+    reader, reports = _Reader(unit.store), []
     for shard_ref in unit.shard_refs:
         file = shard_ref.episodes[0] if shard_ref.episodes else shard_ref.house[0]
         report = FindingCollector(file, shard_ref.scene_id)
@@ -384,6 +394,7 @@ def _shapes(unit: Unit) -> Shapes:
     key = unit.assets.sha256
     if key not in _SHAPES:
         _SHAPES.clear()
-        table = read_table(unit.root / unit.assets.path, ASSETS)
+        with _opened(unit.store, unit.assets.path, ASSETS) as parquet:
+            table = parquet.read_all()
         _SHAPES[key] = Shapes({a.asset_id: a for a in from_table(table, ASSETS)})
     return _SHAPES[key]

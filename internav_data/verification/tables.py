@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from internav_data.dataset import ASSETS, EPISODES, SCENES, from_table, read_table
+from internav_data.core.storage import StoreError
+from internav_data.dataset import ASSETS, EPISODES, SCENES, from_table
+from internav_data.dataset.parquet import open_parquet
 from internav_data.dataset.tables import SPECS
 from internav_data.records import OUTSIDE
 from internav_data.records.errors import InternavError
@@ -24,10 +26,10 @@ from internav_data.verification.surfaces import SINCE, check_flat
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from pathlib import Path
 
     import pyarrow as pa
 
+    from internav_data.core.storage import Store
     from internav_data.dataset import DataFile, Manifest
     from internav_data.records import House
     from internav_data.verification.house_config import RoomPlan
@@ -72,7 +74,7 @@ def number_of(scene_id: str) -> int:
 
 
 def check_tables(
-    root: Path, manifest: Manifest, damaged: frozenset[str]
+    store: Store, manifest: Manifest, damaged: frozenset[str]
 ) -> tuple[FindingCollector, frozenset[str]]:
     """Check all tables of a dataset but for damaged files.
 
@@ -85,7 +87,7 @@ def check_tables(
     for name in ("assets", "scenes", "episodes"):
         for file in manifest.of(name):
             if file.path not in damaged:
-                whole.absorb(_check_table(root, manifest, file, keys, unsafe))
+                whole.absorb(_check_table(store, manifest, file, keys, unsafe))
     if keys.attributes is not None:
         keys.attributes.shares(whole)
     if not damaged:
@@ -94,13 +96,16 @@ def check_tables(
 
 
 def _check_table(
-    root: Path, manifest: Manifest, file: DataFile, keys: DatasetKeys, unsafe: set[str]
+    store: Store, manifest: Manifest, file: DataFile, keys: DatasetKeys, unsafe: set[str]
 ) -> FindingCollector:
     report = FindingCollector(file.path)
     unsafe.add(file.path)  # until its values are known
     spec = SPECS[file.table]
     try:
-        table = read_table(root / file.path, spec)
+        with open_parquet(store.at(file.path), spec, store.source(file.path)) as opened:
+            table = opened.read_all()
+    except StoreError:
+        raise  # of a bucket that cannot be reached nothing is known
     except InternavError as error:
         report.expect(False, "schema.columns", f"the columns of {file.table}", error)  # noqa: FBT003
         return report

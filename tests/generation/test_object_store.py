@@ -26,9 +26,11 @@ from internav_data.dataset import load_dataset, read_manifest, shards
 from internav_data.generation.config import load_config
 from internav_data.generation.run import generate
 from internav_data.records.errors import CorruptDataError, InternavError, UsageError
+from internav_data.verification import validate
 
 CONFIG = load_config(overrides=["episodes_per_scene=3"])
-SCENES = 26
+SCENES = 18
+FEW = 6
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +60,11 @@ def server():
 @pytest.fixture(scope="module")
 def folder(server, tmp_path_factory):
     return made(tmp_path_factory.mktemp("folder") / "d")
+
+
+@pytest.fixture(scope="module")
+def few(server, tmp_path_factory):
+    return content(made(tmp_path_factory.mktemp("few") / "d", FEW))
 
 
 @pytest.fixture(scope="module")
@@ -92,9 +99,9 @@ def test_a_dataset_in_a_bucket_is_that_in_a_folder(folder, bucket):
 def test_worker_processes_write_into_it_and_a_failure_loses_nothing(server, folder):
     out = "s3://bucket/resumed/here"
     with pytest.raises(Exception, match="No space"):
-        made(out, 12, setup=stopping)
+        made(out, FEW, setup=stopping)
     assert any(name.endswith(".work") for name in store_of(out).names())
-    made(out, 12, "processes")
+    made(out, FEW, "processes")
     made(out)
     assert content(out) == content(folder)
 
@@ -125,9 +132,15 @@ def test_commands_read_a_bucket(bucket, folder):
         CliRunner().invoke(cli, ["stats", str(folder), "--json"]).stdout
     )
     assert f"dataset: {bucket}" in found.stderr
-    refused = CliRunner().invoke(cli, ["validate", bucket])
+    refused = CliRunner().invoke(cli, ["upload", bucket, "--to", "me/it"])
     assert isinstance(refused.exception, UsageError)
-    assert "validate reads a folder: copy the dataset" in str(refused.exception)
+    assert "upload sends a folder: copy the dataset into one" in str(refused.exception)
+
+
+def test_a_bucket_is_validated_as_a_folder_is(bucket, folder):
+    validated = validate(bucket, "geometry", workers=2).to_json()
+    assert validated == validate(folder, "geometry").to_json()
+    assert json.loads(validated)["checked"]["scenes"] == SCENES
 
 
 def test_what_is_read_is_verified(bucket):
@@ -140,6 +153,10 @@ def test_what_is_read_is_verified(bucket):
         damaged.put(file.path, bytes(data))
     with pytest.raises(CorruptDataError, match="damaged"):
         list(load_dataset(damaged))
+    damaged.put("data/stranger.parquet", b"?")
+    found = {finding.predicate for finding in validate(damaged, "files").found}
+    assert found >= {"files.sha256", "files.unlisted"}
+    damaged.remove("data/stranger.parquet")
     made(damaged)
     assert content(damaged) == content(bucket), "mended"
 
@@ -250,19 +267,18 @@ def proxy(server, monkeypatch):
         ("GET", (503, "SlowDown"), "requests are throttled"),
     ],
 )
-def test_faults_are_one_line_and_the_same_call_goes_on(proxy, folder, method, fault, message):
+def test_faults_are_one_line_and_the_same_call_goes_on(proxy, few, method, fault, message):
     out = f"s3://bucket/faults/{method}-{fault[0]}"
     proxy.fault = lambda command, path: (
         fault if command == method and (method != "PUT" or "scene-000004" in path) else None
     )
     with pytest.raises(InternavError, match=message) as caught:
-        made(out, 12)
+        made(out, FEW)
     assert "\n" not in str(caught.value)
     assert str(caught.value).startswith("s3://bucket/faults/")
     proxy.fault = lambda *_: None
-    made(out, 12)
-    made(out)
-    assert content(out) == content(folder)
+    made(out, FEW)
+    assert content(out) == few
 
 
 def test_a_lost_connection_while_reading_is_not_damage(proxy, bucket):
@@ -270,6 +286,8 @@ def test_a_lost_connection_while_reading_is_not_damage(proxy, bucket):
     proxy.fault = lambda command, _: "cut" if command == "GET" else None
     with pytest.raises(StoreError, match="connection was lost"):
         dataset[0]
+    with pytest.raises(StoreError, match="connection was lost"):
+        validate(bucket, "files")
     proxy.fault = lambda *_: None
     assert dataset[0] == load_dataset(bucket, "train")[0]
 

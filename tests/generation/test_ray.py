@@ -180,6 +180,16 @@ def test_a_node_that_comes_later_with_another_version_makes_no_scene(messages, m
     assert "internav-data is 0.1.0 there and 9.9 here" in found.reason
 
 
+def test_where_no_cluster_runs_the_line_says_how_to_start_one(monkeypatch):
+    def nobody(*_, **__):
+        raise ConnectionError("Could not find any running Ray instance.")
+
+    monkeypatch.setattr(ray, "init", nobody)
+    found = ray_driver._connected("auto")  # noqa: SLF001
+    assert found.reason.startswith("no Ray cluster runs on this machine: start one with `ray start")
+    assert ray_driver._connected("a:1").reason.startswith("the Ray cluster at a:1: Could not")  # noqa: SLF001
+
+
 def test_the_example_of_a_cluster_file_is_one():
     yaml = pytest.importorskip("yaml")
     jsonschema = pytest.importorskip("jsonschema")
