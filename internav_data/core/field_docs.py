@@ -41,7 +41,8 @@ def _definition(cls: type[Any]) -> ast.ClassDef | None:
         return None
     # `ast.parse` drops docstrings under `python -OO` since Python 3.14.
     tree = compile(source, cls.__name__, "exec", ast.PyCF_ONLY_AST, optimize=0)
-    return tree.body[0] if isinstance(tree.body[0], ast.ClassDef) else None
+    first = tree.body[0] if isinstance(tree, ast.Module) else None
+    return first if isinstance(first, ast.ClassDef) else None
 
 
 def _notes(body: list[ast.stmt]) -> dict[str, str]:
