@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 _TESTS = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(_TESTS), *(str(_TESTS / room) for room in ("generation", "dataset"))]
+import engines  # noqa: E402, F401 - chooses the default one, as the tests do
 
 RESULTS = Path(__file__).parent / "results"
 """Folder of the results, a file a row."""

@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING
 from campaign import Row
 from stub_runs import contents
 
+from internav_data.physics.engines.installed import available_engines
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -33,7 +35,7 @@ AXES = {
     "threads": ("1", "2", "5"),
     "clock": ("now", "1970", "2040"),
     "cache": ("none", "cold", "warm"),
-    "physics": ("bullet", "mujoco"),
+    "physics": available_engines(),
 }
 """Values of each axis; one digest a physics engine."""
 _CLOCK = """

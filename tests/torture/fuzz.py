@@ -37,7 +37,7 @@ SECONDS, SEEDS = 20.0, 30
 MAX_MB, MAX_S, HANGS_S = 300, 5.0, 100
 
 
-def _beside(place: Path, name: str) -> Path:
+def beside(place: Path, name: str) -> Path:
     """Return where a reader's file goes, with what stands beside it."""
     beside = {"manifest.json": DATASET, "checkpoint.json": AGENT}
     path = place / name
@@ -134,7 +134,7 @@ def changed(valid: bytes, random) -> bytes:
 def hammer(name: str, seed: int, seconds: float, folder: Path) -> int:
     """Have a reader read changed bytes for some processor time; return how many times it did."""
     relative, valid, read = READERS[name]()
-    path = _beside(folder, relative)
+    path = beside(folder, relative)
     path.write_bytes(valid)
     with contextlib.suppress(InternavError):  # imports, caches
         read(path)
