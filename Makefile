@@ -74,27 +74,28 @@ mini: $(STAMP) ## make the small dataset that ships with the package again
 	$(BIN)/internav-gen generate --out $(MINI) --scenes 40 --episodes-per-scene 10 --physics mujoco
 	$(BIN)/internav-gen validate $(MINI) --level physics
 
-DEMO_TRAIN := --device cpu --preset small --pretrain bc --steps 32768 \
-  --set cloning.frames=80000 --set cloning.epochs=1 --set ppo.critic_warmup_rollouts=4 \
-  --set stages.joint_learning_rate=3e-4 \
-  --set run.max_steps=150 --set run.validate_every=8
-DEMO_MEASURE := --split all --max-steps 150 --force
+DEMO_HOUSES := --rooms 1 --set 'episodes.max_obstacles=[2,2,2]'
+DEMO_TRAIN := --device cpu --preset small --method ppo --pretrain bc --steps 65536 \
+  --set network.observation=map --set cloning.frames=80000 --set cloning.epochs=1 \
+  --set ppo.critic_warmup_rollouts=4 --set ppo.update_epochs=2 --set ppo.ent_coef=0.003 \
+  --set run.max_steps=150 --set run.validate_every=0
+DEMO_MEASURE := --split all --max-steps 150 --force --no-reference-policies
 
 .PHONY: demo-train
-demo-train: $(STAMP) ## see CaMP learn on a small dataset: about five minutes
-	$(BIN)/internav-gen generate --out $(DEMO)/houses --scenes 122 --episodes-per-scene 10 \
-	  --rooms 1 --set 'episodes.max_obstacles=[2,2,2]'
-	$(BIN)/internav-gen generate --out $(DEMO)/unseen --scenes 32 --episodes-per-scene 4 \
-	  --rooms 1 --set 'episodes.max_obstacles=[2,2,2]' --seed 1
-	rm -rf $(DEMO)/camp
-	$(BIN)/camp-train $(DEMO)/houses --out $(DEMO)/camp $(DEMO_TRAIN) --stages cloning
-	$(BIN)/camp-eval $(DEMO)/camp $(DEMO)/unseen $(DEMO_MEASURE) --out $(DEMO)/cloned --no-reference-policies >/dev/null
-	$(BIN)/camp-train $(DEMO)/houses --out $(DEMO)/camp --resume --stages single,all
-	$(BIN)/camp-eval $(DEMO)/camp $(DEMO)/unseen $(DEMO_MEASURE) --out $(DEMO)/trained --video >/dev/null
+demo-train: $(STAMP) ## see an agent learn on 128 small houses: about five minutes
+	$(BIN)/internav-gen generate --out $(DEMO)/houses --scenes 128 --episodes-per-scene 10 $(DEMO_HOUSES)
+	$(BIN)/internav-gen generate --out $(DEMO)/unseen --scenes 32 --episodes-per-scene 4 $(DEMO_HOUSES) --seed 1
+	rm -rf $(DEMO)/agent
+	$(BIN)/camp-train $(DEMO)/houses --out $(DEMO)/agent $(DEMO_TRAIN) --stages cloning
+	$(BIN)/camp-eval $(DEMO)/agent $(DEMO)/unseen $(DEMO_MEASURE) --out $(DEMO)/cloned >/dev/null
+	$(BIN)/camp-train $(DEMO)/houses --out $(DEMO)/agent --resume --stages single,all
+	$(BIN)/camp-eval $(DEMO)/agent $(DEMO)/unseen $(DEMO_MEASURE) --out $(DEMO)/trained --video >/dev/null
 	$(BIN)/camp-eval compare $(DEMO)/cloned $(DEMO)/trained --dataset $(DEMO)/unseen --force \
 	  --out $(DEMO)/learnt
+	$(BIN)/python examples/draw_curve.py $(DEMO)/agent --out $(DEMO)/curve.png >/dev/null
 	@echo
-	@echo "Look at   $(DEMO)/trained/report.html: tables, curves, where it went"
+	@echo "Look at   $(DEMO)/curve.png: success while it learns"
+	@echo "          $(DEMO)/trained/report.html: tables, curves, where it went"
 	@echo "Watch     $(DEMO)/trained/videos: what it saw and meant, step by step"
 
 TESTS := -q -m 'not slow and not learning' -n 2 --dist loadfile

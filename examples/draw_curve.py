@@ -45,8 +45,8 @@ def main() -> None:
         x, y = WIDTH * k / 5, HEIGHT * k / 5
         canvas.line([(0, y), (WIDTH, y)], GREY, 1)
         canvas.text((-0.09, y), f"{top * k / 5:.1f}", 11, INK)
-        canvas.text((x, -0.07), f"{steps * k / 5:,.0f}", 11, INK)
-    canvas.text((WIDTH / 2, -0.15), "environment steps", 11, INK)
+        canvas.text((x, -0.07), f"{steps * k / 5000:.0f}", 11, INK)
+    canvas.text((WIDTH / 2, -0.15), "thousand environment steps", 11, INK)
     canvas.text((WIDTH / 2, HEIGHT + 0.08), options.metric, 13, INK)
     for k, (run, points) in enumerate(curves.items()):
         colour = COLOURS[k % len(COLOURS)]

@@ -155,6 +155,23 @@ def test_every_channel_is_what_shapely_finds_after_pushes_and_picks(watched, tas
     assert watch.tried or watch.here, "nothing failed: the test is void"
 
 
+def test_a_failed_push_is_told_as_the_agent_looks_now_until_the_thing_is_moved(hand_run):
+    """A crate of 5 t, 0.6 m wide, 1 m ahead in the middle of a room."""
+    run = hand_run(divided=False, pickable=False, mass_kg=5000.0)
+    run.step(Action.PUSH_AHEAD)
+    assert (run.last.success, run.last.target) == (False, 0)
+    # Cells of 0.125 m that [0.7, 1.3] m ahead and 0.3 m to either side overlap.
+    ahead, across = slice(26 - 11, 26 - 5), slice(26 - 3, 26 + 3)
+    places = ((ahead, across), (across, slice(26 + 5, 26 + 11)), (slice(26 + 5, 26 + 11), across))
+    for bit, place in zip((1, 8, 4), places, strict=True):  # ahead, to the right, back
+        tried = shown_to(run)[4]
+        assert (tried[place] == bit).all()
+        assert (tried != 0).sum() == 36
+        run.step(Action.ROTATE_LEFT)
+    run.step(Action.PICKUP)
+    assert shown_to(run)[4, 25:27, 25:27].tolist() == [[32, 32], [32, 32]]
+
+
 def test_only_what_was_seen_is_shown_and_as_it_was_then(watched):
     watch, memory = watched(1, "pick"), {}
     size = [2 * n for n in watch.world.model.lattice.shape]
