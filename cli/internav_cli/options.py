@@ -141,7 +141,7 @@ def dataset_to_read(given: Path | None, *, solves: bool = False, engine: str | N
         The dataset's physics engine is not installed.
 
     """
-    from internav_data.dataset import has_manifest, read_manifest
+    from internav_data.dataset import has_manifest, is_unfinished, read_manifest
     from internav_data.dataset.location import MINI_FOLDER, folder_to_read
     from internav_data.physics.engines.installed import require_engine
 
@@ -149,7 +149,12 @@ def dataset_to_read(given: Path | None, *, solves: bool = False, engine: str | N
     if has_manifest(folder):
         chosen = (engine or _engine_of(folder)) if solves else ""
         part = read_manifest(folder).part
-        name_dataset(folder if folder == MINI_FOLDER else given, chosen, part)
+        name_dataset(
+            folder if folder == MINI_FOLDER else given,
+            chosen,
+            part,
+            unfinished=is_unfinished(folder),
+        )
         if chosen:
             require_engine(chosen, "" if engine else str(folder))
     elif given is None:
@@ -164,7 +169,13 @@ def _engine_of(folder: Path) -> str:
     return PhysicsConfig.of_dataset(read_manifest(folder).config).engine
 
 
-def name_dataset(given: Path | None, engine: str = "", part: DatasetPart | None = None) -> None:
+def name_dataset(
+    given: Path | None,
+    engine: str = "",
+    part: DatasetPart | None = None,
+    *,
+    unfinished: bool = False,
+) -> None:
     """Write on stderr which dataset a command takes, why if none was named, range and engine."""
     from internav_data.core.storage import store_of
     from internav_data.dataset.location import dataset_folder, origin
@@ -174,6 +185,7 @@ def name_dataset(given: Path | None, engine: str = "", part: DatasetPart | None 
     reason = origin(given)
     line = f"dataset: {store_of(dataset_folder(given)).at('')}" + (f" ({reason})" if reason else "")
     line += f"; part {part.first_scene}:{part.end_scene} of a dataset" if part else ""
+    line += "; unfinished: its first scenes, until what makes it has ended" if unfinished else ""
     click.echo(line + (f"; physics: {engine}" if engine else ""), err=True)
 
 

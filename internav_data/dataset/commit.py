@@ -46,6 +46,7 @@ from internav_data.dataset.staging import (
     Staging,
     any_staged,
     clear_staging,
+    end_merging,
     read_identity,
     remove_foreign,
     remove_scenes,
@@ -365,6 +366,7 @@ def end_staging(out: StoreLike) -> None:
     """
     store = store_of(out)
     Journal(store).sweep(read_manifest(store) if has_manifest(store) else None)
+    end_merging(store)  # the run has made the scenes that a merge was to bring
     clear_staging(store)
 
 

@@ -4,17 +4,25 @@ A part is a dataset of a range of scenes, made by `generate --scene-range` anywh
 those of the whole, but its files are cut at other scenes: rows are cut anew, as when a dataset is
 extended. Parts are only read. All are checked before the first byte is written; then a part or
 several at a time are committed, the manifest last, so that after a kill the same call goes on from
-the last commit.
+the last commit. Until the last one a file beside the data says that the dataset is not finished.
 """
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import pyarrow as pa
 
-from internav_data.core.storage import Store, StoreLike, disk_errors, exists, final_of, store_of
+from internav_data.core.storage import (
+    Store,
+    StoreLike,
+    disk_errors,
+    exists,
+    final_of,
+    store_of,
+)
 from internav_data.dataset.commit import (
     Wanted,
     difference_of,
@@ -28,7 +36,7 @@ from internav_data.dataset.manifest import Manifest, has_manifest, read_manifest
 from internav_data.dataset.repair import find_damage
 from internav_data.dataset.shards import SceneSource
 from internav_data.dataset.snapshot import read_shard
-from internav_data.dataset.staging import IDENTITY, STAGING, any_staged
+from internav_data.dataset.staging import IDENTITY, MERGING, STAGING, any_staged, end_merging
 from internav_data.dataset.tables import ASSETS, EPISODES
 from internav_data.records.errors import CorruptDataError, UsageError
 from internav_data.records.version import __version__
@@ -109,12 +117,16 @@ def merge(
         journal.sweep(held)
         first = found[0]
         assets = read_shard(first.store, first.manifest.of(ASSETS.name)[0], ASSETS)
-        for group in _commits(held, found):
+        groups = list(_commits(held, found))
+        if groups:
+            store.put(MERGING, (json.dumps({"scenes": found[-1].numbers.stop}) + "\n").encode())
+        for group in groups:
             held = _add(journal, assets, held, group)
-            store.prune(STAGING)
             callback(
                 f"{held.scenes} of {found[-1].numbers.stop} scenes can be read in {store.at('')}"
             )
+        end_merging(store)
+        store.prune(STAGING)
     return read_manifest(store)
 
 
@@ -130,7 +142,11 @@ def _opened(place: StoreLike) -> _Part:
     store = store_of(place)
     part = _Part(store, read_manifest(store))
     wanted = part.manifest.part
-    if any_staged(store) or (wanted is not None and part.numbers.stop < wanted.end_scene):
+    if (
+        any_staged(store)
+        or exists(store, MERGING)
+        or (wanted is not None and part.numbers.stop < wanted.end_scene)
+    ):
         raise CorruptDataError(
             f"{part.place}: the part is not finished ({part.span} so far): run the command that "
             "makes it again, then merge"
@@ -229,7 +245,8 @@ def _held(store: Store, part: _Part) -> Manifest | None:
         Something else is there.
 
     """
-    names, ours = names_to_write_into(store), {JOURNAL, *journal_names(store)}
+    names, own = names_to_write_into(store), (JOURNAL, MERGING)
+    ours = {*own, *journal_names(store)}
     place = store.at("")
     if exists(store, IDENTITY):
         raise UsageError(
@@ -237,7 +254,7 @@ def _held(store: Store, part: _Part) -> Manifest | None:
             "folder"
         )
     if not has_manifest(store):
-        if any(final_of(name) != JOURNAL and name not in ours for name in names):
+        if any(final_of(name) not in own and name not in ours for name in names):
             raise UsageError(
                 f"{place}: holds something that is no dataset: give a new or empty folder"
             )

@@ -42,6 +42,8 @@ STAGING = ".work/"
 """Prefix of the names of an unfinished dataset's files."""
 IDENTITY = f"{STAGING}identity.json"
 """Name of the file that holds the identity of the run whose scenes are staged."""
+MERGING = f"{STAGING}merging.json"
+"""Name of the file that stands as long as `merge` has not committed all parts."""
 _FILE = FileLimits(remedy=f"move {STAGING} away and start anew")
 _SCENES = f"{STAGING}scenes/"
 _NAME = re.compile(
@@ -169,6 +171,19 @@ class StagedScene:
     state: SceneState
     house: pa.Table
     episodes: pa.Table
+
+
+def is_unfinished(root: StoreLike) -> bool:
+    """Return whether what makes a dataset is at work or was cut off: it has its first scenes."""
+    store = store_of(root)
+    return exists(store, IDENTITY) or exists(store, MERGING)
+
+
+def end_merging(store: Store) -> None:
+    """Remove the file `MERGING`, or what a kill left of it."""
+    for name in store.names(STAGING):
+        if MERGING in (name, final_of(name)):
+            store.remove(name)
 
 
 def any_staged(root: StoreLike) -> bool:

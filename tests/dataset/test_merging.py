@@ -17,6 +17,7 @@ from internav_data.dataset import (
     assemble,
     commit_scenes,
     has_manifest,
+    is_unfinished,
     load_dataset,
     merge,
     open_staging,
@@ -24,6 +25,7 @@ from internav_data.dataset import (
     shards,
     stage_scene,
 )
+from internav_data.dataset.staging import MERGING
 from internav_data.records import Episode, House, Physics
 from internav_data.records.errors import CorruptDataError, InternavError, UsageError
 from internav_data.records.version import __version__
@@ -111,16 +113,22 @@ def test_a_part_of_quarantined_scenes_alone_is_one(parts):
 def test_killed_anywhere_the_same_call_goes_on(parts, whole):
     counting, sizes = MemoryStore(), set()
     merge(parts[2], counting)
-    for deadline in range(0, counting.changes, counting.changes // 6):
+    for deadline in range(0, counting.changes, counting.changes // 5):
         store = MemoryStore(deadline=deadline)
         with pytest.raises(KilledError):
             merge(parts[2], store)
         left = MemoryStore(store.blobs)
         if has_manifest(left):
-            sizes.add(read_manifest(left).scenes)
+            held = read_manifest(left).scenes
+            sizes.add(held)
+            assert is_unfinished(left) or held == 26
+            if is_unfinished(left):
+                with pytest.raises(CorruptDataError, match="the part is not finished"):
+                    merge([left], MemoryStore())
             assert len({e.episode_id for e in load_dataset(left)}) == len(load_dataset(left))
         merge(parts[2], left)
         assert left.blobs == whole
+        assert not is_unfinished(left)
     assert 9 in sizes, "it goes on from its last commit"
 
 
@@ -133,6 +141,15 @@ def test_parts_that_come_later_extend_it(parts, whole):
     merge(parts[5], out)
     assert out.blobs == whole
     assert out.changes - changes <= 1, "nothing is written again"
+
+
+def test_a_run_finishes_what_a_merge_left(parts, whole):
+    out = MemoryStore()
+    merge(parts[2][:1], out)
+    out.put(MERGING, b"{}")  # killed before the second part came
+    build(out, range(9, 26), identity=OURS, quarantined=QUARANTINED)
+    assemble(out, OURS, ASSETS, 26)
+    assert out.blobs == whole
 
 
 def test_a_merged_dataset_is_extended_like_any_other(parts):
