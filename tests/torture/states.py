@@ -149,8 +149,9 @@ class Folder(RuleBasedStateMachine):
         if not has_manifest(self.out):
             return
         found = {finding.file for finding in validate(self.out, "files").found}
-        # Files of a commit that was cut off are noted instead.
-        assert found == set(self.damaged), found
+        # Files of a commit that was cut off are noted; a stranger's among the data is named.
+        strangers = {name for name in STRANGERS if self.strange and name.startswith("data/")}
+        assert found == set(self.damaged) | strangers, found
 
     @rule()
     @precondition(lambda self: self.held)
@@ -174,8 +175,10 @@ class Folder(RuleBasedStateMachine):
             if not self.killed:
                 assert not difference(contents(self.out), before), "a refused merge changed it"
             return
-        if not self.damaged:
+        if not self.damaged and not self.killed:
             self._is_whole(MAX_SCENES)
+        elif self.killed:  # what a killed `generate` left in .work/ goes with the next `generate`
+            check_readable(self.out, whole(MAX_SCENES))
         self.held = MAX_SCENES
 
     @rule()
@@ -207,7 +210,8 @@ def run_machine(seed: int, runs: int, steps: int) -> None:
         stateful_step_count=steps,
         database=None,
         deadline=None,
-        phases=[Phase.generate, Phase.shrink],
+        phases=[Phase.generate],  # shrinking takes longer than finding
+        report_multiple_bugs=False,
         suppress_health_check=list(HealthCheck),
     )
     machine = hypothesis.seed(seed)(type(f"Folder{seed}", (Folder,), {}))
