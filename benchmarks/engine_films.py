@@ -24,6 +24,7 @@ import engines
 
 from internav_data.geometry import centre_of_mass, multiply, part_corners, rotation_matrix
 from internav_data.physics import ENGINES, cache_disabled
+from internav_data.physics.engines.protocol import Simulation
 from internav_data.physics.solving import solve_push
 from internav_data.records import Pose
 from internav_data.views.canvas import Canvas
@@ -51,7 +52,7 @@ VIEW = (-np.sin(0.48), 0.0, 0.0, np.cos(0.48))
 PAPER, GRID, INK = (250, 249, 246), (222, 220, 214), (60, 60, 70)
 
 
-class Watched:
+class Watched(Simulation):
     """A push on an engine: the poses of all bodies after every step."""
 
     def __init__(self, engine: Engine, scene: PhysicsScene, spec: PushSpec) -> None:

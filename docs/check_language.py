@@ -127,7 +127,7 @@ DIALECT_CLASSES = {
     "Step": "AgentStep or TaskStep",
     "Tally": "EpisodeStatistics",
     "Teller": "ProgressReporter",
-    "Trail": "SweepRecorder",
+    "Trail": "sweep_of",
     "Try": "Candidate",
     "View": "CameraView or CameraPose",
     "Visit": "SearchNode",

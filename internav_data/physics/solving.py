@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Final
 
 from internav_data.geometry import centre_of_mass, multiply, rotation_matrix
 from internav_data.physics.scene import PushSolution, SettleSolution
-from internav_data.physics.sweep import SweepRecorder, bounding_radius_m
+from internav_data.physics.sweep import bounding_radius_m, sweep_of
 from internav_data.records import Pose
 
 if TYPE_CHECKING:
+    from internav_data.core.typing import Floats
     from internav_data.physics.engines.protocol import Engine, Simulation
     from internav_data.physics.scene import Body, PhysicsScene
     from internav_data.records import PushSpec, Quaternion, Vec3
@@ -84,26 +85,28 @@ def solve_push(engine: Engine, scene: PhysicsScene, spec: PushSpec) -> PushSolut
     moving = [k for k, body in enumerate(scene.bodies) if body.moves]
     pusher = _Pusher(spec, scene.bodies[0].dynamics.mass_kg, engine.step_s)
     limit = pusher.steps_left + round(PUSH_LIMIT_S / engine.step_s)
-    recorders = [SweepRecorder(scene.bodies[k].asset) for k in moving]
-    movers = list(zip(moving, recorders, strict=True))
     rest = _RestRule(moving, engine.step_s)
     steps = 0
     with engine.load(scene) as simulation:
         pusher.begin(simulation.placement(0)[0])
-        for k, recorder in movers:
-            recorder.follow(*simulation.placement(k))
+        rows = [simulation.row(moving)]
         while steps < limit and not rest.holds:
             pusher.act(simulation)
-            simulation.step()
-            steps += 1
-            slow = not pusher.holds
-            for k, recorder in movers:
-                shift = recorder.follow(*simulation.placement(k))
-                # Asking for a speed costs time.
-                slow = slow and shift < rest.slow_m and _is_slow(simulation, k)
-            if rest.note(simulation, slow=slow, held=pusher.holds):
+            count = 1 if pusher.holds else min(rest.steps_left, limit - steps)
+            simulation.advance(moving, rows, count, rest.slow_m, REST_SPIN)
+            done, steps = len(rows) - 1 - steps, len(rows) - 1
+            slow = (
+                not pusher.holds
+                and all(_is_slow(simulation, k) for k in moving)
+                and max(_shifts(simulation.placements(rows[-2:]))) < rest.slow_m
+            )
+            if rest.note(simulation, slow=slow, held=pusher.holds, steps=done):
                 pusher.let_go()
-        sweeps, paths = zip(*(recorder.recorded() for recorder in recorders), strict=True)
+        placements = simulation.placements(rows)
+        sweeps, paths = zip(
+            *(sweep_of(scene.bodies[k].asset, placements[:, n]) for n, k in enumerate(moving)),
+            strict=True,
+        )
         return PushSolution(
             poses=tuple(_pose(simulation, k, scene.bodies[k]) for k in moving),
             sweeps=sweeps,
@@ -111,6 +114,12 @@ def solve_push(engine: Engine, scene: PhysicsScene, spec: PushSpec) -> PushSolut
             seconds=steps * engine.step_s,
             at_rest=rest.holds,
         )
+
+
+def _shifts(placements: Floats) -> list[float]:
+    """Return how far each body moved between two placements, (2, bodies, 7), metres."""
+    before, after = placements[..., :3].tolist()
+    return [math.dist(here, there) for here, there in zip(after, before, strict=True)]
 
 
 class _Pusher:
@@ -205,8 +214,24 @@ class _RestRule:
         self.holds = False
         """Whether all bodies are at rest."""
 
-    def note(self, simulation: Simulation, *, slow: bool, held: bool) -> bool:
-        """Take notice of a step: whether all were slow in it, and the first one is still held.
+    @property
+    def steps_left(self) -> int:
+        """Number of steps after which they are looked at next."""
+        return 1 if self._held else self._window - self._steps % self._window
+
+    def note(self, simulation: Simulation, *, slow: bool, held: bool, steps: int = 1) -> bool:
+        """Take notice of steps: whether all were slow in the last, and the first is still held.
+
+        Parameters
+        ----------
+        simulation
+            Scene in motion.
+        slow
+            Whether all bodies were slow in the last step. In the others of these some was not.
+        held
+            Whether the first body is still held.
+        steps
+            Number of steps since the last call, `steps_left` at most.
 
         Returns
         -------
@@ -218,7 +243,9 @@ class _RestRule:
             self._look(simulation)
             self._steps, self._still, self._close, self._first = 0, 0, 0, self._latest
         self._held = held
-        self._steps += 1
+        self._steps += steps
+        if steps > 1:
+            self._calm.note(simulation, slow=False)
         calm = self._calm.note(simulation, slow=slow)
         if self._steps % self._window == 0:
             self._look(simulation)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from internav_data.core.typing import Floats
     from internav_data.physics.kdop import Dop8
-    from internav_data.records import Asset, Pose, Quaternion, Vec3
+    from internav_data.records import Asset, Pose
 
     Poses = NDArray[np.float32]
 
@@ -27,7 +27,7 @@ KEPT_M: Final = 0.004
 _POSE: Final = 7
 """Length of a recorded pose: the centre of mass (3) and a quaternion (4)."""
 PATH_POSE_BYTES: Final = 4 * _POSE
-"""Length of one pose in `SweepRecorder.recorded`, bytes."""
+"""Length of one pose of a path in `sweep_of`, bytes."""
 
 
 @lru_cache(maxsize=4096)
@@ -68,47 +68,29 @@ def _record(corners: Floats, radius: float, poses: Floats, reach: Floats) -> Pos
     return kept[: count + 1]
 
 
-class SweepRecorder:
-    """Record of one body's motion: a planar 8-DOP of its sweep, and sampled poses."""
+def sweep_of(asset: Asset, placements: Floats) -> tuple[Dop8, bytes]:
+    """Return the planar 8-DOP of a motion's sweep, and sampled poses.
 
-    __slots__ = ("_asset", "_placements")
+    Parameters
+    ----------
+    asset
+        Body that moves.
+    placements
+        Its centre of mass and orientation after each step, (n, 7), the start first.
 
-    def __init__(self, asset: Asset) -> None:
-        self._asset = asset
-        self._placements: list[tuple[Vec3, Quaternion]] = []
+    Returns
+    -------
+    dop8
+        Planar 8-DOP of the sweep.
+    path
+        Recorded poses, (k, 7) float32 as bytes, the first and the latest included.
 
-    def follow(self, middle: Vec3, turn: Quaternion) -> float:
-        """Add the body's present centre of mass and orientation to the record.
-
-        Returns
-        -------
-        float
-            Distance that the centre of mass moved since the last call, metres; inf at first.
-
-        """
-        placements = self._placements
-        shift = math.dist(middle, placements[-1][0]) if placements else math.inf
-        placements.append((middle, turn))
-        return shift
-
-    def recorded(self) -> tuple[Dop8, bytes]:
-        """Return what is known of the motion so far.
-
-        Returns
-        -------
-        dop8
-            Planar 8-DOP of the sweep.
-        path
-            Recorded poses, (n, 7) float32 as bytes, the first and the latest included.
-
-        """
-        # All at once: a call of a compiled kernel takes a tenth of a step of the engine.
-        poses = np.array([(*middle, *turn) for middle, turn in self._placements])
-        reach = np.full(8, -math.inf)
-        asset = self._asset
-        path = _record(centred_corners(asset), bounding_radius_m(asset), poses, reach)
-        a, b, c, d, e, f, g, h = reach.tolist()
-        return (a, b, c, d, e, f, g, h), path.tobytes()
+    """
+    reach = np.full(8, -math.inf)
+    poses = np.ascontiguousarray(placements)
+    path = _record(centred_corners(asset), bounding_radius_m(asset), poses, reach)
+    a, b, c, d, e, f, g, h = reach.tolist()
+    return (a, b, c, d, e, f, g, h), path.tobytes()
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,7 @@ from internav_data.physics import (
 )
 from internav_data.physics.config import PhysicsConfig
 from internav_data.physics.engines.installed import available_engines
+from internav_data.physics.engines.protocol import Simulation
 from internav_data.physics.result_cache import ResultCache
 from internav_data.physics.solving import RULES
 from internav_data.records import Pose, PushSpec
@@ -47,7 +48,7 @@ class Glide:
         yield GlideSimulation(scene)
 
 
-class GlideSimulation:
+class GlideSimulation(Simulation):
     """Motion of the first body of a scene; the others stay."""
 
     def __init__(self, scene):

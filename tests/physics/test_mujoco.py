@@ -1,7 +1,9 @@
 """Compiled models serve many scenes, and none of them is told from a scene in a new model."""
 
 import os
+from contextlib import contextmanager
 from threading import Thread
+from types import MethodType
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from internav_data.physics import Body, PhysicsScene
 from internav_data.physics.engines import mujoco_scene
 from internav_data.physics.engines.mujoco import MuJoCo, mujoco_engine
 from internav_data.physics.engines.mujoco_scene import ModelBuilder, mujoco
+from internav_data.physics.engines.protocol import Simulation
 from internav_data.physics.solving import solve_push
 from internav_data.records import PUSH_SPECS, Pose
 from internav_data.records.errors import UsageError
@@ -27,6 +30,52 @@ def test_a_used_model_is_as_good_as_a_new_one():
         engine.builder.models.capacity = capacity
         for k in np.random.default_rng(seed).permutation(len(asked)):
             assert answer(engine, *asked[k]) == expected[k]
+
+
+class BySteps:
+    """An engine that makes single steps, and looks at how far things move in them."""
+
+    def __init__(self, engine):
+        self.engine, self.step_s = engine, engine.step_s
+
+    @contextmanager
+    def load(self, scene):
+        with self.engine.load(scene) as simulation:
+            for name in ("row", "advance", "placements"):
+                setattr(self, name, MethodType(getattr(Simulation, name), self))
+            for name in ("step", "placement", "velocity", "set_velocity", "apply_force"):
+                setattr(self, name, getattr(simulation, name))
+            yield self
+
+
+def test_steps_in_one_go_are_those_one_by_one():
+    for scene, _ in scenes(16):
+        for spec in PUSH_SPECS.values():
+            one, other = (
+                solve_push(BySteps(MuJoCo()), scene, spec),
+                solve_push(MuJoCo(), scene, spec),
+            )
+            assert one == other
+
+
+def test_what_moves_alone_moves_as_if_things_slept_around_it():
+    alone = [scene for scene, _ in scenes(40) if sum(body.moves for body in scene.bodies) == 1]
+    for scene in alone[:8]:
+        engine = MuJoCo()
+        option = engine.builder.build(scene).model.opt
+        assert option.enableflags == 0
+        option.enableflags = mujoco.mjtEnableBit.mjENBL_SLEEP
+        option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        expected = solve_push(MuJoCo(), scene, PUSH_SPECS["force"])
+        assert solve_push(engine, scene, PUSH_SPECS["force"]) == expected
+
+
+def test_mujocos_clock_stands_while_a_scene_is_solved():
+    before = mujoco_scene.CLOCK.value
+    with MuJoCo().load(scenes(2)[1][0]):
+        assert mujoco_scene.CLOCK.value is None
+    assert mujoco_scene.CLOCK.value == before
+    assert before
 
 
 def test_what_an_interrupt_left_in_a_model_is_swept_away(monkeypatch):

@@ -13,7 +13,7 @@ from internav_data.physics import Body, push
 from internav_data.physics.frames import Frame
 from internav_data.physics.kdop import overlap
 from internav_data.physics.narrow_phase import met_on_path, prisms_of, prisms_of_collider
-from internav_data.physics.sweep import KEPT_M, SweepRecorder, centred_corners, extent_of
+from internav_data.physics.sweep import KEPT_M, centred_corners, extent_of, sweep_of
 from internav_data.records import Pose
 
 MARGIN = 0.01
@@ -69,16 +69,16 @@ def test_what_is_met_is_what_shapely_says(seed):
         Pose(*rng.uniform(-1.2, 1.2, 2), 0.0, yaw_quaternion(int(rng.integers(360))))
         for _ in range(12)
     ]
-    recorder, nearest = SweepRecorder(CHAIR), [math.inf] * len(others)
+    motion, nearest = [], [math.inf] * len(others)
     bodies = [placed(TABLE, pose) for pose in others]
     for middle, turn in walk(rng):
-        recorder.follow(middle, turn)
+        motion.append((*middle, *turn))
         here = list(hulls(CHAIR, middle, turn))
         for k, body in enumerate(bodies):
             least = min(gap(one, other) for one, other in itertools.product(here, body))
             nearest[k] = min(nearest[k], least)
     prisms = [prisms_of(TABLE, frame.leave(pose)) for pose in others]
-    met = met_on_path(CHAIR, recorder.recorded()[1], frame, prisms, MARGIN)
+    met = met_on_path(CHAIR, sweep_of(CHAIR, np.array(motion))[1], frame, prisms, MARGIN)
     for hit, least in zip(met, nearest, strict=True):
         # Poses are kept every 4 mm; 32 directions round a corner off by half a percent.
         assert not hit or least < MARGIN + 0.004
@@ -88,22 +88,19 @@ def test_what_is_met_is_what_shapely_says(seed):
 
 
 def test_a_path_keeps_its_ends_and_leaves_out_what_stands_still():
-    recorder = SweepRecorder(CHAIR)
-    for k in range(1000):
-        recorder.follow((0.0, 0.0, min(k, 10) * 0.001), UPRIGHT)
-    path = np.frombuffer(recorder.recorded()[1], dtype=np.float32).reshape(-1, 7)
+    motion = np.array([(0.0, 0.0, min(k, 10) * 0.001, *UPRIGHT) for k in range(1000)])
+    path = np.frombuffer(sweep_of(CHAIR, motion)[1], dtype=np.float32).reshape(-1, 7)
     assert path[:, 2] == pytest.approx([0.0, 0.004, 0.008, 0.01], abs=1e-6)
 
 
 @pytest.mark.parametrize("distance", [0.4, 0.5])
 def test_a_column_is_round(distance):
-    recorder = SweepRecorder(CHAIR)
-    recorder.follow((0.0, 0.0, 0.3), UPRIGHT)
+    _, path = sweep_of(CHAIR, np.array([(0.0, 0.0, 0.3, *UPRIGHT)]))
     ((plan, *_), _) = hulls(CHAIR, (0.0, 0.0, 0.3), UPRIGHT)
     for angle in np.linspace(0.0, 2.0 * math.pi, 25):
         x, y = distance * math.cos(angle), distance * math.sin(angle)
         collider = prisms_of_collider(x, y, 0.15, 0.022, 1.8)
-        (met,) = met_on_path(CHAIR, recorder.recorded()[1], Frame(0.0, 0.0, 0), [collider], MARGIN)
+        (met,) = met_on_path(CHAIR, path, Frame(0.0, 0.0, 0), [collider], MARGIN)
         between = plan.distance(Point(x, y)) - 0.15
         assert abs(between - MARGIN) < 0.002 or met == (between < MARGIN)
 

@@ -16,6 +16,7 @@ from internav_data.geometry import (
     yaw_quaternion,
 )
 from internav_data.physics import ENGINES, Body, PhysicsScene, wall_body
+from internav_data.physics.engines.protocol import Simulation
 from internav_data.physics.kdop import overlap
 from internav_data.physics.pushing import AGENT_MIN_M
 from internav_data.physics.solving import solve_push
@@ -236,6 +237,8 @@ def test_slides_in_a_mirrored_house_are_mirrored(yaw, push):
 
 class Watched:
     """An engine whose simulations add up the energy of all that moves after each step, joules."""
+
+    row, advance, placements = Simulation.row, Simulation.advance, Simulation.placements
 
     def __init__(self, engine):
         self.engine, self.step_s, self.energies = engine, engine.step_s, []

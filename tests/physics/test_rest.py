@@ -14,6 +14,7 @@ from internav_data.houses import HouseConfig, build_house
 from internav_data.physics import ENGINES, Body, push, wall_body
 from internav_data.physics.config import PhysicsConfig
 from internav_data.physics.displacement import tilt_deg
+from internav_data.physics.engines.protocol import Simulation
 from internav_data.physics.kdop import grown
 from internav_data.physics.scene import PhysicsScene
 from internav_data.physics.solving import PUSH_LIMIT_S, RULES, solve_push
@@ -27,7 +28,7 @@ STEP_S = 1.0 / 240.0
 
 
 @dataclass
-class Scripted:
+class Scripted(Simulation):
     """An engine whose first body is where a function of time says, x in metres."""
 
     x: object

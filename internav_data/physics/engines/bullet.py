@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from internav_data.core.locks import ThreadLock, once_per_process
 from internav_data.core.temporary import process_folder
 from internav_data.physics.engines.bullet_scene import HULL_MARGIN_M, Builder, pybullet
+from internav_data.physics.engines.protocol import Simulation
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -64,7 +65,7 @@ class Bullet:
 
 
 @dataclass(frozen=True, slots=True)
-class BulletSimulation:
+class BulletSimulation(Simulation):
     """A scene in a world of Bullet. Bodies go by their index in the scene."""
 
     ids: list[int]

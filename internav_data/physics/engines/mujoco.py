@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from internav_data.core.locks import ThreadLock, once_per_process
 from internav_data.physics.engines.mujoco_scene import (
     FAST,
@@ -20,16 +22,21 @@ from internav_data.physics.engines.mujoco_scene import (
     ModelBuilder,
     mujoco,
     set_friction_solver,
+    untimed,
     warnings_unlogged,
 )
+from internav_data.physics.engines.protocol import Simulation
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
+    from internav_data.core.typing import Floats
     from internav_data.physics.engines.mujoco_scene import CompiledScene, MjData
     from internav_data.physics.scene import PhysicsScene
     from internav_data.records import Quaternion, Vec3
 
+_ORDER = (0, 1, 2, 4, 5, 6, 3)
+"""Numbers of a body in MuJoCo's order (centre of mass; w, x, y, z) in that of the protocol."""
 ENGINE_LOCK = ThreadLock()
 """Held while a scene is built, stepped and read: by one thread of the process."""
 
@@ -63,7 +70,7 @@ class MuJoCo:
             for them.
 
         """
-        with ENGINE_LOCK, warnings_unlogged():
+        with ENGINE_LOCK, warnings_unlogged(), untimed():
             try:
                 made = self.builder.build(scene)
                 yield MuJoCoSimulation(made)
@@ -73,7 +80,7 @@ class MuJoCo:
             _check(made.data)
 
 
-class MuJoCoSimulation:
+class MuJoCoSimulation(Simulation):
     """A scene in motion in MuJoCo. Bodies go by their index in the scene."""
 
     __slots__ = (
@@ -83,10 +90,12 @@ class MuJoCoSimulation:
         "_geoms",
         "_masses",
         "_model_and_data",
+        "_places",
         "_positions",
         "_pushed",
         "_speeds",
         "_step_s",
+        "_top",
         "_velocities",
     )
 
@@ -96,7 +105,9 @@ class MuJoCoSimulation:
         self._positions = {k: data.qpos[7 * n : 7 * n + 7] for k, n in made.movers.items()}
         self._velocities = {k: data.qvel[6 * n : 6 * n + 6] for k, n in made.movers.items()}
         self._forces = {k: data.qfrc_applied[6 * n : 6 * n + 3] for k, n in made.movers.items()}
-        self._speeds = data.qvel
+        self._places, self._speeds = data.qpos, data.qvel
+        self._top = 0.0
+        """Greatest component of the velocities of all bodies, m/s or rad/s."""
         self._fast: bool | None = None
         """Whether something was fast before the last step; None before the first."""
         self._masses = {k: float(made.model.body_mass[made.rows[k]]) for k in made.movers}
@@ -108,17 +119,51 @@ class MuJoCoSimulation:
 
     def step(self, count: int = 1) -> None:
         """Advance by a number of time steps."""
-        model, data = self._model_and_data
         for _ in range(count):
-            fast = max(map(abs, self._speeds.tolist())) + self._gain > FAST
-            if fast is not self._fast:
-                set_friction_solver(model, fast=fast)
-                self._fast = fast
-            mujoco.mj_step(model, data, SUBSTEPS)
+            self._step()
+
+    def row(self, bodies: Sequence[int]) -> bytes:  # noqa: ARG002 - all that move
+        """Return where the bodies are, as MuJoCo keeps it."""
+        return self._places.tobytes()
+
+    def advance(
+        self,
+        bodies: Sequence[int],  # noqa: ARG002 - all that move
+        rows: list[bytes],
+        count: int,
+        slow_m: float,
+        slow_rad: float,
+    ) -> None:
+        """Advance by time steps until the bodies may be slow, noting where they are after each.
+
+        Parameters as of `Simulation.advance`.
+        """
+        places, slow = self._places, max(slow_m / self._step_s, slow_rad)
+        for _ in range(count):
+            self._step()
+            rows.append(places.tobytes())
+            if self._top < slow:
+                break
+
+    def placements(self, rows: Sequence[bytes]) -> Floats:
+        """Return centres of mass and orientations from rows, (rows, bodies, 7)."""
+        numbers = np.frombuffer(b"".join(rows)).reshape(len(rows), -1, len(_ORDER))
+        return numbers[..., _ORDER]
+
+    def _step(self) -> None:
+        model, data = self._model_and_data
+        fast = self._top + self._gain > FAST
+        if fast is not self._fast:
+            set_friction_solver(model, fast=fast)
+            self._fast = fast
+        mujoco.mj_step(model, data, SUBSTEPS)
+        if self._pushed:
             for body in self._pushed:
                 self._forces[body][:] = 0.0
             self._pushed.clear()
             self._gain = 0.0
+        speeds = self._speeds.tolist()
+        self._top = max(*speeds, -min(speeds))
 
     def placement(self, body: int) -> tuple[Vec3, Quaternion]:
         """Return a body's centre of mass, metres, and its orientation."""
@@ -135,6 +180,7 @@ class MuJoCoSimulation:
         """Give a body a velocity, m/s, and a spin, rad/s."""
         x, y, z, w = self.placement(body)[1]
         self._velocities[body][:] = (*linear, *_turned((-x, -y, -z, w), angular))
+        self._top = max(map(abs, self._speeds.tolist()))
 
     def apply_force(self, body: int, force: Vec3) -> None:
         """Apply a force, newtons, at a body's centre of mass during the next step."""
@@ -147,14 +193,10 @@ class MuJoCoSimulation:
         """Return the depth of a body's deepest contact, metres; 0 without any."""
         model, data = self._model_and_data
         mujoco.mj_fwdPosition(model, data)  # a step leaves the contacts of its beginning
-        geoms = range(self._geoms[body].start, self._geoms[body].stop)
-        contacts: Any = data.contact
-        depths = [
-            MARGIN_M - contact.dist
-            for contact in contacts
-            if contact.geom[0] in geoms or contact.geom[1] in geoms
-        ]
-        return max([0.0, *depths])
+        geoms = self._geoms[body]
+        touched = (data.contact.geom >= geoms.start) & (data.contact.geom < geoms.stop)
+        distances: Any = data.contact.dist[touched.any(axis=1)]
+        return max([0.0, *(MARGIN_M - distances).tolist()])
 
 
 def _check(data: MjData) -> None:

@@ -16,12 +16,14 @@ All other contacts are explicit pairs of parts that bring the product.
 
 from __future__ import annotations
 
-from contextlib import contextmanager
+import ctypes
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cache, lru_cache
 from hashlib import sha256
 from importlib import import_module
 from itertools import combinations
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
@@ -41,6 +43,8 @@ from internav_data.records.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from types import ModuleType
+
+    from numpy.typing import NDArray
 
     from internav_data.physics.scene import AgentCollider, Body, PhysicsScene
     from internav_data.records import Asset, Part, Quaternion, Vec3
@@ -102,6 +106,8 @@ ARENA_BYTES: Final = 64 << 20
 MB; pages that are not touched cost nothing."""
 MODELS: Final = 64
 """Number of compiled models that are kept, 0.7 MB each."""
+_DISABLED: Final = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+"""What MuJoCo leaves out: a scene that becomes unstable must be noticed, not begin anew."""
 _FLOOR_GEOMS: Final = 1
 """Number of the model's geoms before those of the agent and the bodies."""
 
@@ -116,8 +122,8 @@ class CompiledScene:
     """Row of each body among the model's bodies."""
     geoms: tuple[slice, ...]
     """Rows of each body's parts among the model's geoms."""
-    pairs: tuple[tuple[int, int], ...]
-    """Two bodies of each explicit pair of parts."""
+    pairs: NDArray[np.intp]
+    """Two bodies of each explicit pair of parts, (n, 2)."""
     movers: dict[int, int]
     """Number of each body that moves, in their order."""
 
@@ -152,6 +158,31 @@ class ModelBuilder:
         return made
 
 
+def _clock() -> ctypes.c_void_p | None:
+    """Return the pointer to MuJoCo's clock, `mjcb_time` of its interface; None where it is not."""
+    for name in ("libmujoco*.so*", "libmujoco*.dylib", "mujoco.dll"):
+        for file in Path(mujoco.__file__).parent.glob(name):
+            with suppress(OSError, ValueError):
+                return ctypes.c_void_p.in_dll(ctypes.CDLL(str(file)), "mjcb_time")
+    return None
+
+
+CLOCK: Final = _clock()
+
+
+@contextmanager
+def untimed() -> Iterator[None]:
+    """Keep MuJoCo from looking at the clock 30 times a step, which takes a twentieth of it."""
+    before = CLOCK.value if CLOCK is not None else None
+    if CLOCK is not None:
+        CLOCK.value = None
+    try:
+        yield
+    finally:
+        if CLOCK is not None:
+            CLOCK.value = before
+
+
 @contextmanager
 def warnings_unlogged() -> Iterator[None]:
     """Keep MuJoCo from writing its warnings to a file MUJOCO_LOG.TXT in the working folder.
@@ -175,7 +206,8 @@ def _is_wall(body: Body) -> bool:
 
 
 def _compiled(scene: PhysicsScene, step_s: float) -> CompiledScene:
-    spec = _new_spec()
+    spec = _template().copy()
+    spec.memory = ARENA_BYTES
     first = _FLOOR_GEOMS
     if scene.agent is not None:
         _add_geom(spec.worldbody.add_body(), "", mujoco.mjtGeom.mjGEOM_CYLINDER, size=(1, 1, 0))
@@ -183,24 +215,33 @@ def _compiled(scene: PhysicsScene, step_s: float) -> CompiledScene:
     rows: list[MjsBody] = []
     geoms: list[slice] = []
     names: list[list[str]] = []
+    meshes: dict[str, bytes] = {}
     for number, body in enumerate(scene.bodies):
         made = spec.worldbody.add_body(name=str(number))
-        names.append(_add_parts(spec, made, body))
+        names.append(_add_parts(made, body, meshes))
         count = len(body.asset.parts)
         rows.append(made)
         geoms.append(slice(first, first + count))
         first += count
-    pairs = tuple(_add_pairs(spec, scene, names))
+    for name in meshes:
+        spec.add_mesh(name=name, file=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
+    spec.assets = meshes
+    pairs = np.array(list(_add_pairs(spec, scene, names)), dtype=np.intp).reshape(-1, 2)
     try:
         model = spec.compile()
     except ValueError as error:
         ids = ", ".join(dict.fromkeys(body.asset.asset_id for body in scene.bodies))
         reason = " ".join(str(error).split())
         raise UsageError(f"MuJoCo refuses a shape among {ids}: {reason}") from error
+    model.opt.disableflags = _DISABLED
     model.opt.timestep = step_s / SUBSTEPS
     for stiffness in (model.geom_solref, model.pair_solref, model.dof_solref):
         stiffness[:] = (CONTACT_STEPS * step_s / SUBSTEPS, 1.0)
     moving = [k for k, body in enumerate(scene.bodies) if body.moves]
+    if len(moving) == 1:
+        # Nothing sleeps: the same motion without the search for what touches what.
+        model.opt.enableflags = 0
+        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
     model.tree_sleep_policy[:] = mujoco.mjtSleepPolicy.mjSLEEP_INIT
     model.tree_sleep_policy[:1] = mujoco.mjtSleepPolicy.mjSLEEP_NEVER  # what falls or is pushed
     return CompiledScene(
@@ -213,19 +254,25 @@ def _compiled(scene: PhysicsScene, step_s: float) -> CompiledScene:
     )
 
 
-def _new_spec() -> MjSpec:
-    """Return a specification of an empty scene: the settings and the floor."""
+@cache
+def _template() -> MjSpec:
+    """Return the specification of an empty scene: settings, defaults of shapes, and the floor."""
     spec = mujoco.MjSpec()
     spec.compiler.usethread = 0
-    spec.memory = ARENA_BYTES
     option = spec.option
     option.gravity = (0.0, 0.0, -GRAVITY)
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     # Asleep, a body that is not touched neither trembles nor costs time; a touch wakes it.
     option.enableflags = mujoco.mjtEnableBit.mjENBL_SLEEP
-    # A scene that becomes unstable must be noticed, not begin anew.
-    option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    # The compiler makes a step of its own, with all bodies at one place.
+    option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT
+    for shape in (spec.default.geom, spec.default.pair):
+        shape.condim = CONTACT_DIMENSIONS
+        shape.solimp = IMPEDANCE
+    spec.default.geom.friction = (0.0, 0.0, 0.0)
+    spec.default.geom.margin = MARGIN_M / 2.0  # a contact has the sum of both
+    spec.default.pair.margin = MARGIN_M
     _add_geom(spec.worldbody, "", mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 1))
     return spec
 
@@ -237,16 +284,15 @@ def _add_geom(body: MjsBody, name: str, kind: MjtGeom, **shape: object) -> None:
         type=kind,
         contype=0 if name else 1,
         conaffinity=1 if name and body.joints else 0,
-        condim=CONTACT_DIMENSIONS,
-        friction=(0.0, 0.0, 0.0),
-        solimp=IMPEDANCE,
-        margin=MARGIN_M / 2.0,  # a contact has the sum of both
         **shape,
     )
 
 
-def _add_parts(spec: MjSpec, made: MjsBody, body: Body) -> list[str]:
-    """Add the parts of a body to it, its frame at the centre of mass; return their names."""
+def _add_parts(made: MjsBody, body: Body, meshes: dict[str, bytes]) -> list[str]:
+    """Add the parts of a body to it, its frame at the centre of mass; return their names.
+
+    Files of the parts that are no boxes join `meshes`, by their names.
+    """
     if _is_wall(body):
         _add_geom(made, "", mujoco.mjtGeom.mjGEOM_BOX, size=(1, 1, 1))
         return []
@@ -255,30 +301,33 @@ def _add_parts(spec: MjSpec, made: MjsBody, body: Body) -> list[str]:
         made.explicitinertial = True
         made.mass = 1.0
         made.inertia = (1.0, 1.0, 1.0)
-    middle = centre_of_mass(body.asset)
-    names: list[str] = []
-    for part in body.asset.parts:
-        names.append(f"{made.name} {len(names)}")
-        where = [p - m for p, m in zip(part.centre, middle, strict=True)]
-        if part.shape == "box":
-            half, turn = [extent / 2.0 for extent in part.size], _wxyz(part.rotation)
-            _add_geom(made, names[-1], mujoco.mjtGeom.mjGEOM_BOX, pos=where, quat=turn, size=half)
-        else:
-            mesh = _add_mesh(spec, part)
-            _add_geom(made, names[-1], mujoco.mjtGeom.mjGEOM_MESH, pos=where, meshname=mesh)
+    shapes, files = _shapes(body.asset)
+    meshes.update(files)
+    names = [f"{made.name} {number}" for number in range(len(shapes))]
+    for name, (kind, shape) in zip(names, shapes, strict=True):
+        _add_geom(made, name, kind, **shape)
     return names
 
 
-def _add_mesh(spec: MjSpec, part: Part) -> str:
-    """Add the hull of a part about its centre, if the scene does not have it; return its name."""
-    name, text = _mesh_file(part)
-    if name not in spec.assets:
-        spec.assets = {**spec.assets, name: text}
-        spec.add_mesh(name=name, file=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
-    return name
+@lru_cache(maxsize=4096)
+def _shapes(asset: Asset) -> tuple[list[tuple[MjtGeom, dict[str, Any]]], dict[str, bytes]]:
+    """Return kind and form of each part, about the centre of mass, and the files of hulls."""
+    middle = centre_of_mass(asset)
+    shapes: list[tuple[MjtGeom, dict[str, Any]]] = []
+    files: dict[str, bytes] = {}
+    for part in asset.parts:
+        form: dict[str, Any] = {"pos": [p - m for p, m in zip(part.centre, middle, strict=True)]}
+        if part.shape == "box":
+            form["quat"] = _wxyz(part.rotation)
+            form["size"] = [extent / 2.0 for extent in part.size]
+            shapes.append((mujoco.mjtGeom.mjGEOM_BOX, form))
+        else:
+            name, text = _mesh_file(part)
+            form["meshname"], files[name] = name, text
+            shapes.append((mujoco.mjtGeom.mjGEOM_MESH, form))
+    return shapes, files
 
 
-@lru_cache(maxsize=8192)
 def _mesh_file(part: Part) -> tuple[str, bytes]:
     """Return a part about its centre as a Wavefront OBJ file, and the file's name."""
     corners = (part_corners(part) - np.array(part.centre)).tolist()
@@ -298,13 +347,7 @@ def _add_pairs(
             continue
         for here in names[first]:
             for there in names[second]:
-                spec.add_pair(
-                    geomname1=here,
-                    geomname2=there,
-                    condim=CONTACT_DIMENSIONS,
-                    solimp=IMPEDANCE,
-                    margin=MARGIN_M,
-                )
+                spec.add_pair(geomname1=here, geomname2=there)
                 yield first, second
 
 
@@ -324,9 +367,8 @@ def _fill(made: CompiledScene, scene: PhysicsScene) -> None:
             _set_wall(model, row, geoms.start, body)
         else:
             model.body_pos[row], model.body_quat[row] = _placement(body)
-    for pair, (one, other) in enumerate(made.pairs):
-        here, there = (scene.bodies[k].dynamics.friction for k in (one, other))
-        model.pair_friction[pair, :2] = here * there
+    frictions = np.array([body.dynamics.friction for body in scene.bodies])
+    model.pair_friction[:, :2] = frictions[made.pairs].prod(axis=1, keepdims=True)
     mujoco.mj_setConst(model, data)
     mujoco.mj_resetData(model, data)
 
