@@ -211,7 +211,7 @@ def observation_sensors(
 
 
 class Encoder(nn.Module):
-    """Features of an agent's sensors: those of each of `ENCODERS` whose sensors it has, joined.
+    """Features of an agent's sensors: those of each encoder whose sensors it has, joined.
 
     Parameters
     ----------
@@ -219,14 +219,19 @@ class Encoder(nn.Module):
         Sizes of the networks.
     sensors
         The agent's sensors, or their names. Those of no encoder are left to the agent.
+    encoders
+        Encoders by name, one's own among them.
     """
 
     def __init__(
-        self, config: NetworkConfig, sensors: Sequence[str | Sensor] = DEFAULT_SENSORS
+        self,
+        config: NetworkConfig,
+        sensors: Sequence[str | Sensor] = DEFAULT_SENSORS,
+        encoders: Mapping[str, type[SensorEncoder]] = ENCODERS,
     ) -> None:
         super().__init__()
         names = sensor_names(sensors)
-        found = {name: kind for name, kind in ENCODERS.items() if {*kind.sensors} <= names}
+        found = {name: kind for name, kind in encoders.items() if {*kind.sensors} <= names}
         parts = {name: kind(config) for name, kind in found.items()}
         self.parts, self.size = nn.ModuleDict(parts), sum(part.size for part in parts.values())
         self._taken = {name: part.sensors for name, part in parts.items()}

@@ -63,11 +63,11 @@ def test_features_are_those_of_each_sensor_side_by_side(config, observations):
     assert torch.equal(found[..., -5 - config.network.goal_embedding : -5], goal)
 
 
-def test_a_new_sensor_needs_a_row_of_the_table_alone(config, observations, monkeypatch):
-    monkeypatch.setitem(networks.ENCODERS, "grid", GridEncoder)
-    plain = networks.Encoder(config.network)
+def test_an_encoder_of_ones_own_is_an_argument(config, observations):
+    encoders = {**networks.ENCODERS, "grid": GridEncoder}
+    plain = networks.Encoder(config.network, encoders=encoders)
     assert "grid" not in plain.parts, "an agent without the sensor does not pay for it"
-    encoder = networks.Encoder(config.network, (*DEFAULT_SENSORS, "grid"))
+    encoder = networks.Encoder(config.network, (*DEFAULT_SENSORS, "grid"), encoders)
     assert encoder.size == plain.size + GridEncoder.size
     encoder(observations)[..., -GridEncoder.size :].sum().backward()
     assert encoder.parts["grid"].linear.weight.grad.abs().sum() > 0.0

@@ -82,7 +82,7 @@ class PPOAgent(RecurrentAgent[FlatRecord]):
         super().__init__()
         self.hidden = config.network.hidden
         self.sensors = networks.observation_sensors(config.network, self.sensors)
-        self.encoder = networks.Encoder(config.network, self.sensors)
+        self.encoder = networks.Encoder(config.network, self.sensors, self.sensor_encoders)
         done = config.agent.initial_done_probability
         other = (1.0 - done) / (ACTION_COUNT - 1)
         probabilities = [done if action == Action.DONE else other for action in ACTIONS]

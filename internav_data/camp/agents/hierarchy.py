@@ -293,7 +293,9 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
         self.uses_intent = variant != "none"
         self.sensors = networks.observation_sensors(network)
         count = 1 if network.shared_encoder else 3
-        encoders = [networks.Encoder(network, self.sensors) for _ in range(count)]
+        encoders = [
+            networks.Encoder(network, self.sensors, self.sensor_encoders) for _ in range(count)
+        ]
         self.encoders, size = nn.ModuleList(encoders), encoders[0].size
         moves, options = initial_probabilities(
             agent.initial_done_probability, agent.initial_interaction_probability

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, Generic, Self, TypeVar
@@ -16,7 +16,7 @@ from typing import Any, Generic, Self, TypeVar
 import torch
 from torch import Tensor, nn
 
-from internav_data.camp.networks import EpisodeSegments
+from internav_data.camp.networks import ENCODERS, EpisodeSegments, SensorEncoder
 from internav_data.envs.sensors import DEFAULT_SENSORS, Sensor
 from internav_data.records.errors import UsageError
 
@@ -127,6 +127,8 @@ class Agent(nn.Module, ABC, Generic[R]):
 
     sensors: tuple[str | Sensor, ...] = DEFAULT_SENSORS
     """Sensors that the agent takes, or their names; see `internav_data.envs.sensors`."""
+    sensor_encoders: Mapping[str, type[SensorEncoder]] = ENCODERS
+    """Encoders of its sensors, by name."""
     uses_intent: bool = False
     """Whether its decisions take an intent P(i)."""
 
