@@ -123,3 +123,17 @@ def test_the_demo_makes_pictures_and_films(tmp_path):
     made = {path.name for path in Path(tmp_path).iterdir()}
     pictures = {"house.png", "blocked.png", "lengthened.png", "houses.png"}
     assert made == {"dataset", "page.html", "replay.gif", "replay.mp4", *pictures}
+
+
+def test_a_dataset_that_is_not_finished_is_named_so(tmp_path):
+    from internav_cli.main import cli
+
+    folder = shutil.copytree(MINI_FOLDER, tmp_path / "d")
+    words = ["stats", str(folder), "--json"]
+    assert CliRunner().invoke(cli, words).stderr == f"dataset: {folder}\n"
+    (folder / ".work").mkdir()
+    (folder / ".work" / "merging.json").write_text("{}")
+    said = CliRunner().invoke(cli, words).stderr
+    assert (
+        said == f"dataset: {folder}; unfinished: its first scenes, until what makes it has ended\n"
+    )
