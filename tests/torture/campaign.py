@@ -118,6 +118,7 @@ def _result(row: Row, key: str) -> dict[str, Any]:
         except Exception as error:  # noqa: BLE001 - whatever it is, it is the result
             where = traceback.extract_tb(error.__traceback__)[-1]
             said = " ".join(f"{type(error).__name__}: {error}".split())[:1000]
+            said = said.replace(tempfile.gettempdir(), "TMPDIR")
             line |= {"ok": False, "error": f"{Path(where.filename).name}:{where.lineno}: {said}"}
     line["seconds"] = round(time.monotonic() - began, 2)
     line["of"] = _code()
