@@ -101,3 +101,9 @@ def test_points_and_segments_are_polygons_too():
     assert planar.point_polygon_distance(1.0, 3.0, rod, 0, 2) == 3.0
     assert planar.polygon_distance(rod, 0, 2, dot, 0, 1) == 1.0
     assert not planar.inside(1.0, 1.0, dot, 0, 1)
+
+
+def test_a_triangle_is_the_smallest_polygon_that_holds_a_point():
+    corners = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 3.0]])
+    assert planar.inside(1.0, 1.0, corners, 0, 3)
+    assert not planar.inside(1.0, 0.0, corners, 0, 2), "a segment holds none"
