@@ -370,7 +370,11 @@ def open_file(root: StoreLike, file: DataFile, spec: TableSpec[Any]) -> TableFil
     """
     store = store_of(root)
     check_file(store, file)
-    if footer_sha256(store, file.path, file.bytes) != file.footer_sha256:
+    try:
+        footer = footer_sha256(store, file.path, file.bytes)
+    except OSError as error:  # a commit has removed it since
+        raise _missing(store, file, error) from None
+    if footer != file.footer_sha256:
         raise CorruptDataError(
             f"{store.at(file.path)}: the file's footer was damaged or edited: {_AGAIN}"
         )
@@ -407,14 +411,18 @@ def check_file(root: StoreLike, file: DataFile) -> None:
 
     """
     store = store_of(root)
-    path = store.at(file.path)
     try:
         size = store.size(file.path)
     except OSError as error:
-        raise CorruptDataError(
-            f"{path}: the file is missing ({error.strerror}): {_AGAIN}"
-        ) from None
+        raise _missing(store, file, error) from None
     if size != file.bytes:
         raise CorruptDataError(
-            f"{path}: expected {file.bytes} bytes, got {size} (truncated or edited): {_AGAIN}"
+            f"{store.at(file.path)}: expected {file.bytes} bytes, got {size} (truncated or edited): "
+            f"{_AGAIN}"
         )
+
+
+def _missing(store: Store, file: DataFile, error: OSError) -> CorruptDataError:
+    return CorruptDataError(
+        f"{store.at(file.path)}: the file is missing ({error.strerror}): {_AGAIN}"
+    )

@@ -140,6 +140,29 @@ def test_a_reader_that_loses_the_race_has_the_new_dataset(times):
     assert [episode.episode_id for episode in ds] == expected(10 + times)
 
 
+class ExtendedBetweenLooks(MemoryStore):
+    """A store that is extended between a look at the size of a shard and the first of its bytes."""
+
+    def __init__(self, blobs, later):
+        super().__init__(blobs)
+        self.later = later
+
+    def read(self, name, start=0, stop=None):
+        if name.startswith("data/") and name not in self.later:
+            self.blobs = self.later
+        return super().read(name, start, stop)
+
+
+def test_a_shard_that_is_removed_between_two_looks_is_found_in_its_successor():
+    store = MemoryStore()
+    extend(store, 0, 5)
+    later = MemoryStore(store.blobs)
+    extend(later, 5, 10)
+    ds = load_dataset(ExtendedBetweenLooks(store.blobs, later.blobs))
+    assert [episode.episode_id for episode in ds] == expected(5)
+    assert ds.store.blobs == later.blobs, "no shard was replaced"
+
+
 def test_a_race_that_never_ends_is_given_up(monkeypatch):
     digests = iter(range(1000))
     monkeypatch.setattr(snapshot, "read_manifest_and_digest", lambda _: (None, str(next(digests))))
