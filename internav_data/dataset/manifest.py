@@ -417,8 +417,8 @@ def check_file(root: StoreLike, file: DataFile) -> None:
         raise _missing(store, file, error) from None
     if size != file.bytes:
         raise CorruptDataError(
-            f"{store.at(file.path)}: expected {file.bytes} bytes, got {size} (truncated or edited): "
-            f"{_AGAIN}"
+            f"{store.at(file.path)}: expected {file.bytes} bytes, got {size} (truncated or "
+            f"edited): {_AGAIN}"
         )
 
 
