@@ -56,8 +56,10 @@ def stub(payload):
         with journal.open("a") as file:
             file.write(f"{scene}\n")
         time.sleep(orders.get("seconds", 0.0))
-        while scene in orders.get("linger", ()) and not (folder / "go").exists():
-            time.sleep(0.02)
+        if scene in orders.get("linger", ()):
+            (folder / f"lingers {scene}").write_text(str(os.getpid()))
+            while not (folder / "go").exists():
+                time.sleep(0.02)
         if scene in orders.get("kill_always", ()):
             os.kill(os.getpid(), signal.SIGKILL)
         if (

@@ -35,6 +35,8 @@ from internav_data.records.errors import UsageError
 CONFIG = load_config(overrides=["episodes_per_scene=3"])
 NODE = {"num_cpus": 1, "node_ip_address": "127.0.0.1", "object_store_memory": 80 << 20}
 SCENES = 14
+LINGERING = [6, 7]
+"""Scenes in the middle of which a node is lost."""
 RUN_STUB = Path(__file__).with_name("run_stub.py")
 
 
@@ -78,11 +80,21 @@ class LoseNode(GenerationProgress):
         self.cluster, self.node, self.folder = cluster, node, folder
 
     def tick(self):
-        journal = self.folder / "journal"
-        if self.node and journal.exists() and {"6", "7"} <= {*journal.read_text().split()}:
+        pids = [path.read_text() for path in self.folder.glob("lingers *")]
+        if self.node and all(pids) and len(pids) == len(LINGERING):
             self.cluster.remove_node(self.node, allow_graceful=False)
-            self.node = None
+            self.node, deadline = None, time.monotonic() + 60.0
+            # The node's process notices a moment later, and might end its scene until then.
+            while all(map(lives, pids)) and time.monotonic() < deadline:
+                time.sleep(0.05)
             (self.folder / "go").touch()
+
+
+def lives(pid):
+    try:
+        return Path("/proc", pid, "stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
 
 
 def test_a_node_is_lost_and_a_worker_dies_and_the_bytes_are_those_of_processes(
@@ -91,7 +103,7 @@ def test_a_node_is_lost_and_a_worker_dies_and_the_bytes_are_those_of_processes(
     # At another address than the head: the run's process joins a node at its own.
     node = cluster.add_node(**NODE | {"node_ip_address": "127.0.0.2"})
     cluster.wait_for_nodes()
-    orders = {"quarantine": [5], "kill_once": [9], "linger": [6, 7]}
+    orders = {"quarantine": [5], "kill_once": [9], "linger": LINGERING}
     folder = tmp_path / "ray"
     lose = LoseNode(cluster, node, folder)
     report, found = made(folder, "ray", address=cluster.address, progress=lose, **orders)
