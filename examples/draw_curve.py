@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 from pathlib import Path
 
 from internav_data.views import write_png
@@ -26,6 +27,13 @@ def points_of(run: Path, metric: str) -> list[tuple[float, float]]:
     return [(step, value) for step, value in found if value is not None]
 
 
+def ticks(most: float) -> list[float]:
+    """Return 0 and round numbers up to `most`, seven at most."""
+    size = 10.0 ** math.floor(math.log10(most / 6))
+    apart = next(times * size for times in (1, 2, 5, 10) if most <= 6 * times * size)
+    return [apart * k for k in range(int(most / apart) + 1)]
+
+
 def main() -> None:
     """Read the arguments and draw."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -42,10 +50,11 @@ def main() -> None:
 
     canvas = Canvas((-0.2, -0.2), (WIDTH + 0.15, HEIGHT + 0.15), 900, (255, 255, 255))
     for k in range(6):
-        x, y = WIDTH * k / 5, HEIGHT * k / 5
+        y = HEIGHT * k / 5
         canvas.line([(0, y), (WIDTH, y)], GREY, 1)
         canvas.text((-0.09, y), f"{top * k / 5:.1f}", 11, INK)
-        canvas.text((x, -0.07), f"{steps * k / 5000:.0f}", 11, INK)
+    for tick in ticks(steps):
+        canvas.text((WIDTH * tick / steps, -0.07), f"{tick / 1000:g}", 11, INK)
     canvas.text((WIDTH / 2, -0.15), "thousand environment steps", 11, INK)
     canvas.text((WIDTH / 2, HEIGHT + 0.08), options.metric, 13, INK)
     for k, (run, points) in enumerate(curves.items()):
