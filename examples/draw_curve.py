@@ -27,11 +27,11 @@ def points_of(run: Path, metric: str) -> list[tuple[float, float]]:
     return [(step, value) for step, value in found if value is not None]
 
 
-def ticks(most: float) -> list[float]:
-    """Return 0 and round numbers up to `most`, seven at most."""
-    size = 10.0 ** math.floor(math.log10(most / 6))
-    apart = next(times * size for times in (1, 2, 5, 10) if most <= 6 * times * size)
-    return [apart * k for k in range(int(most / apart) + 1)]
+def ticks(max_steps: float) -> list[float]:
+    """Return 0 and round numbers up to `max_steps`, seven at max_steps."""
+    size = 10.0 ** math.floor(math.log10(max_steps / 6))
+    apart = next(times * size for times in (1, 2, 5, 10) if max_steps <= 6 * times * size)
+    return [apart * k for k in range(int(max_steps / apart) + 1)]
 
 
 def main() -> None:
