@@ -28,7 +28,7 @@ def points_of(run: Path, metric: str) -> list[tuple[float, float]]:
 
 
 def ticks(max_steps: float) -> list[float]:
-    """Return 0 and round numbers up to `max_steps`, seven at max_steps."""
+    """Return 0 and round numbers up to `max_steps`, seven of them at most."""
     size = 10.0 ** math.floor(math.log10(max_steps / 6))
     apart = next(times * size for times in (1, 2, 5, 10) if max_steps <= 6 * times * size)
     return [apart * k for k in range(int(max_steps / apart) + 1)]
