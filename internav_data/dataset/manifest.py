@@ -21,7 +21,7 @@ from internav_data.core.storage import Store, StoreLike, exists, store_of
 from internav_data.dataset.compatibility import present_settings
 from internav_data.dataset.consistency import inconsistencies
 from internav_data.dataset.location import MINI, making_command
-from internav_data.dataset.parquet import TableFile, footer_sha256, open_parquet
+from internav_data.dataset.parquet import TableFile, footer_sha256, open_stored
 from internav_data.dataset.staging import IDENTITY, STAGING
 from internav_data.dataset.tables import FORMAT_VERSION, TABLES
 from internav_data.records import Split  # noqa: TC001 - as above
@@ -378,7 +378,7 @@ def open_file(root: StoreLike, file: DataFile, spec: TableSpec[Any]) -> TableFil
         raise CorruptDataError(
             f"{store.at(file.path)}: the file's footer was damaged or edited: {_AGAIN}"
         )
-    opened = open_parquet(store.at(file.path), spec, store.source(file.path))
+    opened = open_stored(store, file.path, spec)
     if opened.metadata.num_rows != file.rows:
         opened.close()
         raise CorruptDataError(

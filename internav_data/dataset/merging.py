@@ -15,14 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 import pyarrow as pa
 
-from internav_data.core.storage import (
-    Store,
-    StoreLike,
-    disk_errors,
-    exists,
-    final_of,
-    store_of,
-)
+from internav_data.core.storage import Store, StoreLike, disk_errors, exists, final_of, store_of
 from internav_data.dataset.commit import (
     Wanted,
     difference_of,

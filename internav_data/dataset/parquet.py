@@ -353,6 +353,24 @@ def open_parquet(
     return file
 
 
+def open_stored(store: Store, name: str, spec: TableSpec[Any]) -> TableFile:
+    """Open a Parquet file of the spec's columns in a store.
+
+    Raises
+    ------
+    CorruptDataError
+        As `open_parquet`.
+    StoreError
+        The store cannot be reached.
+
+    """
+    try:
+        source = store.source(name)
+    except FileNotFoundError:
+        raise CorruptDataError(f"{store.at(name)}: the file is missing: {MENDING}") from None
+    return open_parquet(store.at(name), spec, source)
+
+
 def read_table(path: Path, spec: TableSpec[Any], columns: Sequence[str] | None = None) -> pa.Table:
     """Return the table in a file, everything that is read of it verified.
 

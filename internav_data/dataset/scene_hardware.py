@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from internav_data.dataset.manifest import Manifest
     from internav_data.dataset.staging import SceneState
 
-_RANGES: Final = re.compile(r"\d{1,8}:\d{1,8}(?:,\d{1,8}:\d{1,8})*")
+_RANGES: Final = re.compile(r"\d{1,8}:\d{1,8}(?:,\d{1,8}:\d{1,8})*", re.ASCII)
 _NOBODY: Final = -1
 
 

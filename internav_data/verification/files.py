@@ -15,7 +15,7 @@ from internav_data.core.storage import (
 from internav_data.dataset import logical_digest, read_manifest
 from internav_data.dataset.journal import journal_names
 from internav_data.dataset.manifest import MANIFEST
-from internav_data.dataset.parquet import open_parquet
+from internav_data.dataset.parquet import open_stored
 from internav_data.dataset.tables import SPECS
 from internav_data.records.errors import CorruptDataError, InternavError, UsageError
 from internav_data.verification.findings import FindingCollector
@@ -123,7 +123,7 @@ def check_file(root: StoreLike, file: DataFile) -> FindingCollector:
         return report
     spec = SPECS[file.table]
     try:
-        with open_parquet(store.at(file.path), spec, store.source(file.path)) as opened:
+        with open_stored(store, file.path, spec) as opened:
             table = opened.read_as_written()
     except StoreError:
         raise  # of a bucket that cannot be reached nothing is known

@@ -12,7 +12,7 @@ from internav_data.core.storage import store_of
 from internav_data.core.worker_pool import WorkerPool
 from internav_data.dataset import ASSETS, EPISODES, SCENES, from_table
 from internav_data.dataset.manifest import MANIFEST, MANIFEST_LIMITS
-from internav_data.dataset.parquet import open_parquet
+from internav_data.dataset.parquet import open_stored
 from internav_data.records import LoaderStream, Purpose, generator
 from internav_data.records.errors import InternavError, UsageError
 from internav_data.verification.checked_config import CheckedConfig, checked_config
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 
     from internav_data.core.storage import Store, StoreLike
     from internav_data.dataset import DataFile, Manifest
-    from internav_data.dataset.parquet import TableFile
-    from internav_data.dataset.tables import TableSpec
     from internav_data.records import Episode, House
 
     Progress = Callable[[str, int, int], None]
@@ -326,7 +324,7 @@ def _shard_refs(store: Store, manifest: Manifest, damaged: frozenset[str]) -> li
         for file in manifest.of(name):
             if file.path in damaged:
                 continue
-            with _opened(store, file.path, spec) as parquet:
+            with open_stored(store, file.path, spec) as parquet:
                 for group in range(parquet.metadata.num_row_groups):
                     column = parquet.read_group(group, ["scene_id"])
                     for scene_id in column.column(0).unique().to_pylist():
@@ -335,10 +333,6 @@ def _shard_refs(store: Store, manifest: Manifest, damaged: frozenset[str]) -> li
         ShardRef(scene_id, found["scenes"][scene_id], found["episodes"].get(scene_id))
         for scene_id in sorted(found["scenes"], key=lambda s: (number_of(s), s))
     ]
-
-
-def _opened(store: Store, name: str, spec: TableSpec[Any]) -> TableFile:
-    return open_parquet(store.at(name), spec, store.source(name))
 
 
 class _Reader:
@@ -352,7 +346,7 @@ class _Reader:
         if name not in self._last or self._last[name][0] != row_group:
             file, group = row_group
             spec = SCENES if name == "scenes" else EPISODES
-            with _opened(self._store, file, spec) as parquet:
+            with open_stored(self._store, file, spec) as parquet:
                 table = parquet.read_group(group)
             extra: dict[str, Any] | None = {"assets": {}} if name == "scenes" else None
             self._last[name] = (row_group, from_table(table, spec, extra))
@@ -394,7 +388,7 @@ def _shapes(unit: Unit) -> Shapes:
     key = unit.assets.sha256
     if key not in _SHAPES:
         _SHAPES.clear()
-        with _opened(unit.store, unit.assets.path, ASSETS) as parquet:
+        with open_stored(unit.store, unit.assets.path, ASSETS) as parquet:
             table = parquet.read_all()
         _SHAPES[key] = Shapes({a.asset_id: a for a in from_table(table, ASSETS)})
     return _SHAPES[key]

@@ -10,7 +10,7 @@ import numpy as np
 
 from internav_data.core.storage import StoreError
 from internav_data.dataset import ASSETS, EPISODES, SCENES, from_table
-from internav_data.dataset.parquet import open_parquet
+from internav_data.dataset.parquet import open_stored
 from internav_data.dataset.tables import SPECS
 from internav_data.records import OUTSIDE
 from internav_data.records.errors import InternavError
@@ -102,7 +102,7 @@ def _check_table(
     unsafe.add(file.path)  # until its values are known
     spec = SPECS[file.table]
     try:
-        with open_parquet(store.at(file.path), spec, store.source(file.path)) as opened:
+        with open_stored(store, file.path, spec) as opened:
             table = opened.read_all()
     except StoreError:
         raise  # of a bucket that cannot be reached nothing is known

@@ -321,6 +321,7 @@ def test_all_hardware_that_made_a_dataset_is_named(tmp_path, monkeypatch):
         ({ours: "0:3,5:6", "another": "3:7"}, "expected scenes of"),
         ({ours: "5:6,0:3", "another": "3:5"}, "expected ranges that ascend"),
         ({ours: "0:3,5:6", "another": 3}, "expected ranges of scenes"),
+        ({ours: "0:3,5:6", "another": "\N{ARABIC-INDIC DIGIT THREE}:5"}, "expected ranges of"),
         ({ours: "0:6"}, "expected an object with the keys"),
     ):
         with pytest.raises(CorruptDataError, match=message):

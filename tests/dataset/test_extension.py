@@ -141,24 +141,32 @@ def test_a_reader_that_loses_the_race_has_the_new_dataset(times):
 
 
 class ExtendedBetweenLooks(MemoryStore):
-    """A store that is extended between a look at the size of a shard and the first of its bytes."""
+    """A store that is extended between two looks at a shard: at size, footer (read) and source."""
 
-    def __init__(self, blobs, later):
+    def __init__(self, blobs, later, call):
         super().__init__(blobs)
-        self.later = later
+        self.later, self.call = later, call
 
     def read(self, name, start=0, stop=None):
-        if name.startswith("data/") and name not in self.later:
-            self.blobs = self.later
+        self.extend_at("read", name)
         return super().read(name, start, stop)
 
+    def source(self, name):
+        self.extend_at("source", name)
+        return super().source(name)
 
-def test_a_shard_that_is_removed_between_two_looks_is_found_in_its_successor():
+    def extend_at(self, call, name):
+        if call == self.call and name.startswith("data/") and name not in self.later:
+            self.blobs = self.later
+
+
+@pytest.mark.parametrize("call", ["read", "source"])
+def test_a_shard_that_is_removed_between_two_looks_is_found_in_its_successor(call):
     store = MemoryStore()
     extend(store, 0, 5)
     later = MemoryStore(store.blobs)
     extend(later, 5, 10)
-    ds = load_dataset(ExtendedBetweenLooks(store.blobs, later.blobs))
+    ds = load_dataset(ExtendedBetweenLooks(store.blobs, later.blobs, call))
     assert [episode.episode_id for episode in ds] == expected(5)
     assert ds.store.blobs == later.blobs, "no shard was replaced"
 
