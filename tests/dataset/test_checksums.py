@@ -7,6 +7,7 @@ import io
 
 import pyarrow.parquet as pq
 import pytest
+from damage import flipped
 from memory_store import MemoryStore
 from page_headers import page_headers
 from strategies import rng
@@ -36,10 +37,6 @@ def few(tmp_path_factory):
     folder = tmp_path_factory.mktemp("checksums") / "few"
     write_synthetic(folder, 2, 3, full=True)
     return folder, read_manifest(folder).of("episodes")[0]
-
-
-def flipped(data, at, bit):
-    return data[:at] + bytes([data[at] ^ (1 << bit)]) + data[at + 1 :]
 
 
 def test_a_file_without_rows_is_read_by_columns(tmp_path):

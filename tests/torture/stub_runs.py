@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
+import functools
 import os
+import shutil
 import signal
+import tempfile
 import traceback
 from dataclasses import dataclass
+from pathlib import Path
 from unittest import mock
 
 from scene_stubs import CATALOGUE, plain
@@ -22,6 +27,43 @@ CONFIG = load_config(overrides=["episodes_per_scene=1"])
 OTHER = load_config(overrides=["episodes_per_scene=1", "seed=3"])
 SHARDS = {"episodes": 1, "scenes": 2}
 """Scenes a shard: a run of four commits twice on its way."""
+STRANGERS = {"notes.txt": b"precious", "data/mine.parquet": b"precious"}
+"""Files of somebody else beside a dataset."""
+_MEMORY = Path("/dev/shm")  # noqa: S108 - a folder of our own is made in it
+_ROOM_BYTES = 2 << 30
+"""Free space from which on a folder in memory is used."""
+
+
+@functools.cache
+def _scratch_root() -> Path:
+    """Return this process's folder in memory, or of temporary files where there is no room.
+
+    Faults are injected at calls, so that the file system below does not matter; in memory, waiting
+    for the disk costs nothing.
+    """
+    roomy = os.access(_MEMORY, os.W_OK) and shutil.disk_usage(_MEMORY).free >= _ROOM_BYTES
+    root = Path(tempfile.mkdtemp(prefix="torture-", dir=_MEMORY if roomy else None))
+    atexit.register(shutil.rmtree, root, ignore_errors=True)
+    return root
+
+
+def scratch(name: str) -> Path:
+    """Return a new folder for temporary files, which goes when this process ends."""
+    return Path(tempfile.mkdtemp(prefix=f"{name}-", dir=_scratch_root()))
+
+
+def in_scratch(run):
+    """Let a row's cases run in a scratch folder each, instead of the campaign's."""
+
+    @functools.wraps(run)
+    def wrapped(key, _folder):
+        folder = scratch("case")
+        try:
+            return run(key, folder)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    return wrapped
 
 
 @dataclass
@@ -67,25 +109,48 @@ def contents(folder):
     }
 
 
-def difference(found, wanted):
+def difference(actual, expected):
     """Return in what two contents differ, in a line; empty if in nothing."""
-    missing, left = wanted.keys() - found.keys(), found.keys() - wanted.keys()
-    other = {name for name in wanted.keys() & found.keys() if wanted[name] != found[name]}
+    missing, left = expected.keys() - actual.keys(), actual.keys() - expected.keys()
+    other = {name for name in expected.keys() & actual.keys() if expected[name] != actual[name]}
     kinds = {"missing": missing, "left over": left, "of other bytes": other}
     return "; ".join(f"{kind}: {', '.join(sorted(some))}" for kind, some in kinds.items() if some)
 
 
-def check_readable(folder, whole):
-    """Check that a folder holds no dataset, or one of the first scenes of a whole one."""
+@functools.cache
+def whole(scenes, *, other=False):
+    """Return a dataset that was made in one piece, of either config."""
+    folder = scratch("whole") / "d"
+    made(folder, scenes, OTHER if other else CONFIG)
+    return folder
+
+
+@functools.cache
+def whole_contents(scenes, *, other=False):
+    """Return the contents of a dataset that was made in one piece."""
+    return contents(whole(scenes, other=other))
+
+
+@functools.cache
+def _rows(folder):
+    """Return the rows of a dataset that does not change, by episode."""
+    return load_dataset(folder).to_table().sort_by("episode_id")
+
+
+def check_readable(folder, complete):
+    """Check that a folder holds no dataset, or one of the first scenes of a complete one.
+
+    The complete one must stay as it is. Returns the number of scenes.
+    """
     if not has_manifest(folder):
         return 0
     manifest = read_manifest(folder)
     scenes, lost = manifest.scenes, {entry.scene for entry in manifest.quarantined}
     table = load_dataset(folder).to_table().sort_by("episode_id")
-    wanted = load_dataset(whole).to_table().sort_by("episode_id")
     ids = {f"scene-{k:06d}" for k in range(scenes) if k not in lost}
-    kept = wanted.filter([row in ids for row in wanted["scene_id"].to_pylist()])
-    assert table.equals(kept), f"the dataset in place is not that of the first {scenes} scenes"
+    expected = _rows(complete)
+    expected = expected.filter([row in ids for row in expected["scene_id"].to_pylist()])
+    assert table.equals(expected), f"the dataset in place is not that of the first {scenes} scenes"
     return scenes
 
 
@@ -94,6 +159,7 @@ def forked(work):
 
     An error for users is its message after `error: `; any other its last lines.
     """
+    _scratch_root()  # the child's own would never go
     reader, writer = os.pipe()
     child = os.fork()
     if child == 0:

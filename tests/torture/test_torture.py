@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import dataclasses
 import itertools
 import json
 import sys
@@ -102,3 +103,18 @@ def test_results_are_lines_of_json():
     for path in (Path(__file__).parent / "results").glob("*.jsonl"):
         for line in map(json.loads, path.read_text().splitlines()):
             assert {"case", "ok", "seconds", "of", "machine"} <= line.keys()
+
+
+@pytest.mark.parametrize("kind", ["manifest", "episodes", "identity", "cache", "weights"])
+def test_damage_is_noticed_and_nothing_else(tmp_path, monkeypatch, kind):
+    name = bits.KINDS[kind].begin(tmp_path)
+    bits.check_undamaged(kind, tmp_path, name)
+    blind = dataclasses.replace(
+        bits.KINDS[kind], noticed=lambda *_: False, unread=lambda _: range(0)
+    )
+    monkeypatch.setitem(bits.KINDS, kind, blind)
+    with pytest.raises(AssertionError, match=r"bit 0 of byte 8: .* not noticed"):
+        bits.run(f"{kind} 0 8:9", tmp_path)
+    monkeypatch.setitem(bits.KINDS, kind, dataclasses.replace(blind, noticed=lambda *_: True))
+    with pytest.raises(AssertionError, match="refused undamaged"):
+        bits.run(f"{kind} 0 8:9", tmp_path)
