@@ -6,8 +6,12 @@ import ast
 import dataclasses
 import itertools
 import json
+import os
+import subprocess
 import sys
 import time
+from dataclasses import replace
+from importlib import util
 from pathlib import Path
 
 import pytest
@@ -19,10 +23,26 @@ import digests
 import faults
 import fuzz
 import kills
+import mutant
 import mutants
 import states
-from campaign import Row, lines_of, run_row, seconds_of, summary
+from campaign import (
+    Row,
+    code_digest,
+    lines_of,
+    newest_code,
+    run_row,
+    run_rows,
+    seconds_of,
+    standing,
+    summary,
+    to_run,
+)
 from stub_runs import forked
+
+_spec = util.spec_from_file_location("torture_command", Path(__file__).with_name("__main__.py"))
+command = util.module_from_spec(_spec)  # pytest's own is the __main__ that can be imported
+_spec.loader.exec_module(command)
 
 
 @pytest.mark.parametrize("fault", ["EIO", "ENOSPC", "SIGKILL"])
@@ -57,10 +77,10 @@ def test_changed_bytes_are_read_or_refused(tmp_path, name):
 
 
 def test_mutants_are_all_different():
-    target = mutants.TARGETS["advantages"]
-    _, _, count = mutants.mutated(target, None)
-    texts = {ast.unparse(mutants.mutated(target, number)[0]) for number in range(count)}
-    as_it_is = ast.unparse(ast.parse(mutants.place_of(target).read_text()))
+    target = mutant.TARGETS["advantages"]
+    _, _, count = mutant.mutated(target, None)
+    texts = {ast.unparse(mutant.mutated(target, number)[0]) for number in range(count)}
+    as_it_is = ast.unparse(ast.parse(mutant.source_of(target).read_text()))
     assert len(texts - {as_it_is}) == count > 10
 
 
@@ -71,6 +91,76 @@ def test_cases_of_digests_hold_every_pair_of_circumstances():
         assert pairs == set(itertools.product(digests.AXES[a], digests.AXES[b]))
 
 
+def _tests_with_mutant(folder, number, test, first="pass"):
+    """Run a test of a module of one function with a mutant of it; return the exit code."""
+    for name in ("made/module.py", "tests/test_it.py"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+    (folder / "made" / "module.py").write_text("def answer():\n    return 41\n")
+    (folder / "tests" / "test_it.py").write_text(test)
+    script = f"""import sys; sys.path[:0] = [{str(Path(__file__).parent)!r}, {str(folder)!r}]
+import mutant, pathlib; {first}
+mutant.ROOT, mutant.TARGETS["it"] = (
+    pathlib.Path({str(folder)!r}), mutant.Target("made.module", ("test_it.py",)))
+sys.exit(mutant.main())"""
+    env = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", script, "it", number],
+        cwd=folder,
+        env=env,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_tests_import_the_mutant_or_it_does_not_count(tmp_path):
+    test = "from made import module\ndef test_it():\n    assert module.answer() == 41\n"
+    assert _tests_with_mutant(tmp_path, "none", test)[0] == 0
+    assert mutants.how_it_ended(*_tests_with_mutant(tmp_path, "0", test)) == "tests failed"
+    code, _ = _tests_with_mutant(tmp_path, "0", "def test_it():\n    assert False\n")
+    assert code == mutant.NOT_LOADED
+    _, text = _tests_with_mutant(tmp_path, "0", test, "import made.module")
+    assert "made was imported before its mutant was there" in text
+
+
+def test_only_ends_that_a_mutant_caused_count():
+    ends = {
+        (0, ""): "survived",
+        (1, ""): "tests failed",
+        (None, ""): "timeout",
+        (2, "Interrupted: 1 error during collection"): "error during collection",
+        (4, "ImportError while loading conftest"): "ImportError while loading conftest",
+    }
+    assert {end: mutants.how_it_ended(*end) for end in ends} == ends
+    for code in (2, 3, 4, 5, -9, mutant.NOT_LOADED):
+        with pytest.raises(AssertionError, match=r"code|never imported"):
+            mutants.how_it_ended(code, "")
+
+
+def test_mutants_do_not_count_where_tests_fail_without(tmp_path, monkeypatch):
+    monkeypatch.setattr(mutants, "tests_with", lambda *_: (1, "broken"))
+    with pytest.raises(AssertionError, match="fail without a mutant: code 1: broken"):
+        mutants.run("manifest 0", tmp_path)
+
+
+def test_a_target_whose_mutants_survive_falls_short(tmp_path):
+    kills = {"a": [1] * 85 + [0] * 15, "b": [1] * 84 + [0] * 16}
+    lines = [
+        {"case": f"{name} {number}", "runs": 1, "killed": killed}
+        for name, each in kills.items()
+        for number, killed in enumerate(each)
+    ]
+    assert mutants.shortfalls([{"case": "a none", "runs": 0}, *lines]) == [
+        "b: 84 of 100 mutants killed, 85% asked"
+    ]
+    row = Row("some", lambda: ["b 0"], lambda *_: {"runs": 1, "killed": 0}, mutants.shortfalls)
+    run_row(row, time.monotonic() + 1000, results=tmp_path)
+    state = standing(row, newest_code([row], tmp_path), tmp_path)
+    assert not state.is_good
+    assert "0 of 1 mutants killed" in summary(row, state)
+
+
 def test_a_campaign_goes_on_where_it_was_stopped(tmp_path):
     def run(key, folder):
         assert not list(folder.iterdir())
@@ -78,18 +168,100 @@ def test_a_campaign_goes_on_where_it_was_stopped(tmp_path):
         return {"runs": 2}
 
     row, later = Row("some", lambda: ["a", "b", "c"], run), time.monotonic() + 1000
-    said: list[str] = []
-    arguments = {"results": tmp_path / "r", "say": said.append}
-    assert run_row(row, time.monotonic() - 1, **arguments) == []
-    assert run_row(row, later, **arguments) == ["b"]
-    assert "broken" in said[2]
+    reports: list[str] = []
+    options = {"results": tmp_path / "r", "report": reports.append, "code": "1"}
+    assert run_row(row, time.monotonic() - 1, **options) == []
+    assert run_row(row, later, **options) == ["b"]
+    assert "broken" in reports[2]
     (tmp_path / "mended").touch()
-    said.clear()
-    assert run_row(row, later, **arguments) == []
-    assert said == ["some: b: passed"]
-    assert summary(row, tmp_path / "r").startswith("some: 3 cases, 6 runs, 0 cases failed")
-    assert run_row(row, later, only="a", **arguments) == []
+    reports.clear()
+    assert run_row(row, later, **options) == []
+    assert reports == ["some: b: passed"]
+    state = standing(row, "1", tmp_path / "r")
+    assert summary(row, state).startswith("some: 3 of 3 cases (0 with older code), 6 runs, 0 cases")
+    assert run_row(row, later, only="a", **options) == []
     assert len(lines_of(tmp_path / "r" / "some.jsonl")) == 3
+
+
+def test_results_are_of_the_code_that_ran(tmp_path):
+    def run(key, _):
+        assert key != "broken"
+        return {"runs": 1}
+
+    cases = ["a", "b", "broken"]
+    later, options = time.monotonic() + 1000, {"results": tmp_path, "report": lambda _: None}
+    run_row(Row("some", lambda: cases, run), later, code="1", **options)
+    run_row(Row("some", lambda: ["a"], run), later, code="2", **options)
+    row = Row("some", lambda: [*cases, "new"], run)
+    lines = lines_of(tmp_path / "some.jsonl")
+    assert to_run(row.cases(), lines, "2") == ["new", "broken", "b"]
+    assert to_run(row.cases(), lines, "1") == ["new", "a", "broken"]
+    state = standing(row, "2", tmp_path)
+    assert (state.cases, state.current, state.older, state.failed) == (4, 1, 1, ("broken",))
+    assert not state.is_good
+    gone = Row("some", lambda: ["b"], run)
+    assert standing(gone, "2", tmp_path).is_good, "what is no case of the row does not count"
+
+
+def test_the_digest_of_the_code_is_that_of_its_files_without_results(tmp_path):
+    def digest():
+        return code_digest.__wrapped__(tmp_path)
+
+    (tmp_path / "tests" / "torture" / "results").mkdir(parents=True)
+    digests_seen = [digest()]
+    for name in ("tests/a.py", "tests/torture/results/a.jsonl"):
+        (tmp_path / name).write_text("1")
+        digests_seen.append(digest())
+    assert digests_seen[0] != digests_seen[1] == digests_seen[2]
+
+
+def test_a_line_that_a_kill_cut_is_no_result(tmp_path):
+    row, options = Row("some", lambda: ["a", "b"], lambda *_: {}), {"results": tmp_path}
+    path = tmp_path / "some.jsonl"
+    run_row(row, time.monotonic() + 1000, **options)
+    path.write_bytes(path.read_bytes()[:-20])
+    assert [line["case"] for line in lines_of(path)] == ["a"]
+    run_row(row, time.monotonic() + 1000, **options)
+    assert [line["case"] for line in lines_of(path)] == ["a", "b"]
+    assert len(path.read_text().splitlines()) == 2
+
+
+def test_rows_share_the_time(tmp_path, monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: clock[0])
+
+    def run(key, _):
+        clock[0] += 1
+        return {}
+
+    many = [str(number) for number in range(99)]
+    keys = {"a": ["0"], "b": many, "c": many}
+    rows = [Row(name, lambda name=name: keys[name], run) for name in keys]
+    run_rows(rows, 31, results=tmp_path, report=lambda _: None)
+    ran = {row.name: len(lines_of(tmp_path / f"{row.name}.jsonl")) for row in rows}
+    assert ran == {"a": 1, "b": 15, "c": 15}
+
+
+def test_a_case_needs_its_row(capsys):
+    assert command.arguments(["--row", "memory", "--case", "houses 2000"]).row == "memory"
+    for words, error in {
+        ("--case", "houses 2000"): "--case needs --row",
+        ("--row", "memory", "--case", "houses"): "row memory has no case 'houses'",
+        ("--budget", "2"): "BUDGET is '2'",
+    }.items():
+        with pytest.raises(SystemExit):
+            command.arguments(list(words))
+        assert error in capsys.readouterr().err
+
+
+def test_the_table_counts_what_ran_with_the_newest_code():
+    state = standing(Row("none", lambda: ["a"], lambda *_: {}), "")
+    assert command.cells(state) == ["0 of 1 cases; 0 runs", "not run", "0"]
+    state = replace(state, current=3, older=2, cases=9, runs=5, shortfalls=("b: too few",))
+    assert command.cells(state)[:2] == [
+        "3 of 9 cases, 2 more with older code; 5 runs",
+        "none failed; b: too few",
+    ]
 
 
 def test_budgets():
