@@ -7,6 +7,7 @@ or a test's dictionary can stand in for a folder.
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import itertools
 import os
@@ -344,10 +345,24 @@ def disk_errors(place: object) -> Iterator[None]:
         yield
     except OSError as error:
         where = error.filename or place
+        reason = f"{error.strerror or error}{_free_bytes(error, place)}"
         raise InternavError(
-            f"cannot write to {where}: {error.strerror or error}; make it writable or free some "
+            f"cannot write to {where}: {reason}; make it writable or free some "
             "space, then run the same command again: finished scenes are kept"
         ) from error
+
+
+def _free_bytes(error: OSError, place: object) -> str:
+    """Return how much is free at a place, for the error of a full disk; empty for any other.
+
+    Much that is free tells that a quota, or the number of files, is what has run out.
+    """
+    if error.errno != errno.ENOSPC or "://" in str(place):
+        return ""
+    for folder in (Path(str(place)), *Path(str(place)).parents):
+        with contextlib.suppress(OSError):
+            return f" ({shutil.disk_usage(folder).free:,} bytes free)"
+    return ""
 
 
 def _lock_file(folder: Path) -> tuple[Path, int]:

@@ -1,7 +1,7 @@
 """Fault points: calls of this process that change files below a folder, counted; one of them fails.
 
 Python asks its audit hooks before it opens, renames, links or removes anything, and a hook that
-raises stops the call. Writes and `fsync` are wrapped. `complete.py` compares what is counted with
+raises stops the call. Writes and `fsync` are wrapped. `faults.run` compares what is counted with
 the system calls of the same run.
 """
 
@@ -13,10 +13,7 @@ import io
 import os
 import signal
 import sys
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from pathlib import Path
 
 FAULTS = ("EIO", "ENOSPC", "SIGKILL")
 _CHANGES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC
@@ -32,10 +29,16 @@ _EVENTS = {
 }
 
 
+def mark_of(folder: str | Path) -> Path:
+    """Return the file beside a folder that is there once a fault has happened below it."""
+    return Path(f"{folder}.reached")
+
+
 class FaultPoints:
     """Counts the calls below a folder from the first one on; the call of number `at` fails.
 
-    With `only`, calls of that kind alone count.
+    With `only`, calls of that kind alone count. Before it fails, the file `mark_of(folder)` is
+    written, so that a run can be told in which there was no fault.
     """
 
     def __init__(
@@ -73,6 +76,7 @@ class FaultPoints:
         self.log.append((kind, os.path.relpath(path, self.folder)))
         if len(self.log) - 1 != self.at:
             return
+        mark_of(self.folder).touch()
         before()
         if self.fault == "SIGKILL":
             os.kill(os.getpid(), signal.SIGKILL)

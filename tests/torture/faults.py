@@ -12,16 +12,28 @@ import functools
 import itertools
 import json
 import os
+import re
 import shutil
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from campaign import Row
-from fault_points import FAULTS, FaultPoints
-from stub_runs import InOrder, check_readable, contents, difference, forked, made, merged, plain
+from fault_points import FAULTS, FaultPoints, mark_of
+from stub_runs import (
+    STRANGERS,
+    InOrder,
+    check_readable,
+    contents,
+    difference,
+    forked,
+    in_scratch,
+    made,
+    merged,
+    scratch,
+)
 from system_calls import strace, system_calls
+from worker_setups import POINT, with_fault_points
 
 from internav_data.core.storage import write_atomically
 from internav_data.generation.executors import ProcessExecutor
@@ -33,9 +45,9 @@ if TYPE_CHECKING:
 BLOCK = 10
 """Calls of one case."""
 SCENES = 4
-POINT = "INTERNAV_TORTURE_POINT"
-"""Environment variable with folder, number and fault for workers."""
-STRANGERS = {"notes.txt": b"precious", "data/mine.parquet": b"precious"}
+_STRERROR = {"EIO": "Input/output error", "ENOSPC": "No space left on device"}
+_FREE = re.compile(r"\(\d[\d,]* bytes free\)")
+"""What an error for a full disk says besides."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +62,10 @@ class Scenario:
     """Whether readers may refuse the dataset until the command has ended."""
     in_worker: bool = False
     """Whether faults happen in a worker process."""
+
+    def watched(self, folder: Path) -> Path:
+        """Return the folder below which calls count."""
+        return folder / "d" if self.in_worker else folder
 
 
 def _extended(folder):
@@ -89,31 +105,6 @@ def _whole(folder):
     return made(folder / "d", SCENES)
 
 
-def watching(payload):
-    """Make plain scenes in a worker whose calls are fault points, as the environment says."""
-    if POINT in os.environ:
-        folder, at, fault = json.loads(os.environ[POINT])
-        # A worker that takes the place of a killed one is well.
-        with Path(folder, "workers").open("a") as file:
-            file.write("one\n")
-        if len(Path(folder, "workers").read_text().split()) == 1:
-            points = FaultPoints(Path(folder, "d"), at, fault)
-            points.install()
-            _WATCHED.append(points)
-    work = plain(payload)
-
-    def make(scene):
-        count = work(scene)
-        for points in _WATCHED:  # `calls` reads how many there were
-            with Path(points.folder).with_name("log").open("w") as file:
-                json.dump(points.log, file)
-        return count
-
-    return make
-
-
-_WATCHED: list[FaultPoints] = []
-
 SCENARIOS = {
     "new": Scenario(lambda _: None, _whole),
     "extend": Scenario(_extended, _whole),
@@ -123,7 +114,7 @@ SCENARIOS = {
     "merge": Scenario(_parts, _merged),
     "worker": Scenario(
         lambda _: None,
-        lambda f: made(f / "d", SCENES, executor=ProcessExecutor(1), setup=watching),
+        lambda f: made(f / "d", SCENES, executor=ProcessExecutor(1), setup=with_fault_points),
         in_worker=True,
     ),
 }
@@ -132,7 +123,7 @@ SCENARIOS = {
 @functools.cache
 def _begun(name: str) -> Path:
     """Return a folder as a scenario begins in it; copied for each run."""
-    folder = Path(tempfile.mkdtemp(prefix="torture-begun-"))
+    folder = scratch("begun")
     SCENARIOS[name].begin(folder)
     return folder
 
@@ -140,42 +131,55 @@ def _begun(name: str) -> Path:
 @functools.cache
 def _ended(name: str) -> Path:
     """Return a folder as it is after the command of a scenario without a fault."""
-    folder = Path(tempfile.mkdtemp(prefix="torture-ended-"))
+    folder = scratch("ended")
     shutil.copytree(_begun(name), folder, dirs_exist_ok=True)
     SCENARIOS[name].act(folder)
     return folder
 
 
 @functools.cache
+def _ended_contents(name: str) -> dict[str, bytes | None]:
+    return contents(_ended(name))
+
+
+@functools.cache
 def calls(name: str) -> list[tuple[str, str]]:
     """Return the calls of a scenario that change the disk: kind, and path below its folder."""
     _ended(name)  # what is imported late is by now
-    with tempfile.TemporaryDirectory(prefix="torture-") as folder:
-        shutil.copytree(_begun(name), folder, dirs_exist_ok=True)
-        text = _faulty(name, Path(folder), None, "SIGKILL")
-        return [tuple(call) for call in json.loads(text)]
+    folder = scratch("calls")
+    shutil.copytree(_begun(name), folder, dirs_exist_ok=True)
+    text = _faulty(name, folder, None, "SIGKILL")
+    shutil.rmtree(folder)
+    return [tuple(call) for call in json.loads(text)]
 
 
 def _faulty(name: str, folder: Path, at: int | None, fault: str) -> str:
-    """Run a command with a fault in a copy of this process; without one, return its calls."""
+    """Run a command with a fault in a copy of this process; without one, return its calls.
+
+    Asserts that the fault has happened.
+    """
     scenario = SCENARIOS[name]
 
-    def watched():
+    def here():
         points = FaultPoints(folder, at, fault)
         points.install()
         scenario.act(folder)
-        return json.dumps([(kind, _plain(path)) for kind, path in points.log])
+        return json.dumps([(kind, _without_process(path)) for kind, path in points.log])
 
     def in_worker():
         os.environ[POINT] = json.dumps([str(folder), at, fault])
         scenario.act(folder)
         log = json.loads((folder / "log").read_text()) if at is None else []
-        return json.dumps([(kind, _plain(f"d/{path}")) for kind, path in log])
+        return json.dumps([(kind, _without_process(f"d/{path}")) for kind, path in log])
 
-    return forked(in_worker if scenario.in_worker else watched)
+    outcome = forked(in_worker if scenario.in_worker else here)
+    mark = mark_of(scenario.watched(folder))
+    assert mark.exists() == (at is not None), f"call {at} was not reached: {outcome}"
+    mark.unlink(missing_ok=True)
+    return outcome
 
 
-def _plain(path: str) -> str:
+def _without_process(path: str) -> str:
     """Return the path of a temporary file without the number of its process."""
     head, _, last = path.rpartition(".")
     return head.rpartition(".")[0] if last == "tmp" else path
@@ -221,49 +225,54 @@ def _compared(name: str, folder: Path):
         f"text = faults._faulty({name!r}, pathlib.Path({str(folder / 'run')!r}), None, '')\n"
         f"pathlib.Path({str(folder / 'calls')!r}).write_text(text)"
     )
-    found = [
-        (kind, _plain(path))
+    traced = [
+        (kind, _without_process(path))
         for kind, path in system_calls(script, folder / "run")
         if path == "d" or path.startswith("d/")
     ]
     counted = [tuple(call) for call in json.loads((folder / "calls").read_text())]
     if SCENARIOS[name].in_worker:
         kinds = {"unlink", "rmdir"}  # of its parent alone
-        counted, found = (
+        counted, traced = (
             [call for call in some if ".work/scenes/" in call[1] and call[0] not in kinds]
-            for some in (counted, found)
+            for some in (counted, traced)
         )
-    assert found == counted, next(
+    assert traced == counted, next(
         (k, pair)
-        for k, pair in enumerate(itertools.zip_longest(found, counted))
+        for k, pair in enumerate(itertools.zip_longest(traced, counted))
         if len({*pair}) > 1
     )
-    return {"runs": 1, "system_calls": len(found)}
+    return {"runs": 1, "system_calls": len(traced)}
 
 
 def run_one(name: str, fault: str, at: int, folder: Path, where: str) -> None:
     """Run a scenario with one fault, then again without."""
+    scenario = SCENARIOS[name]
     shutil.copytree(_begun(name), folder)
-    said = _faulty(name, folder, at, fault)
-    if fault == "SIGKILL" and not SCENARIOS[name].in_worker:
-        assert said == "killed by SIGKILL", f"{where}: {said}"
+    outcome = _faulty(name, folder, at, fault)
+    if fault == "SIGKILL" and not scenario.in_worker:
+        assert outcome == "killed by SIGKILL", f"{where}: {outcome}"
     else:
-        assert not said.startswith(("bug", "killed")), f"{where}: {said}"
-    if said.startswith("error"):
-        strerror = {"EIO": "Input/output error", "ENOSPC": "No space left on device"}[fault]
-        assert "\n" not in said, f"{where}: {said}"
-        assert str(folder) in said, f"{where}: no path: {said}"
-        assert strerror in said, f"{where}: {said}"
-        assert "space" in said, f"{where}: {said}"
-    with contextlib.suppress(*((CorruptDataError,) if SCENARIOS[name].damaged else ())):
+        assert not outcome.startswith(("bug", "killed")), f"{where}: {outcome}"
+    if outcome.startswith("error"):
+        _check_message(outcome, fault, folder, where)
+    with contextlib.suppress(*((CorruptDataError,) if scenario.damaged else ())):
         check_readable(folder / "d", _ended(name) / "d")
-    SCENARIOS[name].act(folder)
+    scenario.act(folder)
     for trace in ("workers", "log"):
         (folder / trace).unlink(missing_ok=True)
-    wanted = contents(_ended(name))
-    found = difference(contents(folder), wanted)
-    assert not found, f"{where}: after the same command again: {found}"
+    differences = difference(contents(folder), _ended_contents(name))
+    assert not differences, f"{where}: after the same command again: {differences}"
     shutil.rmtree(folder)
 
 
-ROW = Row("faults", cases, run)
+def _check_message(message: str, fault: str, folder: Path, where: str) -> None:
+    """Check that an error of the disk is one line with its path, its cause and what to do."""
+    assert "\n" not in message, f"{where}: {message}"
+    assert str(folder) in message, f"{where}: no path: {message}"
+    assert _STRERROR[fault] in message, f"{where}: {message}"
+    assert "run the same command again" in message, f"{where}: {message}"
+    assert bool(_FREE.search(message)) == (fault == "ENOSPC"), f"{where}: {message}"
+
+
+ROW = Row("faults", cases, in_scratch(run))

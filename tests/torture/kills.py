@@ -1,28 +1,44 @@
 """SIGKILL of the group, the parent or a worker at random moments, and of the group at every fsync.
 
 A case is "group 17", "parent 17" or "worker 17", a seed that draws the moment, or "fsync 17", the
-call. Then another config is tried in the same folder, and the same command goes on.
+call. Then another config is tried in the same folder, and the same command goes on. A random moment
+may be one at which there is nobody to kill: `runs` counts the kills that happened.
 """
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import os
+import shutil
 import signal
-import tempfile
 import time
-from pathlib import Path
+import traceback
+from typing import TYPE_CHECKING
 
 import psutil
 from campaign import Row
 from fault_points import FaultPoints
 from strategies import rng
-from stub_runs import CONFIG, OTHER, check_readable, contents, difference, made, plain
+from stub_runs import (
+    OTHER,
+    check_readable,
+    contents,
+    difference,
+    forked,
+    in_scratch,
+    made,
+    scratch,
+    whole,
+    whole_contents,
+)
+from worker_setups import recording_workers
 
 from internav_data.core.storage import LockedError
 from internav_data.generation.executors import ProcessExecutor
-from internav_data.records.errors import InternavError, UsageError
+from internav_data.records.errors import UsageError
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 SCENES, WORKERS = 6, 2
 MOMENTS = 200
@@ -30,55 +46,50 @@ MOMENTS = 200
 _WAIT_S = 120.0
 
 
-def noted(payload):
-    """Make plain scenes; the process is noted beside the dataset."""
-    with (payload.staging.store.root.parent / "workers").open("a") as file:
-        file.write(f"{os.getpid()}\n")
-    work = plain(payload)
-
-    def make(scene):
-        time.sleep(0.01 * (scene % 3))
-        return work(scene)
-
-    return make
-
-
 def _run(out):
-    made(out, SCENES, executor=ProcessExecutor(WORKERS), setup=noted)
+    made(out, SCENES, executor=ProcessExecutor(WORKERS), setup=recording_workers)
 
 
 def _started(out: Path, *, fsync: int | None = None) -> int:
-    """Start a run in a process group of its own; return its process."""
+    """Start a run in a process group of its own; return its process.
+
+    An error of it goes into the file `error` beside the dataset, see `_ended`.
+    """
     child = os.fork()
     if child:
         return child
-    code = 1
-    with contextlib.suppress(BaseException):
+    try:
         os.setsid()
         if fsync is not None:
             FaultPoints(out, fsync, "SIGKILL of the group", only="fsync").install()
         _run(out)
-        code = 0
-    os._exit(code)
+    except BaseException:  # noqa: BLE001 - it is the result
+        out.with_name("error").write_text(traceback.format_exc())
+        os._exit(1)
+    os._exit(0)
 
 
-@functools.cache
-def _whole(*, other: bool = False) -> Path:
-    """Return a dataset of a run without kills."""
-    folder = Path(tempfile.mkdtemp(prefix="torture-whole-"))
-    made(folder / "d", SCENES, OTHER if other else CONFIG)
-    return folder / "d"
+def _ended(process: int, out: Path) -> bool:
+    """Wait for a run; return whether it was killed. Asserts that else it ended well."""
+    _, status = os.waitpid(process, 0)
+    if os.WIFSIGNALED(status):
+        assert os.WTERMSIG(status) == signal.SIGKILL, f"the run died of {os.WTERMSIG(status)}"
+        return True
+    error = out.with_name("error")
+    assert status == 0, error.read_text() if error.exists() else f"the run ended with {status}"
+    return False
 
 
 @functools.cache
 def _seconds() -> float:
     """Return the seconds of a run, from its first worker on."""
-    with tempfile.TemporaryDirectory(prefix="torture-") as folder:
-        process = _started(Path(folder) / "d")
-        _wait_for_workers(Path(folder))
-        began = time.monotonic()
-        os.waitpid(process, 0)
-        return time.monotonic() - began
+    folder = scratch("unkilled")
+    process = _started(folder / "d")
+    _wait_for_workers(folder)
+    began = time.monotonic()
+    assert not _ended(process, folder / "d")
+    shutil.rmtree(folder)
+    return time.monotonic() - began
 
 
 def _wait_for_workers(folder: Path) -> None:
@@ -99,7 +110,8 @@ def _runs(pid: int) -> bool:
         return False
 
 
-def _kill(target: str, process: int, folder: Path) -> None:
+def _kill(target: str, process: int, folder: Path) -> bool:
+    """Kill what is the target; return whether a worker was killed."""
     if target == "group":
         os.killpg(process, signal.SIGKILL)
     elif target == "parent":
@@ -108,6 +120,8 @@ def _kill(target: str, process: int, folder: Path) -> None:
         alive = [pid for pid in _workers(folder) if _runs(pid)]
         if alive:  # it may be before its first worker, or after its last
             os.kill(alive[-1], signal.SIGKILL)
+            return True
+    return False
 
 
 def _another_config(out: Path) -> bool:
@@ -118,8 +132,8 @@ def _another_config(out: Path) -> bool:
     except UsageError:
         assert not difference(contents(out), before), "a config that is refused changed something"
         return False
-    found = difference(contents(out), contents(_whole(other=True)))
-    assert not found, f"another config in the same folder: {found}"
+    differences = difference(contents(out), whole_contents(SCENES, other=True))
+    assert not differences, f"another config in the same folder: {differences}"
     return True
 
 
@@ -136,52 +150,62 @@ def _again(out: Path) -> None:
             return
 
 
+def _killed(target: str, number: int, out: Path) -> tuple[bool, float]:
+    """Run and kill; return whether a kill happened, and at which second after the first worker."""
+    if target == "fsync":
+        assert _ended(_started(out, fsync=number), out), "the run ended before the fsync"
+        return True, 0.0
+    seconds = _seconds()
+    process = _started(out)
+    if number % 10:  # most of the time passes before there is one
+        _wait_for_workers(out.parent)
+    moment = float(rng([len(target), number]).uniform(0.0, 1.05 * seconds))
+    time.sleep(moment)
+    worker_killed = _kill(target, process, out.parent)
+    run_killed = _ended(process, out)
+    assert target != "worker" or not run_killed, "a run ends well though a worker was killed"
+    return worker_killed or run_killed, moment
+
+
 def run(key: str, folder: Path):
     """Kill a run, try another config, run the same command again."""
-    target, number = key.split()
-    whole, seconds, out = _whole(), _seconds(), folder / "d"
-    process = _started(out, fsync=int(number) if target == "fsync" else None)
-    moment = 0.0
-    if target != "fsync":
-        if int(number) % 10:  # most of the time passes before there is one
-            _wait_for_workers(folder)
-        moment = float(rng([len(target), int(number)]).uniform(0.0, 1.05 * seconds))
-        time.sleep(moment)
-        _kill(target, process, folder)
-    _, status = os.waitpid(process, 0)
-    if target == "worker":
-        assert status == 0, "a run ends well though a worker was killed"
+    target, text = key.split()
+    number, out = int(text), folder / "d"
+    happened, moment = _killed(target, number, out)
+    figures = {"runs": int(happened), "killed": happened, "at_s": round(moment, 3)}
     deadline = time.monotonic() + _WAIT_S
     while any(map(_runs, _workers(folder))):
         assert time.monotonic() < deadline, "workers outlive their run"
         time.sleep(0.02)
-    readable = check_readable(out, whole)
-    if out.exists() and int(number) % 2 and _another_config(out):
-        return {"runs": 1, "at_s": round(moment, 3), "then": "another config"}
+    readable = check_readable(out, whole(SCENES))
+    if out.exists() and number % 2 and _another_config(out):
+        return {**figures, "then": "another config"}
     _again(out)
-    found = difference(contents(out), contents(whole))
-    assert not found, f"after the same command again: {found}"
-    return {"runs": 1, "at_s": round(moment, 3), "of_s": round(seconds, 3), "readable": readable}
+    differences = difference(contents(out), whole_contents(SCENES))
+    assert not differences, f"after the same command again: {differences}"
+    return {**figures, "of_s": round(_seconds(), 3), "readable": readable}
 
 
-def _fsyncs() -> int:
+@functools.cache
+def count_fsyncs() -> int:
     """Return the number of times that the parent of a run waits for the disk."""
-    with tempfile.TemporaryDirectory(prefix="torture-") as folder:
-        child = os.fork()
-        if child == 0:
-            with contextlib.suppress(InternavError):
-                points = FaultPoints(Path(folder), None, only="fsync")
-                points.install()
-                made(Path(folder) / "d", SCENES, executor=ProcessExecutor(WORKERS), setup=noted)
-                Path(folder, "count").write_text(str(len(points.log)))
-            os._exit(0)
-        os.waitpid(child, 0)
-        return int(Path(folder, "count").read_text())
+    folder = scratch("fsyncs")
+
+    def count():
+        points = FaultPoints(folder, only="fsync")
+        points.install()
+        _run(folder / "d")
+        return len(points.log)
+
+    outcome = forked(count)
+    assert outcome.isdigit(), outcome
+    shutil.rmtree(folder)
+    return int(outcome)
 
 
 def cases():
     """Yield the four targets in turns."""
-    fsyncs = _fsyncs()
+    fsyncs = count_fsyncs()
     for number in range(max(MOMENTS, fsyncs)):
         if number < MOMENTS:
             yield from (f"{target} {number}" for target in ("group", "parent", "worker"))
@@ -189,4 +213,4 @@ def cases():
             yield f"fsync {number * 37 % fsyncs if fsyncs % 37 else number}"
 
 
-ROW = Row("kills", cases, run)
+ROW = Row("kills", cases, in_scratch(run))

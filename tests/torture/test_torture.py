@@ -290,3 +290,25 @@ def test_damage_is_noticed_and_nothing_else(tmp_path, monkeypatch, kind):
     monkeypatch.setitem(bits.KINDS, kind, dataclasses.replace(blind, noticed=lambda *_: True))
     with pytest.raises(AssertionError, match="refused undamaged"):
         bits.run(f"{kind} 0 8:9", tmp_path)
+
+
+def test_a_fault_that_does_not_happen_fails_its_case(tmp_path):
+    beyond = len(faults.calls("extend"))
+    with pytest.raises(AssertionError, match=f"call {beyond} was not reached"):
+        faults.run_one("extend", "EIO", beyond, tmp_path / "run", "the end")
+
+
+def test_a_run_that_fails_by_itself_or_is_not_killed_fails_its_case(tmp_path, monkeypatch):
+    monkeypatch.setattr(kills, "_run", lambda _: None)
+    with pytest.raises(AssertionError, match="ended before the fsync"):
+        kills.run("fsync 0", tmp_path)
+
+    def broken(_):
+        raise ValueError("a bug")
+
+    monkeypatch.setattr(kills, "_run", broken)
+    with pytest.raises(AssertionError, match="ValueError: a bug"):
+        kills.run("fsync 0", tmp_path)
+    kills.count_fsyncs.cache_clear()
+    with pytest.raises(AssertionError, match="ValueError: a bug"):
+        next(kills.cases())
