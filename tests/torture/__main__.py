@@ -69,7 +69,7 @@ ASKED = {
         "torture/test_torture.py::test_mutants_are_all_different",
     ),
     "memory": (
-        "2,000 houses, 1,000,000 steps: under 10 kB each in the second half",
+        "2,000 houses, 2,400 scenes, 1,000,000 steps: under 10 kB each (100 steps) in the 2nd half",
         "envs/test_environment.py::test_memory_stays_flat",
     ),
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import dataclasses
 import itertools
 import json
@@ -14,6 +15,7 @@ from dataclasses import replace
 from importlib import util
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -23,6 +25,7 @@ import digests
 import faults
 import fuzz
 import kills
+import memory
 import mutant
 import mutants
 import states
@@ -38,6 +41,7 @@ from campaign import (
     summary,
     to_run,
 )
+from strategies import rng
 from stub_runs import forked
 
 _spec = util.spec_from_file_location("torture_command", Path(__file__).with_name("__main__.py"))
@@ -159,6 +163,51 @@ def test_a_target_whose_mutants_survive_falls_short(tmp_path):
     state = standing(row, newest_code([row], tmp_path), tmp_path)
     assert not state.is_good
     assert "0 of 1 mutants killed" in summary(row, state)
+
+
+def test_the_clock_of_digests_is_moved_in_processes_that_are_started():
+    for clock in ("1970", "2040"):
+        digests.check_clock(clock)
+
+
+def test_a_clock_that_is_not_moved_is_noticed(monkeypatch):
+    monkeypatch.setattr(digests, "_CLOCK", "")
+    with pytest.raises(AssertionError, match="the clock of 2040 is not moved"):
+        digests.check_clock.__wrapped__("2040")
+
+
+@pytest.mark.parametrize(
+    ("slope_kb", "noise_kb", "error"),
+    [(0.0, 10.0, None), (8.0, 10.0, None), (11.0, 10.0, "grows"), (8.0, 20_000.0, "grows")],
+)
+def test_growth_is_bounded_by_the_upper_end_of_its_interval(slope_kb, noise_kb, error):
+    noise = rng(0).normal(scale=noise_kb, size=100)
+    done = np.arange(1, 101) * 20
+    fills = np.minimum(done, 900) * 100.0  # caches, in the first half
+    memory_kb = 500_000 + fills + slope_kb * done + noise
+    figures = memory.figures([(at, kb, 5, 0, 1) for at, kb in zip(done, memory_kb, strict=True)])
+    assert figures["low_kb"] <= figures["slope_kb"] <= figures["high_kb"]
+    with pytest.raises(AssertionError, match=error) if error else contextlib.nullcontext():
+        memory.check(figures)
+
+
+@pytest.mark.parametrize("name", memory.CONSTANT)
+def test_handles_shared_memory_and_threads_do_not_grow(name):
+    column = 2 + memory.CONSTANT.index(name)
+    rows = [[at, 500_000.0, 5, 0, 1] for at in range(100)]
+    memory.check(memory.figures(rows))
+    rows[-1][column] += 1
+    with pytest.raises(AssertionError, match=f"{name} from"):
+        memory.check(memory.figures(rows))
+
+
+def test_memory_that_is_held_counts_and_freed_memory_does_not():
+    before, *_ = memory.held()
+    block = np.ones(40 << 17)
+    during, *_ = memory.held()
+    del block
+    after, *_ = memory.held()
+    assert during - before > 30_000 > abs(after - before)
 
 
 def test_a_campaign_goes_on_where_it_was_stopped(tmp_path):
