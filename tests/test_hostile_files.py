@@ -142,7 +142,10 @@ JSON = {
     "actions.json": (read_actions, {"episode_id": "e", "actions": ["MoveAhead", 11]}),
     "manifest.json": (_manifest, json.loads((DATASET / "manifest.json").read_text())),
     "checkpoint.json": (_checkpoint, json.loads((AGENT / "checkpoint.json").read_text())),
-    "checkpoints.json": (_pointers, {"last": "3", "best": "2", "serial": 3, "best_score": 0.5}),
+    "checkpoints.json": (
+        _pointers,
+        with_sha256({"last": "3", "best": "2", "serial": 3, "best_score": 0.5}),
+    ),
     "evaluation.json": (_evaluation, EVALUATION),
     ".work/identity.json": (_identity, asdict(identity_of(read_manifest(DATASET)))),
 }

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from internav_data.core.lazy import lazy_imports
 
 if TYPE_CHECKING:
-    from internav_data.camp.agents import make_agent
     from internav_data.camp.agents.protocol import (
         Agent,
         AgentStep,
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
         one_step,
         reset_where_done,
     )
-    from internav_data.camp.checkpoint import export_agent, load_agent
     from internav_data.camp.config import CampConfig, preset
     from internav_data.camp.networks import (
         Encoder,
@@ -30,7 +28,7 @@ if TYPE_CHECKING:
         entropy_of,
         log_prob_of,
     )
-    from internav_data.camp.rollout import Collector, Rollout, uniforms_of
+    from internav_data.camp.rollout import Collector, uniforms_of
 
 __all__ = [
     "Agent",
@@ -41,15 +39,11 @@ __all__ = [
     "Encoder",
     "Evaluated",
     "RecurrentActorCritic",
-    "Rollout",
     "State",
     "StepRecord",
     "drawn",
     "entropy_of",
-    "export_agent",
-    "load_agent",
     "log_prob_of",
-    "make_agent",
     "one_step",
     "preset",
     "reset_where_done",
@@ -59,14 +53,12 @@ __all__ = [
 __getattr__, __dir__ = lazy_imports(
     __name__,
     {
-        "agents": ["make_agent"],
         "agents.protocol": [
             "Agent", "AgentStep", "Batch", "Evaluated", "State", "StepRecord", "one_step",
             "reset_where_done",
         ],
-        "checkpoint": ["export_agent", "load_agent"],
         "config": ["CampConfig", "preset"],
         "networks": ["Encoder", "RecurrentActorCritic", "drawn", "entropy_of", "log_prob_of"],
-        "rollout": ["Collector", "Rollout", "uniforms_of"],
+        "rollout": ["Collector", "uniforms_of"],
     },
 )  # fmt: skip

@@ -12,7 +12,6 @@ name, and back.
 
 from __future__ import annotations
 
-import itertools
 import json
 import platform
 import re
@@ -21,7 +20,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import safetensors
 import torch
@@ -34,10 +33,10 @@ from internav_data.camp.agents.protocol import Agent, State
 from internav_data.camp.config import CampConfig, from_mapping, preset
 from internav_data.camp.stages import check_parts
 from internav_data.core import config as values
+from internav_data.core.config import Bounds
 from internav_data.core.files import (
     FileLimits,
     check_sha256,
-    open_regular,
     read_json,
     size_of_regular,
     with_sha256,
@@ -67,19 +66,7 @@ _FILE: Final = FileLimits(
     remedy="copy the checkpoint again", max_bytes=256_000_000, max_values=50_000_000
 )
 """Limits of the JSON files; the actions of 65,536 environments stay below."""
-_BEFORE_DIGESTS: Final = (
-    *("format", "method", "config", "progress", "files", "versions"),
-    *("serial", "last", "best", "best_score", "leftovers"),
-)
-"""Keys of checkpoints and of lists of them that may lack their digest."""
 _MAX_TENSOR_BYTES: Final = 16_000_000_000
-_MAX_HEADER_BYTES: Final = 10_000_000
-"""Size of a safetensors file's list of tensors, which is read into memory."""
-_DTYPES: Final = {
-    torch.float32: "F32", torch.float64: "F64", torch.float16: "F16", torch.bfloat16: "BF16",
-    torch.int64: "I64", torch.int32: "I32", torch.uint8: "U8", torch.bool: "BOOL",
-}  # fmt: skip
-"""Names of types in safetensors files."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,11 +113,10 @@ def save(run: Path, checkpoint: Checkpoint, *, score: float | None = None) -> Pa
 
 def _next_folder(run: Path, known: Mapping[str, Any]) -> Path:
     """Return the first folder after the last checkpoint's that nobody has made."""
-    for serial in itertools.count(int(known.get("serial", 0)) + 1):
-        folder = run / FOLDER / f"{serial:06d}"
-        if not folder.exists():
-            return folder
-    raise AssertionError  # pragma: no cover - numbers do not end
+    serial = int(known.get("serial", 0)) + 1
+    while (run / FOLDER / f"{serial:06d}").exists():
+        serial += 1
+    return run / FOLDER / f"{serial:06d}"
 
 
 def _swept(run: Path, pointer: dict[str, Any]) -> dict[str, Any]:
@@ -213,7 +199,7 @@ def read(path: Path, which: str = "last", *, training: bool = True) -> Checkpoin
             f"{folder / ABOUT}: format {about.get('format')!r}: this release reads {FORMAT}; "
             "read it with the release that wrote it"
         )
-    check_sha256(about, folder / ABOUT, _FILE, _BEFORE_DIGESTS)
+    check_sha256(about, folder / ABOUT, _FILE, ())
     method, files, progress = (about.get(name) for name in ("method", "files", "progress"))
     if not isinstance(method, str) or not isinstance(files, dict) or not isinstance(progress, dict):
         raise CorruptDataError(f"{folder / ABOUT}: expected a method, files and progress")
@@ -223,8 +209,14 @@ def read(path: Path, which: str = "last", *, training: bool = True) -> Checkpoin
             wanted = make_agent(method, config).state_dict()
     except InternavError as error:
         raise CorruptDataError(f"{folder / ABOUT}: {error}") from error
-    kinds = {name: (_DTYPES[v.dtype], *v.shape) for name, v in wanted.items()}
-    weights = _tensors(folder / WEIGHTS, files, kinds)
+    weights = _tensors(folder / WEIGHTS, files)
+    for name in sorted({*weights, *wanted}):
+        found, right = _kind(weights.get(name)), _kind(wanted.get(name))
+        if found != right:
+            raise CorruptDataError(
+                f"{folder / WEIGHTS}: {name} has type and shape {found}, the method and sizes of "
+                f"{ABOUT} want {right}: these are another agent's weights"
+            )
     rest = _tensors(folder / TRAINING, files) if training else {}
     return Checkpoint(method, config, weights, progress, rest)
 
@@ -324,7 +316,7 @@ def _pointer(run: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
     pointer = _json(path)
-    check_sha256(pointer, path, _FILE, _BEFORE_DIGESTS)
+    check_sha256(pointer, path, _FILE, ())
     return pointer
 
 
@@ -338,10 +330,8 @@ def _object(value: object, path: Path | str) -> dict[str, Any]:
     return value
 
 
-def _tensors(
-    path: Path, files: Mapping[str, Any], kinds: Mapping[str, tuple[str | int, ...]] | None = None
-) -> dict[str, Tensor]:
-    """Read tensors; names, types and shapes are compared before any memory is taken."""
+def _tensors(path: Path, files: Mapping[str, Any]) -> dict[str, Tensor]:
+    """Read tensors whose file has the size and digest that `files` tell."""
     known = files.get(path.name)
     if not isinstance(known, dict):
         raise CorruptDataError(f"{path.parent / ABOUT}: files: {path.name} is missing")
@@ -351,14 +341,6 @@ def _tensors(
             raise CorruptDataError(
                 f"{path}: {size} bytes, expected {known.get('bytes')}: copy the checkpoint again"
             )
-        found = _kinds(path)
-        kinds = found if kinds is None else kinds
-        for name in sorted({*found, *kinds}):
-            if found.get(name) != kinds.get(name):
-                raise CorruptDataError(
-                    f"{path}: {name} has type and shape {found.get(name)}, the method and sizes of "
-                    f"{ABOUT} want {kinds.get(name)}: these are another agent's weights"
-                )
         if file_sha256(path) != known.get("sha256"):
             raise CorruptDataError(f"{path}: its bytes have changed: copy the checkpoint again")
         tensors = load_file(path)
@@ -374,14 +356,9 @@ def _tensors(
     return tensors
 
 
-def _kinds(path: Path) -> dict[str, tuple[str | int, ...]]:
-    """Return type and shape of each tensor in a file, by name, without reading the tensors."""
-    with open_regular(path) as file:
-        if int.from_bytes(file.read(8), "little") > _MAX_HEADER_BYTES:
-            raise CorruptDataError(f"{path}: this is no safetensors file: its header is too large")
-    with safetensors.safe_open(path, "pt") as opened:
-        slices = {name: opened.get_slice(name) for name in opened.keys()}  # noqa: SIM118 - no mapping
-        return {name: (part.get_dtype(), *part.get_shape()) for name, part in slices.items()}
+def _kind(tensor: Tensor | None) -> tuple[torch.dtype, torch.Size] | None:
+    """Return type and shape of a tensor; None for none."""
+    return None if tensor is None else (tensor.dtype, tensor.shape)
 
 
 _OPTIMISER, _STATE, _STARTS, _RANDOM = "optimiser", "state", "starts", "random"
@@ -406,29 +383,26 @@ class TrainState:
     environment_steps: int = 0
     cloned_frames: int = 0
     training_s: float = 0.0
-    critics: dict[str, int] = field(default_factory=dict)
+    critics: Mapping[str, Annotated[int, Bounds(0)]] = field(default_factory=dict)
     """Rollouts that each critic has learnt from."""
+    window: tuple[Mapping[str, float], ...] = ()
+    """Metrics of the last episodes that ended in the stage."""
+    log: Annotated[int, Bounds(0)] = 0
+    """Size of the log in bytes: later rows are of updates that are done again."""
 
     @classmethod
     def from_progress(cls, progress: Mapping[str, Any]) -> TrainState:
-        """Read the counters of a checkpoint, and check what else its progress must have.
+        """Read the counters of a checkpoint.
 
         Raises
         ------
         CorruptDataError
             A value is missing or of another type.
         """
-        critics, window = progress.get("critics"), progress.get("window")
-        counts = [progress.get("log"), *(critics.values() if isinstance(critics, dict) else [None])]
-        if not all(type(count) is int and count >= 0 for count in counts):
-            raise CorruptDataError(f"checkpoint: progress: log, critics: got {counts}")
-        if not isinstance(window, list) or not all(isinstance(each, dict) for each in window):
-            raise CorruptDataError("checkpoint: progress: window: expected a list of episodes")
-        names = [f.name for f in fields(cls) if f.name != "critics"]
-        counters = {name: progress.get(name) for name in names}
+        counters = {f.name: progress.get(f.name) for f in fields(cls)}
         try:
             state = values.from_mapping(cls(), counters, "progress")
-            state.critics.update(critics or {})
+            values.check_bounds(state)
             if state.parts:
                 check_parts(state.parts)
         except UsageError as error:
@@ -486,10 +460,9 @@ def unpack(
     optimiser.load_state_dict({"state": moments, "param_groups": groups})
 
     def rows(name: str, like: Tensor) -> Tensor:
-        found, shape = tensors.get(name), (count, *like.shape[1:])
-        if found is None or tuple(found.shape) != shape or found.dtype != like.dtype:
-            got = None if found is None else (found.dtype, tuple(found.shape))
-            raise CorruptDataError(f"checkpoint: {name}: expected {like.dtype} {shape}, got {got}")
+        found, right = tensors.get(name), (like.dtype, torch.Size([count, *like.shape[1:]]))
+        if found is None or _kind(found) != right:
+            raise CorruptDataError(f"checkpoint: {name}: expected {right}, got {_kind(found)}")
         return found[local.start : local.stop].to(like.device)
 
     state = {name: rows(f"{_STATE}/{name}", like) for name, like in blank.items()}

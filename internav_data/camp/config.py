@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 from internav_data.core import config as values
 from internav_data.core.config import MAX_SEED, Bounds, check_bounds
@@ -75,11 +75,6 @@ class AgentConfig:
     """Number of objects that `nie` takes: the nearest in sight."""
     nie_weight: Annotated[float, Bounds(0.0)] = 3.0
     """Weight of the L1 loss on `nie`'s predicted keypoints (released code)."""
-    RENAMED: ClassVar[dict[str, str]] = {
-        "end_chance": "initial_done_probability",
-        "interact_chance": "initial_interaction_probability",
-    }
-    """Fields of earlier versions, and their names today."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,21 +115,6 @@ class PPOConfig:
     """Normalise advantages to mean 0 and deviation 1, over a rollout."""
     critic_warmup_rollouts: Annotated[int, Bounds(0)] = 10
     """Critic warm-up: number of first rollouts of a new critic that train the critic alone."""
-    RENAMED: ClassVar[dict[str, str]] = {
-        "environments": "num_envs",
-        "steps": "num_steps",
-        "epochs": "update_epochs",
-        "minibatches": "num_minibatches",
-        "clip": "clip_coef",
-        "clip_value": "clip_vloss",
-        "value_coefficient": "vf_coef",
-        "entropy_coefficient": "ent_coef",
-        "lam": "gae_lambda",
-        "gradient_norm": "max_grad_norm",
-        "kl_limit": "target_kl",
-        "critic_rollouts": "critic_warmup_rollouts",
-    }
-    """Fields of earlier versions, and their names today."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,8 +136,6 @@ class CloningConfig:
     """Initial learning rate of Adam; decays linearly to 0."""
     sync_every: Annotated[int, Bounds(1)] = 100
     """Updates between copies of the global policy into the intent policy."""
-    RENAMED: ClassVar[dict[str, str]] = {"environments": "num_envs", "steps": "num_steps"}
-    """Fields of earlier versions, and their names today."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,8 +164,6 @@ class StagesConfig:
     decay_over: Literal["stage", "all"] = "stage"
     """Span over which the learning rate decays to 0: each stage, or all steps. Each stage has a
     fresh Adam."""
-    RENAMED: ClassVar[dict[str, str]] = {"steps": "total_timesteps"}
-    """Fields of earlier versions, and their names today."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,8 +177,6 @@ class DataConfig:
     house_cache_size: Annotated[int, Bounds(1)] = 512
     """Number of loaded houses that a process caches; those of 1 to 3 rooms take 10 ms and 0.1 MB
     each, and the distances to each of their goals besides."""
-    RENAMED: ClassVar[dict[str, str]] = {"where": "filter", "houses_kept": "house_cache_size"}
-    """Fields of earlier versions, and their names today."""
 
 
 @dataclass(frozen=True, slots=True)

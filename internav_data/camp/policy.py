@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.random import Generator
     from numpy.typing import NDArray
 
+    from internav_data.camp.config import NetworkConfig
     from internav_data.dataset import Dataset
     from internav_data.envs.types import Observations
     from internav_data.evaluation.evaluator import EvaluationConfig, Note, Policy
@@ -148,8 +148,6 @@ def candidate(
     )  # fmt: skip
     if who in REFERENCE_POLICIES:
         return EvaluatedPolicy(reference_policy(who, dataset), about)
-    if "planner" in who.split(","):
-        raise UsageError("the reference policy planner is now called shortest_path")
     if not Path(who).exists():
         raise UsageError(
             f"{who}: neither a run's folder nor a reference policy; expected what `camp-train` "
@@ -159,12 +157,12 @@ def candidate(
 
     from internav_data.camp.checkpoint import load_agent  # noqa: PLC0415 - torch
 
-    agent = load_agent(who)
+    agent: Any = load_agent(who)
     # Networks of 16 small pictures are no work for two threads, which wait for each other.
-    torch.set_num_threads(agent_config(agent, "run", "threads", 1))
+    torch.set_num_threads(agent.config.run.threads)
     about = replace(_facts(agent, about), greedy=greedy, without_intent=without_intent)
-    about = replace(about, name=row_name(about) + _observation(agent))
-    size = agent_config(agent, "network", "image_size", 64)
+    about = replace(about, name=row_name(about) + _observation(agent.config.network))
+    size = agent.config.network.image_size
     if without_intent:
         agent = agent.without_intent()
     return EvaluatedPolicy(AgentPolicy(about.name, agent, size, greedy=greedy), about)
@@ -187,40 +185,29 @@ def row_name(about: About) -> str:
     return " ".join(words)
 
 
-def agent_config(agent: object, part: str, name: str, default: Any) -> Any:  # noqa: ANN401
-    """Return a value of an agent's config; the default where it has none."""
-    return getattr(getattr(getattr(agent, "config", None), part, None), name, default)
-
-
-def _observation(agent: object) -> str:
+def _observation(network: NetworkConfig) -> str:
     """Return what a row's name says of an agent's map and of hidden attributes that it shows."""
-    if agent_config(agent, "network", "observation", "camera") == "camera":
+    if network.observation == "camera":
         return ""
-    told = agent_config(agent, "network", "privileged", ())
-    seen = " as seen" if agent_config(agent, "network", "map_occlusion", default=False) else ""
+    told, seen = network.privileged, " as seen" if network.map_occlusion else ""
     return f" (map{seen}{'; privileged: ' if told else ''}{', '.join(told)})"
 
 
-def _facts(agent: object, about: About) -> About:
+def _facts(agent: Any, about: About) -> About:  # noqa: ANN401 - what `load_agent` returns
     """Return `about` with the agent's `method`, `config` and `progress`."""
     from internav_data.camp.agents import AGENTS  # noqa: PLC0415 - torch
 
-    progress = getattr(agent, "progress", None)
-    known = progress if isinstance(progress, Mapping) else {}
-    method = str(getattr(agent, "method", type(agent).__name__))
-    has_intent = method in AGENTS and AGENTS[method].intent
-    parameters = getattr(agent, "parameters", None)
-    count = sum(p.numel() for p in parameters()) if parameters is not None else None
-    seed = getattr(getattr(agent, "config", None), "seed", None)
+    config, known = agent.config, agent.progress
+    has_intent = agent.method in AGENTS and AGENTS[agent.method].intent
     return replace(
         about,
-        method=method,
+        method=agent.method,
         is_reference=False,
-        intent=agent_config(agent, "agent", "intent", "") if has_intent else "",
-        sync_every=agent_config(agent, "agent", "sync_every", None) if has_intent else None,
-        training_seed=seed,
+        intent=config.agent.intent if has_intent else "",
+        sync_every=config.agent.sync_every if has_intent else None,
+        training_seed=config.seed,
         environment_steps=known.get("environment_steps"),
         cloned_frames=known.get("cloned_frames"),
         training_s=known.get("training_s"),
-        parameters=count,
+        parameters=sum(p.numel() for p in agent.parameters()),
     )

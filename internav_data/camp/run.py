@@ -157,7 +157,7 @@ def forecast(request: Request) -> list[tuple[str, int, float]]:
     ppo, found = request.config.ppo, []
     for stage in trainer.stages:
         now = trainer.open(stage)
-        trainer.state.critics[stage.critic] = ppo.critic_warmup_rollouts  # to measure whole updates
+        trainer.state.critics = {stage.critic: ppo.critic_warmup_rollouts}  # whole updates
         try:
             trainer.update(now)
             began = time.perf_counter()

@@ -116,12 +116,10 @@ class Trainer:
                 f"ppo.num_minibatches is {config.ppo.num_minibatches}: it must divide the "
                 f"{len(local)} environments of each of {self.ranks.size} processes"
             )
-        progress = checkpoint.progress if checkpoint else {}
         if checkpoint:
             self.agent.load_state_dict(dict(checkpoint.weights))
         self.agent.to(self.ranks.device)
-        self._window = EpisodeWindow(config.run.window, progress.get("window", ()))
-        self._log_position = int(progress.get("log", 0))
+        self._window = EpisodeWindow(config.run.window, state.window)
         self._log: MetricsLogger | None = None
         self._total_updates = 0
         self._lap = time.perf_counter()
@@ -181,7 +179,7 @@ class Trainer:
         )
         log: AbstractContextManager[MetricsLogger | None] = nullcontext()
         if self.ranks.first:
-            log = MetricsLogger(self.run, self._log_position, board=every.tensorboard)
+            log = MetricsLogger(self.run, state.log, board=every.tensorboard)
         with log as self._log:
             self._lap = time.perf_counter()
             for stage in self.stages:
@@ -304,7 +302,7 @@ class Trainer:
         steps = config.num_envs * config.num_steps
         state.done, state.updates = state.done + 1, state.updates + 1
         state.environment_steps += steps
-        state.critics[stage.critic] = learnt + 1
+        state.critics = {**state.critics, stage.critic: learnt + 1}
         if not stage.tasks and state.done % self.config.agent.sync_every == 0:
             self.agent.synchronise()
         episodes, decisions = self._statistics(rollout, now.local)
@@ -362,11 +360,11 @@ class Trainer:
         ranks, loop = self.ranks, now.source.loop
         memory = {name: ranks.all_gather(values) for name, values in now.source.state.items()}
         episode_starts = ranks.all_gather(torch.from_numpy(loop.episode_starts))
+        self.state.window = tuple(self._window.episodes)
+        self.state.log = self._log.position if self._log else 0
         progress = {
             **asdict(self.state),
             "environments": ranks.all_gather_items([asdict(each) for each in loop.env.state()]),
-            "window": list(self._window.episodes),
-            "log": self._log.position if self._log else 0,
             "dataset": self.data.fingerprint,
         }
         if not ranks.first:

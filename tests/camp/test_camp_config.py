@@ -64,18 +64,6 @@ def test_invalid_settings_are_refused(changes, words):
         from_mapping(preset("small"), changes, "file")
 
 
-@pytest.mark.parametrize("part", [field.name for field in dataclasses.fields(CampConfig)])
-def test_old_keys_are_refused_with_a_line_that_names_the_new_one(part):
-    kind = type(getattr(CampConfig(), part))
-    for old, new in getattr(kind, "RENAMED", {}).items():
-        assert old not in kind.__dataclass_fields__
-        assert new in kind.__dataclass_fields__
-        with pytest.raises(
-            UsageError, match=rf"^file: '{part}.{old}' is called '{part}.{new}' now$"
-        ):
-            from_mapping(preset("small"), {part: {old: 1}}, "file")
-
-
 def test_unknown_presets_are_refused():
     with pytest.raises(UsageError, match="paper, small"):
         preset("large")
