@@ -13,6 +13,7 @@ from internav_data.camp.policy import AgentPolicy
 from internav_data.camp.stages import TrainingStage
 from internav_data.dataset import Dataset, load_dataset
 from internav_data.dataset.select import condition
+from internav_data.envs.tasks import InteractiveNavigation, Task
 from internav_data.evaluation.evaluator import EvaluationConfig, evaluate
 from internav_data.records import Episode
 from internav_data.records.errors import UsageError
@@ -36,6 +37,8 @@ class TrainingData:
         Conditions on columns, as in "shortest_path_m<=6".
     expert
         Column of the experts to clone.
+    task
+        Main task: reward, end and metrics of training episodes.
 
     Raises
     ------
@@ -46,9 +49,13 @@ class TrainingData:
     """
 
     def __init__(
-        self, path: Path, where: Sequence[str] = (), expert: ExpertColumn = "expert"
+        self,
+        path: Path,
+        where: Sequence[str] = (),
+        expert: ExpertColumn = "expert",
+        task: type[Task] = InteractiveNavigation,
     ) -> None:
-        self._expert = expert
+        self._expert, self._task = expert, task
         self.path, self._where = path, [condition(text) for text in where]
         episodes = self.episodes()
         if any(obstacle.outcomes is None for obstacle in episodes[0].obstacles):
@@ -124,7 +131,7 @@ class TrainingData:
             len(local), self.episodes_of(stage),
             min(config.run.workers, len(local)),
             autoreset_mode="Disabled", copy=False, sensors=sensors,
-            task=stage.tasks[local.start : local.stop] or "interactive",
+            task=stage.tasks[local.start : local.stop] or self._task,
             image_size=config.network.image_size, max_steps=config.run.max_steps,
             failed_done_reward=config.data.failed_done_reward,
             house_cache_size=config.data.house_cache_size,

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any, Final, Self, TextIO
 
 from internav_data.core.progress import ProgressLine, clock
-from internav_data.envs.tasks import STEP, SUCCESS
 from internav_data.records.errors import CorruptDataError
 
 Row = dict[str, Any]
@@ -170,26 +169,13 @@ class EpisodeWindow:
         if not values:
             return {"ended": len(ended)}
         means = {name: sum(column) / len(column) for name, column in values.items()}
-        row = {"ended": len(ended), **means, **_reward_parts(means)}
+        row = {"ended": len(ended), **means}
         for rate, names in _SUCCESS_RATES.items():
             tried = sum(sum(values.get(f"{name}_tried", ())) for name in names)
             if tried:
                 done = sum(sum(values.get(f"{name}_done", ())) for name in names)
                 row[f"{rate}_success"] = done / tried
         return row
-
-
-def _reward_parts(means: Mapping[str, float]) -> Row:
-    """Return the mean return of an episode by its sources; `reward_moves` is what they leave."""
-    names = ("interaction_reward_m", "openings", "closings")
-    metres, openings, closings = (means.get(name, 0.0) for name in names)
-    parts = {
-        "reward_steps": STEP * means.get("steps", 0.0),
-        "reward_success": SUCCESS * means.get("success", 0.0),
-        "reward_ways": metres + openings - closings,
-        "reward_actions": means.get("auxiliary_reward", 0.0),
-    }
-    return {**parts, "reward_moves": means.get("return", 0.0) - sum(parts.values())}
 
 
 def rates(steps: int, seconds: Sequence[float]) -> Row:

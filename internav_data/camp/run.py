@@ -118,6 +118,11 @@ def _resume(request: Request, asked: Mapping[str, Any]) -> Trainer:
             f"{out}: a run of method {checkpoint.method!r}, asked for {asked['method']!r}: "
             "leave --method out, or choose another --out"
         )
+    if (known := checkpoint.progress.get("task")) != request.task.name:
+        raise UsageError(
+            f"{out}: a run of task {known!r}, asked for {request.task.name!r}: give the same task "
+            "(`Request(task=…)`), or choose another --out"
+        )
     config = checkpoint.config
     if asked.get("config") is not None:
         config = _continued(out, config, asked["config"], asked.get("keys"))

@@ -24,6 +24,7 @@ from internav_data.camp.logging import EpisodeWindow, MetricsLogger, Row, rates
 from internav_data.camp.rollout import Collector, Rollout, orders_of, uniforms_of
 from internav_data.camp.stages import PARTS, TrainingStage, cloning_stage, order_seed, schedule
 from internav_data.core.interrupts import InterruptedRunError
+from internav_data.envs.tasks import TASKS, InteractiveNavigation, Task
 from internav_data.records import Purpose, TrainingStream, generator
 from internav_data.records.errors import NotFiniteError, UsageError
 
@@ -52,6 +53,8 @@ class Request:
     clones: bool = False
     """Whether the dataset's experts are cloned first."""
     device: str = "auto"
+    task: type[Task] = InteractiveNavigation
+    """Main task: reward, end and metrics of training episodes; validation keeps the paper's."""
     callback: Callable[[Row], object] = lambda _: None
     """Function that the first rank calls with every row of the log."""
     interrupted: Callable[[], int] = lambda: 0
@@ -102,9 +105,16 @@ class Trainer:
         # Nothing here draws from torch's own generator, but a user's agent may.
         draws = generator(seed, Purpose.TRAINING, attempt=TrainingStream.TORCH)
         torch.manual_seed(int(draws.integers(2**62)))
-        self.data = TrainingData(request.dataset, config.data.filter, config.cloning.expert)
+        self.data = TrainingData(
+            request.dataset, config.data.filter, config.cloning.expert, request.task
+        )
         if checkpoint is None:
             check_settings(self.method, config)
+        if TASKS.get(request.task.name, request.task) is not request.task:
+            raise UsageError(
+                f"task {request.task.__name__}: its name {request.task.name!r} is another task's; "
+                "give it a `name` of its own"
+            )
         self.agent = make_agent(self.method, config)
         self.stages = self._schedule()
         for stage in self.stages:
@@ -366,6 +376,7 @@ class Trainer:
             **asdict(self.state),
             "environments": ranks.all_gather_items([asdict(each) for each in loop.env.state()]),
             "dataset": self.data.fingerprint,
+            "task": self._request.task.name,
         }
         if not ranks.first:
             return

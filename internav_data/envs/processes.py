@@ -18,7 +18,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from internav_data.core.main_module import dumped, loaded
 from internav_data.core.processes import GRACE_S, Child
 from internav_data.envs.copies import PlainSpec, with_absolute_path
-from internav_data.envs.slot import EpisodeSnapshot, check_options, take_sensors, task_names
+from internav_data.envs.slot import EpisodeSnapshot, check_options, take_sensors, task_classes
 from internav_data.envs.spaces import buffer_shapes
 from internav_data.envs.vector import (
     OPTIONS,
@@ -195,7 +195,7 @@ class InterNavProcesses(PlainSpec, VectorEnv[Any, Any, Any]):
             arguments, dataset=with_absolute_path(dataset), image_size=image_size,
             autoreset_mode=self._mode, render_mode=render_mode,
         )  # fmt: skip
-        given["sensors"], tasks = sensors, task_names(arguments, num_envs)
+        given["sensors"], tasks = sensors, task_classes(arguments, num_envs)
         bounds = [num_envs * k // workers for k in range(workers + 1)]
         self._rows = list(itertools.pairwise(bounds))
         self._counts = [high - low for low, high in self._rows]

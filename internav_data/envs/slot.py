@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, TypedDict
+from typing import TYPE_CHECKING, Any, Final, TypedDict, cast
 
 from internav_data.envs.auxiliary import next_start
 from internav_data.envs.episode import EpisodeRun
 from internav_data.envs.sensors import observed
 from internav_data.envs.source import HOUSE_CACHE_SIZE, LOADED_HOUSES, Source, open_source
-from internav_data.envs.tasks import TASKS, TaskConfig
+from internav_data.envs.tasks import TASKS, Task, TaskConfig
 from internav_data.records.errors import CorruptDataError, UsageError
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from internav_data.envs.house_map import Privilege
     from internav_data.envs.order import EpisodeOrder
     from internav_data.envs.sensors import Observation, Sensor
-    from internav_data.envs.tasks import Task, TaskStep
+    from internav_data.envs.tasks import TaskStep
     from internav_data.records import Episode, PushModel
     from internav_data.world.config import Hands
 
@@ -32,7 +32,7 @@ class Arguments(TypedDict, total=False):
     split: str | None
     filters: list[tuple[str, str, object]] | None
     agreed_only: bool
-    task: str | Sequence[str]
+    task: str | type[Task] | Sequence[str | type[Task]]
     max_steps: int
     failed_done_reward: float
     push_model: PushModel
@@ -156,7 +156,7 @@ class EnvSlot:
                 f"num_envs, episodes_per_house and house_cache_size: expected at least 1 each, "
                 f"got {count}, {episodes_per_house} and {kept}"
             )
-        tasks = [TASKS[name] for name in task_names(arguments, count)]
+        tasks = task_classes(arguments, count)
         LOADED_HOUSES.capacity = max(LOADED_HOUSES.capacity, kept)
         source = open_source(
             dataset,
@@ -275,8 +275,8 @@ class EnvSlot:
         return number, (start.i, start.j, start.quarter)
 
 
-def task_names(arguments: Mapping[str, Any], count: int) -> list[str]:
-    """Return the task of each environment: one name for all, or a name each.
+def task_classes(arguments: Mapping[str, Any], count: int) -> list[type[Task]]:
+    """Return the task of each environment: one for all, or one each, by name or as a class.
 
     Raises
     ------
@@ -284,10 +284,14 @@ def task_names(arguments: Mapping[str, Any], count: int) -> list[str]:
         There is no such task, or another number of them.
     """
     given = arguments.get("task", "interactive")
-    names = [given] * count if isinstance(given, str) else list(given)
-    if len(names) != count or not set(names) <= set(TASKS):
-        raise UsageError(f"task: expected one of {list(TASKS)}, or {count} of them; got {given!r}")
-    return names
+    each = [given] * count if isinstance(given, str | type) else list(given)
+    tasks = [TASKS.get(task) if isinstance(task, str) else task for task in each]
+    if len(tasks) != count or not all(isinstance(t, type) and issubclass(t, Task) for t in tasks):
+        raise UsageError(
+            f"task: expected one of {list(TASKS)}, a subclass of Task, or {count} of them; "
+            f"got {given!r}"
+        )
+    return cast("list[type[Task]]", tasks)
 
 
 def take_sensors(
