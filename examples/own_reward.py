@@ -32,4 +32,5 @@ class FrugalNavigation(InteractiveNavigation):
 if __name__ == "__main__":
     dataset, out, *settings = sys.argv[1:]
     config = config_of("small", overrides=settings)
-    begin(Request(Path(dataset), Path(out), "ppo", config, task=FrugalNavigation))
+    request = Request(Path(dataset), Path(out), "ppo", config, ("all",), task=FrugalNavigation)
+    print("trained", begin(request).run)

@@ -152,7 +152,9 @@ def test_examples_run(example, small_dataset, small_run, tmp_path):
     if example.stem == "slurm_generate":
         pytest.importorskip("submitit")
     ranges = ["--scenes", "2", "--parts", "2", "--workers", "1", "--local"]
+    tiny = ["network.image_size=16", "ppo.num_envs=4", "ppo.num_steps=8", "run.max_steps=8"]
     arguments = {
+        "own_reward": [small_dataset, tmp_path / "run", *tiny, "stages.total_timesteps=64"],
         "draw_curve": [small_run, "--out", tmp_path / "curve.png"],
         "ship_agent": [small_run, tmp_path / "agent"],
         "contact_sheet": [small_dataset, tmp_path / "sheet.png", "--pixels", "120"],

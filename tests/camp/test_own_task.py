@@ -24,7 +24,7 @@ from internav_data.world.actions import Action  # noqa: E402
 EXAMPLE = Path(__file__).parents[2] / "examples" / "own_reward.py"
 TINY = [
     "network.image_size=16", "network.hidden=8", "ppo.num_envs=4", "ppo.num_steps=8",
-    "stages.total_timesteps=64", "stages.single_room_share=0.5", "run.max_steps=8",
+    "stages.total_timesteps=64", "run.max_steps=8",
     "run.validation_episodes=2", "run.tensorboard=false", "run.workers=2",
 ]  # fmt: skip
 
@@ -61,7 +61,7 @@ def test_the_example_trains_over_processes_and_no_other_task_goes_on(scenes, tmp
     assert any("pushes_tried" in row.get("episode", ()) for row in rows)
     progress = read(out).progress
     assert (progress["task"], progress["environment_steps"]) == ("frugal", 64)
-    request = Request(scenes, out)
+    request = Request(scenes, out, parts=("all",))
     with pytest.raises(UsageError, match="run of task 'frugal', asked for 'interactive'"):
         resume(request, {})
     resume(replace(request, task=frugal), {})
