@@ -81,7 +81,7 @@ def test_a_run_is_trained_and_measured(call, dataset, tmp_path):
         (("DATA", "--set", "cloning.frames=99"), 2, ["cloning.frames is 99", "256 frames"]),
         (("DATA", "--method", "ppo", "--intent", "none"), 2, ["agent.intent", "camp, ppo-intent"]),
         (("DATA", "--config", "nowhere.toml"), 2, ["nowhere.toml"]),
-        (("DATA", "--set", "ppo.steps=9"), 2, ["'ppo.steps' is called 'ppo.num_steps' now"]),
+        (("DATA", "--set", "ppo.steps=9"), 2, ["no key 'ppo.steps'; did you mean 'ppo.num_steps'"]),
         (("DATA", "--init-from", "expert"), 2, ["--init-from is now called --pretrain bc"]),
         (("DATA", "--where", "room_count=1"), 2, ["--where is now called --filter"]),
         (("DATA", "--stages", "all,single"), 2, ["--stages", "order"]),
