@@ -128,7 +128,9 @@ def method_row(dataset: Path, method: str, config: CampConfig, rollouts: int) ->
     count, steps = config.ppo.num_envs, config.ppo.num_steps
 
     def train(number: int) -> None:
-        rollout = collector.collect(uniforms_of(0, number, range(count), steps))
+        rollout = collector.collect(
+            uniforms_of(0, number, range(count), steps), config.ppo.chunk_steps
+        )
         orders = orders_of(0, number, config.ppo.update_epochs, count)
         update(agent, optimiser, rollout, config.ppo, orders)
 

@@ -89,6 +89,9 @@ class PPOConfig:
     """Passes over a rollout (the paper's k)."""
     num_minibatches: Annotated[int, Bounds(1)] = 4
     """Number of minibatches a pass, each of whole environments."""
+    chunk_steps: Annotated[int, Bounds(0)] = 16
+    """Number of steps of a chunk, or more than `num_steps`; 0 for whole rollouts. Chunks are
+    replayed side by side from the hidden states of the collection, and no gradient leaves one."""
     clip_coef: Annotated[float, Bounds(0.0)] = 0.2
     """Distance of the probability ratio from 1 beyond which it is clipped."""
     clip_vloss: bool = False
@@ -242,6 +245,11 @@ class CampConfig:
                 f"ppo.num_minibatches is {self.ppo.num_minibatches}: minibatches are of whole "
                 f"environments, so it must divide ppo.num_envs ({self.ppo.num_envs})"
             )
+        if self.ppo.num_steps % min(self.ppo.chunk_steps or 1, self.ppo.num_steps):
+            raise UsageError(
+                f"ppo.chunk_steps is {self.ppo.chunk_steps}: rollouts are cut into equal chunks, "
+                f"so it must divide ppo.num_steps ({self.ppo.num_steps}); 0 replays whole rollouts"
+            )
         an_update = self.cloning.num_envs * self.cloning.num_steps
         if self.cloning.frames < an_update:
             raise UsageError(
@@ -311,8 +319,8 @@ _PRESETS: Final = {
     "paper": CampConfig(
         network=NetworkConfig(300, encoder="paper", hidden=512, shared_encoder=False),
         ppo=PPOConfig(
-            num_envs=12, num_steps=30, update_epochs=1, num_minibatches=1, clip_coef=0.1,
-            clip_vloss=True, scale_values=False,
+            num_envs=12, num_steps=30, update_epochs=1, num_minibatches=1, chunk_steps=0,
+            clip_coef=0.1, clip_vloss=True, scale_values=False,
         ),
         stages=StagesConfig(
             total_timesteps=10_000_000, min_auxiliary_timesteps=0, side_by_side=False,

@@ -1,7 +1,8 @@
 """Proximal policy optimisation (Schulman et al. 2017) of recurrent agents.
 
-Shapes: T steps, n environments, m of them in a minibatch. Minibatches are of whole environments, so
-that GRUs run over a rollout's steps in order.
+Shapes: T steps, n environments, m of them in a minibatch. Minibatches are of whole environments.
+GRUs run over a rollout's steps in order, or over chunks of them side by side: gradients end at the
+first step of a chunk, whose hidden state is that of the collection.
 """
 
 from __future__ import annotations
@@ -9,12 +10,13 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import torch
 from torch import Tensor, nn
 
-from internav_data.camp.agents.protocol import Agent, Batch
+from internav_data.camp.agents.protocol import Agent, Batch, Evaluated
 from internav_data.camp.config import PPOConfig
 from internav_data.camp.networks import ValueHead
 from internav_data.camp.rollout import Rollout
@@ -200,6 +202,23 @@ def step(
     return norm
 
 
+def replayed(agent: Agent[Any], rollout: Rollout, environments: Tensor) -> Evaluated:
+    """Run an agent over the steps of environments (m,), chunk by chunk; outputs are (T, m)."""
+    found = agent.evaluate(rollout.batch.chunked(environments, rollout.states))
+
+    def in_order(values: Tensor) -> Tensor:
+        chunks = values.reshape(len(values), -1, len(environments))  # (T / C, C, m)
+        return chunks.transpose(0, 1).flatten(0, 1)
+
+    return replace(
+        found,
+        log_prob=in_order(found.log_prob),
+        value=in_order(found.value),
+        entropy=in_order(found.entropy),
+        loss=None if found.loss is None else in_order(found.loss),
+    )
+
+
 def _losses(
     agent: Agent[Any],
     rollout: Rollout,
@@ -213,7 +232,7 @@ def _losses(
     `environments` (m,) holds their numbers, `estimates` their advantages and returns, (T, m) each.
     """
     advantages, returns = estimates
-    now = agent.evaluate(rollout.batch.select(environments))
+    now = replayed(agent, rollout, environments)
     check_finite(environments, now.log_prob, now.value)
     log_ratio = now.log_prob - rollout.log_probs[:, environments]
     ratio = log_ratio.exp()

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from internav_data.camp.agents.protocol import Agent, AgentStep, Batch
+from internav_data.camp.agents.protocol import Agent, AgentStep, Batch, State
 from internav_data.camp.config import PPOConfig
 from internav_data.envs.loop import EnvironmentLoop, Environments, LoopStep
 from internav_data.records import Purpose, TrainingStream, generator
@@ -38,6 +38,8 @@ class Rollout:
     """Steps, rewards and values that PPO learns from. Tensors are (T, n)."""
 
     batch: Batch[Any]
+    states: Sequence[State]
+    """Memory (n, …) before the first step of each of the equal chunks that learning replays."""
     rewards: Tensor
     terminated: Tensor
     truncated: Tensor
@@ -126,20 +128,23 @@ class Collector:
         self.loop.restore(states, episode_starts)
 
     @torch.no_grad()
-    def collect(self, uniforms: Tensor) -> Rollout:
+    def collect(self, uniforms: Tensor, chunk_steps: int = 0) -> Rollout:
         """Take T steps everywhere.
 
         Parameters
         ----------
         uniforms : (T, n, 2)
             Random numbers of `uniforms_of`.
+        chunk_steps
+            Number of steps of a chunk (`PPOConfig.chunk_steps`), a divisor of T; 0 for T.
 
         Raises
         ------
         NotFiniteError
             An observation or a reward is NaN or infinite.
         """
-        agent, device, before = self.agent, self.agent.device, self.state
+        agent, device, chunk_steps = self.agent, self.agent.device, chunk_steps or len(uniforms)
+        states: list[State] = []
         seen = ObservationRows(len(uniforms), device, self._rows)
         taken: list[AgentStep[Any]] = []
         start_rows: list[Tensor] = []
@@ -148,6 +153,8 @@ class Collector:
 
         def act(observations: Observations, episode_starts: Bools) -> Actions:
             self._check(observations)
+            if len(taken) % chunk_steps == 0:
+                states.append(self.state)
             row = seen.append(observations)
             start_rows.append(torch.from_numpy(episode_starts).to(device))
             draws = uniforms[len(taken)].to(device)
@@ -170,8 +177,8 @@ class Collector:
         )
         record = type(taken[0].record).stack([step.record for step in taken])
         return Rollout(
-            Batch(seen.rows, torch.stack(start_rows), before, record),
-            rewards, terminated, truncated,
+            Batch(seen.rows, torch.stack(start_rows), states[0], record),
+            states, rewards, terminated, truncated,
             values=torch.stack([step.value for step in taken]),
             log_probs=torch.stack([step.log_prob for step in taken]),
             final_values=final_values, last_value=self._values(), finished=finished,

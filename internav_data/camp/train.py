@@ -299,7 +299,7 @@ class Trainer:
         )
         rate = ppo.set_rate(now.optimiser, stage.rate, decay)
         uniforms = uniforms_of(self.config.seed, state.updates, now.local, config.num_steps)
-        rollout = collector.collect(uniforms)
+        rollout = collector.collect(uniforms, config.chunk_steps)
         collected_s = time.perf_counter() - began
         learnt = state.critics.get(stage.critic, 0)
         critic_only = learnt < config.critic_warmup_rollouts and bool(now.learner.critics())

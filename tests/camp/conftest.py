@@ -124,13 +124,13 @@ def collected(fake, config):
     from internav_data.camp.agents import make_agent
     from internav_data.camp.rollout import Collector, uniforms_of
 
-    def make(method, rollouts=2, env=None, steps=8, changes=None, agent=None):
+    def make(method, rollouts=2, env=None, steps=8, changes=None, agent=None, chunk_steps=0):
         agent = agent or lively(make_agent(method, config(**(changes or {}))))
         env = env or fake()
         collector = Collector(env, agent)
         collector.loop.reset(seed=0)
         lived = [
-            collector.collect(uniforms_of(0, r, range(env.num_envs), steps))
+            collector.collect(uniforms_of(0, r, range(env.num_envs), steps), chunk_steps)
             for r in range(rollouts)
         ]
         return agent, collector, lived

@@ -11,7 +11,7 @@ from internav_data.camp.rollout import Rollout  # noqa: E402
 
 def advantages_of(rewards, values, last, terminated, truncated, final, **config):
     """Return the advantages of a rollout without observations."""
-    rollout = Rollout(None, rewards, terminated, truncated, values, None, final, last)
+    rollout = Rollout(None, [], rewards, terminated, truncated, values, None, final, last)
     return rollout.advantages(PPOConfig(**config))
 
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 
 import pytest
 
@@ -15,6 +16,7 @@ from internav_data.records.errors import UsageError
 def test_the_paper_preset_is_the_papers():
     paper = preset("paper")
     paper.check()
+    assert paper.ppo.chunk_steps == 0
     assert (paper.network.image_size, paper.network.hidden) == (300, 512)
     assert not paper.network.shared_encoder
     assert (paper.ppo.clip_coef, paper.ppo.clip_vloss, paper.ppo.update_epochs) == (0.1, True, 1)
@@ -35,7 +37,13 @@ def test_the_small_preset_is_the_sheets():
     assert small.network.shared_encoder
     ppo = small.ppo
     assert (ppo.num_envs, ppo.num_steps, ppo.update_epochs, ppo.num_minibatches) == (16, 64, 3, 4)
-    assert (ppo.clip_coef, ppo.clip_vloss) == (0.2, False)
+    assert (ppo.chunk_steps, ppo.clip_coef, ppo.clip_vloss) == (16, 0.2, False)
+
+
+@pytest.mark.parametrize("chunk_steps", [0, 1, 32, 64, 100])
+def test_chunks_of_a_divisor_of_the_steps_or_of_whole_rollouts(chunk_steps):
+    changed = from_mapping(preset("small"), {"ppo": {"chunk_steps": chunk_steps}}, "file")
+    assert changed.ppo.chunk_steps == chunk_steps
 
 
 def test_plain_data_is_read_back():
@@ -51,6 +59,7 @@ def test_plain_data_is_read_back():
         ({"ppo": {"clip_coef": "much"}}, "expected a number"),
         ({"ppo": {"num_envs": 0}}, "ppo.num_envs is 0"),
         ({"ppo": {"num_minibatches": 5}}, "must divide"),
+        ({"ppo": {"chunk_steps": 24}}, "must divide ppo.num_steps (64)"),
         ({"ppo": {"gamma": 1.5}}, "expected 0.0 … 1.0"),
         ({"network": {"encoder": "paper", "image_size": 32}}, "needs 36 pixels"),
         ({"agent": {"intent": "some"}}, "expected one of"),
@@ -60,7 +69,7 @@ def test_plain_data_is_read_back():
     ],
 )
 def test_invalid_settings_are_refused(changes, words):
-    with pytest.raises(UsageError, match=words.replace(".", r"\.")):
+    with pytest.raises(UsageError, match=re.escape(words)):
         from_mapping(preset("small"), changes, "file")
 
 

@@ -225,10 +225,11 @@ def _columns(rollout, part):
     tensors = {
         f.name: getattr(rollout, f.name)[:, part]
         for f in dataclasses.fields(Rollout)
-        if f.name not in {"batch", "last_value", "finished"}
+        if f.name not in {"batch", "states", "last_value", "finished"}
     }
     batch = rollout.batch.select(torch.tensor(part))
-    return Rollout(batch, last_value=rollout.last_value[part], **tensors)
+    states = [{name: values[part] for name, values in each.items()} for each in rollout.states]
+    return Rollout(batch, states, last_value=rollout.last_value[part], **tensors)
 
 
 def _in_step(ranks, halves, ppo):

@@ -8,7 +8,9 @@ torch = pytest.importorskip("torch")
 
 from internav_data.camp.agents import AGENTS, make_agent  # noqa: E402
 from internav_data.camp.agents.hierarchy import AuxiliaryAgent  # noqa: E402
+from internav_data.camp.agents.protocol import Batch  # noqa: E402
 from internav_data.camp.networks import EpisodeSegments  # noqa: E402
+from internav_data.camp.ppo import replayed  # noqa: E402
 from internav_data.envs.house_map import MAP_SIZE  # noqa: E402
 from internav_data.envs.sensors import sensor_names  # noqa: E402
 
@@ -48,6 +50,70 @@ def test_log_probabilities_and_values_are_those_of_the_rollout(
     assert any(rollout.batch.episode_starts[1:].any() for rollout in lived)
     if method == "camp":
         assert any(rollout.batch.state["open"].any() for rollout in lived[1:])
+
+
+@pytest.mark.parametrize(("method", "condition"), VARIANTS)
+@pytest.mark.parametrize("shared", [True, False])
+def test_chunks_replay_the_rollout(collected, curious, method, condition, shared):
+    """Interactions and episodes begin and end within chunks, and go on from one to the next."""
+    changes = {"agent": {**curious["agent"], **condition}, "network": {"shared_encoder": shared}}
+    agent, _, lived = collected(method, rollouts=2, steps=12, changes=changes, chunk_steps=4)
+    for rollout in lived:
+        assert len(rollout.states) == 3
+        for columns in ([2, 0], [0, 1, 2, 3]):
+            now = replayed(agent, rollout, torch.tensor(columns))
+            expected = rollout.log_probs[:, columns]
+            torch.testing.assert_close(now.log_prob, expected, atol=1e-5, rtol=0)
+            expected = rollout.values[:, columns]
+            torch.testing.assert_close(now.value, expected, atol=1e-5, rtol=0)
+    assert any(rollout.batch.episode_starts[1:].any() for rollout in lived)
+
+
+def test_chunks_of_auxiliary_tasks_replay_the_rollout(collected, config):
+    agent = AuxiliaryAgent(make_agent("camp", config()), ["navigate", "push", "pick", "push"])
+    _, _, lived = collected("", rollouts=2, agent=agent, steps=16, chunk_steps=4)
+    for rollout in lived:
+        now = replayed(agent, rollout, torch.tensor([3, 1, 0]))
+        expected = rollout.log_probs[:, [3, 1, 0]]
+        torch.testing.assert_close(now.log_prob, expected, atol=1e-5, rtol=0)
+        torch.testing.assert_close(now.value, rollout.values[:, [3, 1, 0]], atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize("method", ["ppo", "camp"])
+def test_no_gradient_leaves_a_chunk(collected, method):
+    """The gradient of a loss over chunks is the sum of those over each chunk for itself."""
+    agent, _, (rollout,) = collected(method, rollouts=1, steps=12, chunk_steps=4)
+    now = replayed(agent, rollout, torch.arange(4))
+    parameters = agent.optimised()
+    found = torch.autograd.grad(loss_of(now), parameters, allow_unused=True)
+    apart = 0.0
+    for number, state in enumerate(rollout.states):
+        rows = slice(4 * number, 4 * number + 4)
+        batch = rollout.batch
+        alone = Batch(
+            {name: values[rows] for name, values in batch.observations.items()},
+            batch.episode_starts[rows],
+            state,
+            batch.record.map(lambda values, rows=rows: values[rows]),
+        )
+        apart = apart + loss_of(agent.evaluate(alone))
+    expected = torch.autograd.grad(apart, parameters, allow_unused=True)
+    whole = torch.autograd.grad(
+        loss_of(agent.evaluate(rollout.batch)), parameters, allow_unused=True
+    )
+    for one, other in zip(found, expected, strict=True):
+        assert (one is None) == (other is None)
+        if one is not None:
+            torch.testing.assert_close(one, other, atol=1e-4, rtol=1e-4)
+    differs = [
+        not torch.allclose(a, b, 1e-2) for a, b in zip(found, whole, strict=True) if a is not None
+    ]
+    assert any(differs)
+
+
+def loss_of(found):
+    """Return a scalar that depends on all outputs."""
+    return (found.log_prob + found.value.square() + found.entropy).sum()
 
 
 @pytest.mark.parametrize("method", ["ppo", "ppo-intent", "camp", "hrl"])

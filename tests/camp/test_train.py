@@ -36,7 +36,7 @@ from internav_data.records.errors import (  # noqa: E402
 SMALL = {
     "network": {"image_size": 16, "hidden": 12},
     "ppo": {
-        "num_envs": 4, "num_minibatches": 2, "num_steps": 8, "update_epochs": 2,
+        "num_envs": 4, "num_minibatches": 2, "num_steps": 8, "chunk_steps": 4, "update_epochs": 2,
         "critic_warmup_rollouts": 1,
     },
     "cloning": {"frames": 64, "epochs": 2, "num_envs": 4, "num_steps": 8, "sync_every": 2},
@@ -230,7 +230,7 @@ def test_what_is_not_finite_stops_and_leaves_the_last_checkpoint(request_for, mo
     ("asked", "words"),
     [
         ({"method": "ppo"}, "run of method 'camp', asked for 'ppo'"),
-        ({"config": {"ppo": {"num_steps": 9}}}, "ppo.num_steps is 8 in this run, asked for 9"),
+        ({"config": {"ppo": {"num_steps": 12}}}, "ppo.num_steps is 8 in this run, asked for 12"),
         ({"parts": ("all",)}, "stage auxiliary is not finished"),
     ],
 )

@@ -101,6 +101,33 @@ class Batch(Generic[R]):
             self.record and self.record.map(lambda values: values[:, columns]),
         )
 
+    def chunked(self, columns: Tensor, states: Sequence[State]) -> Batch[R]:
+        """Return the steps of m environments cut into C chunks, each of which is a column.
+
+        Parameters
+        ----------
+        columns : (m,)
+            Numbers of the environments.
+        states
+            Memory (n, …) before the first step of each of the C chunks; C divides T.
+
+        Returns
+        -------
+        Batch
+            T / C steps of C m columns: the first chunk of every environment, then the second.
+        """
+
+        def cut(values: Tensor) -> Tensor:
+            rows = values.view(len(states), -1, *values.shape[1:])  # (C, T / C, n, …)
+            return rows.transpose(0, 1)[:, :, columns].flatten(1, 2)
+
+        return Batch(
+            {name: cut(values) for name, values in self.observations.items()},
+            cut(self.episode_starts),
+            {name: torch.cat([each[name][columns] for each in states]) for name in self.state},
+            self.record and self.record.map(cut),
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class Evaluated:
