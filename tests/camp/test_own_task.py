@@ -14,6 +14,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from internav_data.camp.checkpoint import read  # noqa: E402
+from internav_data.camp.config import config_of  # noqa: E402
 from internav_data.camp.run import begin, resume  # noqa: E402
 from internav_data.camp.train import Request  # noqa: E402
 from internav_data.envs.tasks import InteractiveNavigation  # noqa: E402
@@ -65,6 +66,19 @@ def test_the_example_trains_over_processes_and_no_other_task_goes_on(scenes, tmp
     with pytest.raises(UsageError, match="run of task 'frugal', asked for 'interactive'"):
         resume(request, {})
     resume(replace(request, task=frugal), {})
+
+
+def test_training_pays_what_the_task_pays(scenes, tmp_path, frugal):
+    class Counted(frugal):
+        name, steps = "counted", 0
+
+        def step(self, result):
+            Counted.steps += 1
+            return super().step(result)
+
+    config = config_of("small", overrides=[*TINY, "run.workers=0"])
+    begin(Request(scenes, tmp_path / "run", "ppo", config, ("all",), task=Counted))
+    assert Counted.steps == 64
 
 
 def test_a_task_needs_a_name_of_its_own(scenes, tmp_path):
