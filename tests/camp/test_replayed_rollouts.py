@@ -7,7 +7,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from internav_data.camp.agents import AGENTS, make_agent  # noqa: E402
-from internav_data.camp.agents.hierarchy import AuxiliaryAgent  # noqa: E402
+from internav_data.camp.agents.hierarchy import AuxiliaryAgent, option_inputs  # noqa: E402
 from internav_data.camp.agents.protocol import Batch  # noqa: E402
 from internav_data.camp.networks import EpisodeSegments  # noqa: E402
 from internav_data.camp.ppo import replayed  # noqa: E402
@@ -155,8 +155,13 @@ def test_intents_worked_out_again_are_those_recorded(collected, curious, method,
         batch = rollout.batch
         recorded = batch.record.intent
         record = dataclasses.replace(batch.record, intent=None)
-        again = agent.evaluate(dataclasses.replace(batch, record=record))
-        torch.testing.assert_close(again.intent, recorded, atol=1e-5, rtol=0)
+        unknown = dataclasses.replace(batch, record=record)
+        again = agent.evaluate(unknown)
+        if method == "camp":
+            intent = agent.run(unknown, option_inputs(record.open, record.used)).intent
+        else:
+            intent = agent.run(unknown).inputs["intent"]
+        torch.testing.assert_close(intent, recorded, atol=1e-5, rtol=0)
         torch.testing.assert_close(again.log_prob, rollout.log_probs, atol=1e-5, rtol=0)
         assert recorded.std(0).max() > 1e-3  # intents differ from step to step
 

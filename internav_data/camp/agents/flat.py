@@ -112,8 +112,7 @@ class PPOAgent(RecurrentAgent[FlatRecord]):
         ran = self.run(batch)
         log_prob = networks.log_prob_of(ran.log_probs, batch.record.choice)
         entropy = networks.entropy_of(ran.log_probs)
-        intent = ran.inputs.get("intent")
-        return Evaluated(log_prob, ran.value, entropy, ran.state, intent, critic_inputs=ran.out)
+        return Evaluated(log_prob, ran.value, entropy, ran.state, critic_inputs=ran.out)
 
     def labels(self, actions: Sequence[int]) -> tuple[list[int], FlatRecord]:
         """See `Agent`."""

@@ -248,7 +248,7 @@ class ForwardOutput(NamedTuple):
     action_log_probs: Tensor
     """(T, n, 4, A): log-probabilities of the actions of each option; STOP's is Done."""
     termination: Tensor
-    """(T, n, 4): logits of beta, the probability that each option terminates on arrival."""
+    """(T, n, 3): logits of beta, the probability that Navigate, Push, Pick end on arrival."""
     value: Tensor
     """(T, n): the global policy's values."""
     out: Tensor
@@ -372,7 +372,7 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
         acted = networks.entropy_of(_of_option(ran.action_log_probs, record.option))
         state = {**batch.state, "hidden": ran.hidden}
         entropy = networks.entropy_of(ends) + decided + acted
-        return Evaluated(log_prob, ran.value, entropy, state, ran.intent, critic_inputs=ran.out)
+        return Evaluated(log_prob, ran.value, entropy, state, critic_inputs=ran.out)
 
     def decisions(self, ran: ForwardOutput, opened: Tensor) -> tuple[Tensor, Tensor]:
         """Return what is decided on arrival, where interactions `opened` (T, n) are open.
@@ -423,7 +423,7 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
             may_end = k == NAVIGATE or self.hand_back_step
             log_probs.append(action_log_probs_of(k, logits, may_end=may_end))
             terminations.append(logits[..., -1] - logits[..., :-1].logsumexp(-1))
-        termination = torch.stack([*terminations, torch.zeros_like(terminations[0])], -1)
+        termination = torch.stack(terminations, -1)
         acts = torch.stack([*log_probs, self.done.expand_as(log_probs[0])], -2)  # (T, n, 4, A)
         features, intended = torch.cat([views[0], option_features], -1), None
         if not self.uses_intent:
@@ -553,24 +553,22 @@ class AuxiliaryAgent(RecurrentAgent[OptionRecord]):
         hidden : (n, hidden)
             Hidden states after the last step.
         """
-        before, (steps, count, _) = batch.state["hidden"], option_features.shape
-        log_probs = before.new_full((steps, count, ACTION_COUNT), -torch.inf)
-        value, hidden = before.new_zeros(steps, count), torch.zeros_like(before)
-        for task, policy in enumerate(self.hierarchy.policies):
-            columns = (option == task).nonzero().flatten()
-            if not len(columns):
-                continue
-            encoder = self.hierarchy.encoders[task % len(self.hierarchy.encoders)]
-            own = batch.select(columns)
-            inputs = encoder(own.observations)
+        parts: list[tuple[Tensor, Tensor, Tensor]] = []
+        columns = [(option == task).nonzero().flatten() for task in (NAVIGATE, PUSH, PICK)]
+        for task in (task for task, numbers in enumerate(columns) if len(numbers)):
+            policy, own = self.hierarchy.policies[task], batch.select(columns[task])
+            inputs = self.hierarchy.encoders[task % len(self.hierarchy.encoders)](own.observations)
             if task != NAVIGATE:
-                inputs = torch.cat([inputs, option_features[:, columns]], -1)
+                inputs = torch.cat([inputs, option_features[:, columns[task]]], -1)
             out, after = own.segments.run(policy.gru, inputs, own.state["hidden"])
-            own_log_probs = action_log_probs_of(task, policy.actor(out))
-            log_probs = log_probs.index_copy(1, columns, own_log_probs)
-            value = value.index_copy(1, columns, policy.value(out))
-            hidden = hidden.index_copy(0, columns, after)
-        return log_probs, value, hidden
+            parts.append((action_log_probs_of(task, policy.actor(out)), policy.value(out), after))
+        order = torch.cat(columns).argsort()
+        log_probs, value, hidden = zip(*parts, strict=True)
+        return (
+            torch.cat(log_probs, 1)[:, order],
+            torch.cat(value, 1)[:, order],
+            torch.cat(hidden)[order],
+        )
 
     def optimised(self) -> list[nn.Parameter]:
         """See `Agent`: encoders and policies that have environments, critics too."""

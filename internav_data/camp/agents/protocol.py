@@ -141,8 +141,6 @@ class Evaluated:
     """(T, n): entropy of the distributions that were drawn from."""
     state: State
     """(n, …): memory after the last step; without hidden states that were not run again."""
-    intent: Tensor | None = None
-    """(T, n, …): P(i), where it was recomputed."""
     loss: Tensor | None = None
     """(T, n): loss of other predictions (`nie`)."""
     critic_inputs: Tensor | None = None
