@@ -256,11 +256,7 @@ def code_digest(root: Path = _ROOT) -> str:
     for folder in _CODE:
         for path in sorted((root / folder).rglob("*")):
             name = path.relative_to(root).as_posix()
-            if (
-                not path.is_file()
-                or "__pycache__" in name
-                or name.startswith("tests/torture/results/")
-            ):
+            if _NO_CODE.match(name) or not path.is_file():
                 continue
             digest.update(f"{name}\n".encode() + hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()[:16]
