@@ -21,6 +21,7 @@ from internav_data.core.files import with_sha256
 from internav_data.dataset import load_dataset, write_parquet
 from internav_data.dataset.commit import identity_of, open_staging
 from internav_data.dataset.manifest import read_manifest
+from internav_data.envs.slot import EpisodeSnapshot
 from internav_data.evaluation.archive import read_evaluation
 from internav_data.evaluation.metrics import RESULTS
 from internav_data.generation import GenerationConfig, load_config
@@ -123,6 +124,15 @@ def _checkpoint(path):
     checkpoint.snapshots_of(found.progress, range(1))
 
 
+def _resumable():
+    """Return a real checkpoint's JSON with what a run resumes from."""
+    values = json.loads((AGENT / "checkpoint.json").read_text())
+    snapshot = EpisodeSnapshot("scene-000001/0000", (0, 11), 0, 1, (3, 4, 0))
+    counters = {**asdict(checkpoint.TrainState()), **values["progress"]}
+    progress = {**counters, "environments": [asdict(snapshot)], "window": [{}], "log": 0}
+    return with_sha256(values | {"progress": progress})
+
+
 def _evaluation(path):
     write_parquet(path.parent / "episodes.parquet", [], RESULTS)
     read_evaluation(path.parent)
@@ -141,7 +151,7 @@ JSON = {
     "plan.json": (load_floor_plan, PLAN),
     "actions.json": (read_actions, {"episode_id": "e", "actions": ["MoveAhead", 11]}),
     "manifest.json": (_manifest, json.loads((DATASET / "manifest.json").read_text())),
-    "checkpoint.json": (_checkpoint, json.loads((AGENT / "checkpoint.json").read_text())),
+    "checkpoint.json": (_checkpoint, _resumable()),
     "checkpoints.json": (
         _pointers,
         with_sha256({"last": "3", "best": "2", "serial": 3, "best_score": 0.5}),
@@ -154,10 +164,7 @@ TOMLS = {
     "config.toml": (lambda path: load_config(path).check(), config_toml(GenerationConfig())),
     "train.toml": (lambda path: config_of("small", path), config_toml(preset("small"))),
     "assets.toml": (lambda path: read_notes(path.parent, ("a.obj",)), NOTES),
-    "plan.toml": (
-        load_floor_plan,
-        "[[rooms]]\ntype = 'living'\npolygon = [[0,0], [4,0], [4,3], [0,3]]\n[[doors]]\nat = 3",
-    ),
+    "plan.toml": (load_floor_plan, (ROOT / "examples" / "floor_plan.toml").read_text()),
 }
 READERS = {name: reader for name, (reader, _) in (JSON | TOMLS).items()}
 
@@ -223,6 +230,13 @@ def limited_time():
     yield
     signal.alarm(0)
     signal.signal(signal.SIGALRM, before)
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_a_valid_file_is_read_by_every_reader(place, name):
+    path, valid = place(name), (JSON | TOMLS)[name][1]
+    path.write_text(valid if isinstance(valid, str) else json.dumps(valid))
+    READERS[name](path)
 
 
 @pytest.mark.usefixtures("limited_time")

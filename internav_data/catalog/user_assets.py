@@ -206,6 +206,8 @@ def _read(path: Path) -> tuple[Floats, NDArray[np.int64], RGB]:
         raise UsageError(f"{path}: {len(faces)} triangles, at most {MAX_FACES}; simplify it")
     if not finite:
         raise UsageError(f"{path}: has corners that are not numbers; export it again")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise UsageError(f"{path}: has triangles of corners that it does not have; export it again")
     return vertices, faces, _mean_colour(mesh)
 
 

@@ -330,6 +330,18 @@ def test_a_glb_that_takes_minutes_or_memory_is_refused_at_once(tmp_path, scene, 
     assert time.process_time() - started < 5
 
 
+def test_a_glb_with_a_triangle_of_no_corners_is_refused(tmp_path):
+    import trimesh
+
+    box = trimesh.creation.box((0.4, 0.6, 0.8))
+    faces = box.faces.astype("<u4").tobytes()
+    content = box.export(file_type="glb")
+    assert content.count(faces) == 1
+    broken = content.replace(faces, struct.pack("<I", 8) + faces[4:])
+    with pytest.raises(UsageError, match="corners that it does not have"):
+        load_user_assets(folder(tmp_path, "thing.glb", mesh=broken))
+
+
 def test_an_obj_of_many_groups_is_refused(tmp_path):
     many = b"".join(b"\nusemtl m%d" % k for k in range(2000))
     with pytest.raises(UsageError, match="2000 groups, at most 1000"):

@@ -7,7 +7,6 @@ steers the same readers by what code the bytes reach.
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import json
 import resource
@@ -20,7 +19,7 @@ from typing import TYPE_CHECKING
 import bits
 from campaign import Row
 from strategies import rng
-from stub_runs import contents, forked, made
+from stub_runs import contents, forked, in_scratch, made, scratch
 from test_hostile_files import AGENT, DATASET, HOSTILE, JSON, TOMLS
 from test_hostile_files import READERS as SMALL
 
@@ -73,7 +72,7 @@ def _mesh(suffix: str) -> tuple[str, bytes, Callable[[Path], object]]:
 
 
 def _table(spec) -> tuple[str, bytes, Callable[[Path], object]]:
-    folder = Path(tempfile.mkdtemp(prefix="torture-tables-"))
+    folder = scratch("tables")
     made(folder / "d", 3)
     data = next((folder / "d" / "data").rglob(f"{spec.name}*/*.parquet"), None) or next(
         (folder / "d" / "data").glob(f"{spec.name}*.parquet")
@@ -108,6 +107,23 @@ READERS: dict[str, Callable[[], tuple[str, bytes, Callable[[Path], object]]]] = 
 }
 
 
+@functools.cache
+def reader_of(name: str) -> tuple[str, bytes, Callable[[Path], object]]:
+    """Return the name of a reader's file, its valid content, and the reader."""
+    return READERS[name]()
+
+
+def read_or_refused(read: Callable[[Path], object], path: Path) -> bool:
+    """Return whether a reader takes a file; else it must raise an error for users, in one line."""
+    try:
+        read(path)
+    except InternavError as error:
+        if "\n" in str(error):
+            raise AssertionError(f"several lines: {error}") from error
+        return False
+    return True
+
+
 def changed(valid: bytes, random) -> bytes:
     """Return bytes with some changes, each drawn from six kinds."""
     data = bytearray(valid)
@@ -133,11 +149,10 @@ def changed(valid: bytes, random) -> bytes:
 
 def hammer(name: str, seed: int, seconds: float, folder: Path) -> int:
     """Have a reader read changed bytes for some processor time; return how many times it did."""
-    relative, valid, read = READERS[name]()
+    relative, valid, read = reader_of(name)
     path = beside(folder, relative)
     path.write_bytes(valid)
-    with contextlib.suppress(InternavError):  # imports, caches
-        read(path)
+    assert read_or_refused(read, path), f"{name}: what is valid is refused"  # and all is imported
     signal.signal(signal.SIGALRM, signal.SIG_DFL)  # a reader that waits is killed
     before, end, number = _peak_mb(), time.process_time() + seconds, 0
     while time.process_time() < end:
@@ -148,10 +163,7 @@ def hammer(name: str, seed: int, seconds: float, folder: Path) -> int:
         signal.alarm(HANGS_S)
         where = f"{name}, seed {seed}, input {number} ({len(data)} bytes, {data[:60]!r})"
         try:
-            read(path)
-        except (InternavError, OSError) as error:
-            if "\n" in str(error):
-                raise AssertionError(f"{where}: several lines: {error}") from error
+            read_or_refused(read, path)
         except Exception as error:
             raise AssertionError(f"{where}: {type(error).__name__}: {error}") from error
         signal.alarm(0)
@@ -174,9 +186,10 @@ def cases():
 def run(key: str, folder: Path):
     """Fuzz a reader with a seed, in a copy of this process."""
     name, seed = key.rsplit(" ", 1)
-    said = forked(lambda: hammer(name, int(seed), SECONDS, folder / "place"))
-    assert said.isdigit(), " ".join(said.split())[-1500:]
-    return {"runs": int(said)}
+    reader_of(name)  # once for all copies
+    outcome = forked(lambda: hammer(name, int(seed), SECONDS, folder / "place"))
+    assert outcome.isdigit(), " ".join(outcome.split())[-1500:]
+    return {"runs": int(outcome)}
 
 
-ROW = Row("fuzz", cases, run)
+ROW = Row("fuzz", cases, in_scratch(run))

@@ -8,49 +8,64 @@ from __future__ import annotations
 
 import functools
 import shutil
-import tempfile
-from pathlib import Path
+from collections import Counter
+from typing import TYPE_CHECKING, ClassVar
 
 import hypothesis
 from campaign import Row
-from fault_points import FaultPoints
+from fault_points import FaultPoints, mark_of
 from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
     RuleBasedStateMachine,
     initialize,
+    invariant,
     precondition,
     rule,
     run_state_machine_as_test,
 )
-from stub_runs import CONFIG, OTHER, check_readable, contents, difference, forked, made, merged
+from stub_runs import (
+    OTHER,
+    STRANGERS,
+    check_readable,
+    contents,
+    difference,
+    forked,
+    made,
+    merged,
+    scratch,
+    whole,
+    whole_contents,
+)
 
 from internav_data.core.storage import write_atomically
 from internav_data.dataset import has_manifest, load_dataset
 from internav_data.records.errors import InternavError
 from internav_data.verification import validate
 
+if TYPE_CHECKING:
+    from pathlib import Path
+
 MAX_SCENES, RUNS, STEPS = 5, 5, 20
-STRANGERS = {"notes.txt": b"precious", "data/mine.txt": b"precious"}
 _MANIFEST = "manifest.json"
-
-
-@functools.cache
-def whole(scenes: int, *, other: bool = False) -> Path:
-    """Return a dataset that was made in one piece."""
-    folder = Path(tempfile.mkdtemp(prefix="torture-whole-"))
-    made(folder / "d", scenes, OTHER if other else CONFIG)
-    return folder / "d"
 
 
 class Folder(RuleBasedStateMachine):
     """A folder and what it must hold."""
 
+    totals: ClassVar[Counter[str]] = Counter()
+    """Runs, steps and kills that really happened; `run_machine` counts them anew."""
+
     def __init__(self) -> None:
         super().__init__()
-        self.place = Path(tempfile.mkdtemp(prefix="torture-states-"))
+        self.place = scratch("states")
         self.out = self.place / "d"
-        self.steps = 0
+        self.steps = -1  # the first is `begin`
+
+    @invariant()
+    def count(self):
+        """Count a step: hypothesis asks after each."""
+        self.steps += 1
 
     @initialize()
     def begin(self):
@@ -59,19 +74,20 @@ class Folder(RuleBasedStateMachine):
         self.damaged: dict[str, bytes] = {}
 
     def teardown(self):
+        self.totals.update(runs=1, steps=self.steps)
         shutil.rmtree(self.place)
 
     @property
     def files(self):
         """Contents of the folder without strangers' files."""
-        found = contents(self.out)
+        files = contents(self.out)
         if self.strange:
-            assert {name: found.pop(name) for name in STRANGERS} == STRANGERS
-        return found
+            assert {name: files.pop(name) for name in STRANGERS} == STRANGERS
+        return files
 
     def _is_whole(self, scenes):
-        found = difference(self.files, contents(whole(scenes)))
-        assert not found, f"expected the {scenes} scenes of a run in one piece: {found}"
+        differences = difference(self.files, whole_contents(scenes))
+        assert not differences, f"expected the {scenes} scenes of a run in one piece: {differences}"
         self.held, self.killed, self.damaged = scenes, False, {}
 
     def _ends_with(self, scenes):
@@ -110,12 +126,16 @@ class Folder(RuleBasedStateMachine):
             FaultPoints(self.out, int(share * calls), "SIGKILL").install()
             made(self.out, scenes)
 
-        said = forked(run)
-        assert said in {"", "killed by SIGKILL"} or "would be lost" in said, said
-        if "SIGKILL" in said:
+        outcome = forked(run)
+        killed = outcome == "killed by SIGKILL"
+        assert killed or not outcome or "would be lost" in outcome, outcome
+        assert mark_of(self.out).exists() == killed, "a kill, and no fault point was reached"
+        mark_of(self.out).unlink(missing_ok=True)
+        if killed:
+            self.totals["kills"] += 1
             self.killed = True
             self.held = max(self.held, check_readable(self.out, whole(MAX_SCENES)))
-        elif not said:
+        elif not outcome:
             self._ends_with(scenes)
 
     @rule(scenes=st.integers(1, MAX_SCENES))
@@ -155,14 +175,14 @@ class Folder(RuleBasedStateMachine):
 
     @rule()
     @precondition(lambda self: self.held or self.killed)
-    def validate(self):
+    def check_files(self):
         """Find the damage, and nothing else."""
         if not has_manifest(self.out):
             return
-        found = {finding.file for finding in validate(self.out, "files").found}
-        # Files of a commit that was cut off are noted; a stranger's among the data is named.
+        named = {finding.file for finding in validate(self.out, "files").found}
+        # Files of a commit that was cut off are expected; a stranger's among the data is named.
         strangers = {name for name in STRANGERS if self.strange and name.startswith("data/")}
-        assert found == set(self.damaged) | strangers, found
+        assert named == set(self.damaged) | strangers, named
 
     @rule()
     @precondition(lambda self: self.held)
@@ -186,11 +206,11 @@ class Folder(RuleBasedStateMachine):
             if not self.killed:
                 assert not difference(contents(self.out), before), "a refused merge changed it"
             return
-        if not self.damaged and not self.killed:
+        if self.killed:  # what a killed `generate` left in .work/ goes with the next `generate`
+            assert check_readable(self.out, whole(MAX_SCENES)) == MAX_SCENES
+            self.held = MAX_SCENES
+        else:
             self._is_whole(MAX_SCENES)
-        elif self.killed:  # what a killed `generate` left in .work/ goes with the next `generate`
-            check_readable(self.out, whole(MAX_SCENES))
-        self.held = MAX_SCENES
 
     @rule()
     @precondition(lambda self: self.held and not self.strange)
@@ -214,13 +234,13 @@ def _scene(name: str) -> int:
 
 @functools.cache
 def _part(first: int, end: int) -> Path:
-    folder = Path(tempfile.mkdtemp(prefix="torture-part-"))
-    made(folder / "d", range(first, end))
-    return folder / "d"
+    folder = scratch("part") / "d"
+    made(folder, range(first, end))
+    return folder
 
 
-def run_machine(seed: int, runs: int, steps: int) -> None:
-    """Run the state machine with a seed."""
+def run_machine(seed: int, runs: int, steps: int) -> Counter[str]:
+    """Run the state machine with a seed; return how many runs, steps and kills there were."""
     profile = settings(
         max_examples=runs,
         stateful_step_count=steps,
@@ -230,14 +250,14 @@ def run_machine(seed: int, runs: int, steps: int) -> None:
         report_multiple_bugs=False,
         suppress_health_check=list(HealthCheck),
     )
-    machine = hypothesis.seed(seed)(type(f"Folder{seed}", (Folder,), {}))
+    machine = hypothesis.seed(seed)(type(f"Folder{seed}", (Folder,), {"totals": Counter()}))
     run_state_machine_as_test(machine, settings=profile)
+    return machine.totals
 
 
 def run(key: str, _folder: Path):
     """Run five runs of a seed."""
-    run_machine(int(key), RUNS, STEPS)
-    return {"runs": RUNS, "steps_a_run": STEPS}
+    return dict(run_machine(int(key), RUNS, STEPS))
 
 
 ROW = Row("states", lambda: map(str, range(200 // RUNS)), run)

@@ -44,6 +44,8 @@ from campaign import (
 from strategies import rng
 from stub_runs import forked
 
+from internav_data.records.errors import CorruptDataError
+
 _spec = util.spec_from_file_location("torture_command", Path(__file__).with_name("__main__.py"))
 command = util.module_from_spec(_spec)  # pytest's own is the __main__ that can be imported
 _spec.loader.exec_module(command)
@@ -70,14 +72,16 @@ def test_a_group_killed_at_an_fsync_goes_on(tmp_path):
 
 
 def test_a_folder_is_what_a_model_of_it_says():
-    states.run_machine(seed=0, runs=2, steps=10)
+    totals = states.run_machine(seed=0, runs=2, steps=10)
+    assert totals["runs"] == 2
+    assert 0 < totals["steps"] <= 20
 
 
 @pytest.mark.parametrize("name", ["journal", "staged", "parquet", "cache"])
 def test_changed_bytes_are_read_or_refused(tmp_path, name):
-    said = forked(lambda: fuzz.hammer(name, 0, 0.1, tmp_path / "place"))
-    assert said.isdigit(), said
-    assert int(said) > 0
+    outcome = forked(lambda: fuzz.hammer(name, 0, 0.1, tmp_path / "place"))
+    assert outcome.isdigit(), outcome
+    assert int(outcome) > 0
 
 
 def test_mutants_are_all_different():
@@ -364,3 +368,20 @@ def test_a_run_that_fails_by_itself_or_is_not_killed_fails_its_case(tmp_path, mo
     kills.count_fsyncs.cache_clear()
     with pytest.raises(AssertionError, match="ValueError: a bug"):
         next(kills.cases())
+
+
+@pytest.mark.parametrize("name", fuzz.READERS)
+def test_fuzzing_begins_with_what_is_read(tmp_path, name):
+    relative, valid, read = fuzz.reader_of(name)
+    path = fuzz.beside(tmp_path / "place", relative)
+    path.write_bytes(valid)
+    assert fuzz.read_or_refused(read, path)
+
+
+@pytest.mark.parametrize("error", [OSError("one line"), CorruptDataError("two\nlines"), KeyError()])
+def test_fuzzing_takes_errors_for_users_alone(tmp_path, error):
+    def read(_):
+        raise error
+
+    with pytest.raises((OSError, AssertionError, KeyError)):
+        fuzz.read_or_refused(read, tmp_path)
