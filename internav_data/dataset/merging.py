@@ -88,7 +88,7 @@ def merge(
         Parts of different identities, by another version of this package or of an engine; ranges
         that overlap or leave a hole; or `out` holds something else.
     CorruptDataError
-        A part is unfinished or damaged.
+        A part is unfinished or damaged, or the dataset in `out` is damaged.
     LockedError
         Another process is writing `out`.
     InternavError
@@ -106,11 +106,12 @@ def merge(
     store = store_of(out)
     with disk_errors(store.at("")), store.lock(BUSY):
         held = _held(store, found[0])
+        groups = list(_commits(held, found))
+        _check_held(store, metadata=not groups)
         journal = Journal(store)
         journal.sweep(held)
         first = found[0]
         assets = read_shard(first.store, first.manifest.of(ASSETS.name)[0], ASSETS)
-        groups = list(_commits(held, found))
         if groups:
             store.put(MERGING, (json.dumps({"scenes": found[-1].numbers.stop}) + "\n").encode())
         for group in groups:
@@ -259,6 +260,25 @@ def _held(store: Store, part: _Part) -> Manifest | None:
         what = f"another dataset ({found})" if found else "a part of a dataset"
         raise UsageError(f"{place}: holds {what}: give another folder")
     return held
+
+
+def _check_held(store: Store, *, metadata: bool) -> None:
+    """Check every byte of the data in place; of the metadata files too, if none will be written.
+
+    A kill may leave the metadata files of the commit that it cut off.
+
+    Raises
+    ------
+    CorruptDataError
+        A file is missing or damaged.
+
+    """
+    damage = find_damage(store)
+    if damage is not None and (damage.files or metadata):
+        raise CorruptDataError(
+            f"{store.at('')}: {', '.join(damage.paths[:3])}: missing or damaged: run `generate` "
+            "in this folder, which mends it, then merge; or give a new folder"
+        )
 
 
 def _commits(held: Manifest | None, parts: Sequence[_Part]) -> Iterator[list[_Part]]:

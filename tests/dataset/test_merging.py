@@ -245,6 +245,18 @@ def test_what_is_unfinished_or_damaged_is_refused(parts, tmp_path):
     assert out.blobs == {}
 
 
+@pytest.mark.parametrize("count", [2, 5])
+def test_a_damaged_dataset_in_place_is_refused_before_anything_is_written(parts, count):
+    store = MemoryStore()
+    merge(parts[5][:count], store)
+    name = next(name for name in store.names() if name.startswith("data/episodes/"))
+    store.put(name, store.read(name)[:-1] + b"?")
+    before = {name: store.read(name) for name in store.names()}
+    with pytest.raises(CorruptDataError, match=rf"{name}: missing or damaged: run `generate`"):
+        merge(parts[5], store)
+    assert {name: store.read(name) for name in store.names()} == before
+
+
 def test_folders_that_hold_something_else_are_refused(parts, tmp_path):
     two, held = parts[2], MemoryStore()
     build(held, range(3), identity=dataclasses.replace(OURS, seed=9))

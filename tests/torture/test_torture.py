@@ -385,3 +385,16 @@ def test_fuzzing_takes_errors_for_users_alone(tmp_path, error):
 
     with pytest.raises((OSError, AssertionError, KeyError)):
         fuzz.read_or_refused(read, tmp_path)
+
+
+def test_what_a_merge_leaves_is_looked_at(monkeypatch):
+    folder = states.Folder()
+    folder.begin()
+    folder.generate(scenes=states.MAX_SCENES)
+    folder.corrupt(number=0, cut=True, at=0.0)
+    folder.merge(cut=2)
+    assert folder.damaged, "it is refused, and nothing is changed"
+    monkeypatch.setattr(states, "merged", lambda *_: None)
+    with pytest.raises(AssertionError, match=r"expected the 5 scenes .* missing: README\.md"):
+        folder.merge(cut=2)
+    folder.teardown()
