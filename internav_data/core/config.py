@@ -297,7 +297,7 @@ def _unknown(key: str, where: str, known: Sequence[str], elsewhere: Sequence[str
     names = list(dict.fromkeys(near)) or list(known)
     listed = " or ".join(f"'{name}'" for name in names[:2]) if near else ", ".join(names)
     return UsageError(
-        f"{where}: there is no key '{key}'; " + (f"did you mean {listed}?" if near else listed)
+        f"{where}: there is no key {key!r}; " + (f"did you mean {listed}?" if near else listed)
     )
 
 

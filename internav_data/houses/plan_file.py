@@ -127,7 +127,7 @@ def _known(table: Mapping[str, Any], kind: str) -> None:
         if key not in _KEYS[kind]:
             where = f"[[{kind}]]" if kind else "the file"
             raise FloorPlanError(
-                f"unknown key '{key}' in {where}; known: {', '.join(sorted(_KEYS[kind]))}"
+                f"unknown key {key!r} in {where}; known: {', '.join(sorted(_KEYS[kind]))}"
             )
 
 
@@ -147,11 +147,11 @@ def _names(rooms: Sequence[Mapping[str, Any]]) -> list[str]:
         name = str(room.get("name", kind if kind is not None else f"number {k + 1}"))
         if kind not in list(ROOM_TYPES):  # a list, as what cannot be hashed is no type either
             raise FloorPlanError(
-                f"room '{name}': type is {kind!r}; choose one of {', '.join(sorted(ROOM_TYPES))}"
+                f"room {name!r}: type is {kind!r}; choose one of {', '.join(sorted(ROOM_TYPES))}"
             )
         if name in names or name == "outside":
             raise FloorPlanError(
-                f"room '{name}': this name is taken, give each room a 'name' of its own"
+                f"room {name!r}: this name is taken, give each room a 'name' of its own"
             )
         names.append(name)
     return names
@@ -186,7 +186,7 @@ def _room(name: object, names: Sequence[str], what: str) -> int:
     if name == "outside":
         return OUTSIDE
     if name not in names:
-        raise FloorPlanError(f"{what}: no room '{name}'; rooms: {', '.join(names)}")
+        raise FloorPlanError(f"{what}: no room {name!r}; rooms: {', '.join(map(repr, names))}")
     return names.index(str(name))
 
 
@@ -216,7 +216,7 @@ def _door(
     what = f"door {number + 1}"
     if not isinstance(between, list) or len(between) != 2:  # noqa: PLR2004 - two rooms
         raise FloorPlanError(f"{what}: 'between' is {between!r}, expected two names of rooms")
-    what = f"door {number + 1} between '{between[0]}' and '{between[1]}'"
+    what = f"door {number + 1} between {between[0]!r} and {between[1]!r}"
     a, b = sorted(_room(name, names, what) for name in between)
     if a == b:
         raise FloorPlanError(f"{what}: a door joins two different rooms")
@@ -251,7 +251,7 @@ def _window(
     shift: tuple[int, int],
     number: int,
 ) -> Opening:
-    what = f"window {number + 1} of '{entry.get('room')}'"
+    what = f"window {number + 1} of {entry.get('room')!r}"
     room = _room(entry.get("room"), names, what)
     at = _point(entry.get("at"), what, shift)
     width, sill, height = (
@@ -287,7 +287,7 @@ def _apart(openings: Sequence[Opening], names: Sequence[str]) -> None:
             ):
                 room = names[one.rooms[1]]
                 raise FloorPlanError(
-                    f"room '{room}': two of its doors or windows overlap; move one"
+                    f"room {room!r}: two of its doors or windows overlap; move one"
                 )
 
 
@@ -299,5 +299,5 @@ def _joined(doors: Sequence[Opening], names: Sequence[str]) -> tuple[tuple[int, 
         seen |= {b for a, b in pairs if a in seen} | {a for a, b in pairs if b in seen}
     lost = [name for k, name in enumerate(names) if k not in seen]
     if lost:
-        raise FloorPlanError(f"room '{lost[0]}': no way leads there from '{names[0]}'; add a door")
+        raise FloorPlanError(f"room {lost[0]!r}: no way leads there from {names[0]!r}; add a door")
     return tuple(pairs)

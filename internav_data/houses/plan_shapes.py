@@ -38,10 +38,10 @@ def read_polygon(value: object, name: str) -> list[Corner]:
     """
     if not isinstance(value, list) or len(value) < 4:  # noqa: PLR2004 - a rectangle has four
         raise FloorPlanError(
-            f"room '{name}': 'polygon' needs four or more corners [x, y] in metres"
+            f"room {name!r}: 'polygon' needs four or more corners [x, y] in metres"
         )
     if len(value) > MAX_CORNERS:
-        raise FloorPlanError(f"room '{name}': {len(value)} corners, at most {MAX_CORNERS}")
+        raise FloorPlanError(f"room {name!r}: {len(value)} corners, at most {MAX_CORNERS}")
     corners: list[Corner] = []
     for entry in value:
         good = (
@@ -57,17 +57,17 @@ def read_polygon(value: object, name: str) -> list[Corner]:
         )
         if not good:
             raise FloorPlanError(
-                f"room '{name}': corner {entry!r} is no [x, y] in metres within "
+                f"room {name!r}: corner {entry!r} is no [x, y] in metres within "
                 f"{MAX_EXTENT_CM // 100} m"
             )
         corners.append((round(entry[0] * 100), round(entry[1] * 100)))
     corners = [c for k, c in enumerate(corners) if c != corners[k - 1]]
     if len(corners) < 4:  # noqa: PLR2004 - a rectangle has four
-        raise FloorPlanError(f"room '{name}': 'polygon' needs four or more different corners")
+        raise FloorPlanError(f"room {name!r}: 'polygon' needs four or more different corners")
     for (ax, ay), (bx, by) in itertools.pairwise([*corners, corners[0]]):
         if (ax == bx) == (ay == by):
             raise FloorPlanError(
-                f"room '{name}': the side from ({ax / 100}, {ay / 100}) to ({bx / 100}, "
+                f"room {name!r}: the side from ({ax / 100}, {ay / 100}) to ({bx / 100}, "
                 f"{by / 100}) is not along x or y; walls are rectilinear"
             )
     count = len(corners)
@@ -98,7 +98,7 @@ def _check_simple(corners: Sequence[Corner], name: str) -> None:
         neighbours = b == a + 1 or (a == 0 and b == count - 1)
         backwards = neighbours and (p[0] == q[0]) == (r[0] == s[0])
         if meet and (not neighbours or backwards):
-            raise FloorPlanError(f"room '{name}': its outline touches or crosses itself")
+            raise FloorPlanError(f"room {name!r}: its outline touches or crosses itself")
 
 
 def _covers(corners: Sequence[Corner], x: float, y: float) -> bool:
@@ -135,7 +135,7 @@ def lay_out(
             ]
             if len(inside) > 1:
                 raise FloorPlanError(
-                    f"room '{names[inside[1]]}': overlaps room '{names[inside[0]]}' at "
+                    f"room {names[inside[1]]!r}: overlaps room {names[inside[0]]!r} at "
                     f"({(x0 + left) / 100}, {(y0 + low) / 100})"
                 )
             if inside:
@@ -150,7 +150,7 @@ def _check_tiling(grid: FloorGrid, names: Sequence[str]) -> None:
     for room, name in enumerate(names):
         x0, y0, x1, y1 = grid.main_rectangle(room)
         if min(x1 - x0, y1 - y0) < MIN_SIDE_CM:
-            raise FloorPlanError(f"room '{name}': it is narrower than {MIN_SIDE_CM / 100} m")
+            raise FloorPlanError(f"room {name!r}: it is narrower than {MIN_SIDE_CM / 100} m")
     if grid.polygon(frozenset(range(len(names)))):
         return
     reached = {0}
@@ -162,10 +162,10 @@ def _check_tiling(grid: FloorGrid, names: Sequence[str]) -> None:
     lost = next((name for k, name in enumerate(names) if k not in reached), None)
     if lost is not None:
         raise FloorPlanError(
-            f"room '{lost}': shares no wall with the others; rooms are centre lines of walls, "
+            f"room {lost!r}: shares no wall with the others; rooms are centre lines of walls, "
             "close the gap"
         )
     raise FloorPlanError(
-        f"room '{names[-1]}': the rooms enclose a gap or touch at a corner only; fill the gap "
+        f"room {names[-1]!r}: the rooms enclose a gap or touch at a corner only; fill the gap "
         "with a room or close it"
     )

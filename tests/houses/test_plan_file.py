@@ -97,6 +97,8 @@ BAD_PLANS = {
     "name twice": ((LIVING, {**BEDROOM, "name": "living"}), "'living'.*taken"),
     "no rooms": ((), "0 rooms"),
     "unknown key": ((LIVING, {**BEDROOM, "colour": "red"}), "unknown key 'colour'"),
+    "key of two lines": ((LIVING, {**BEDROOM, "a\nb": "red"}), r"unknown key 'a\\nb'"),
+    "name of two lines": ((LIVING, {**BEDROOM, "name": "a\nb", "polygon": []}), r"room 'a\\nb'"),
 }
 
 
