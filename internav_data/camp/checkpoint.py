@@ -1,7 +1,7 @@
 """Checkpoints: tensors in safetensors, the rest in JSON, complete or absent.
 
 Nothing is unpickled. A checkpoint is a folder: `weights.safetensors` (the agent's, enough to act),
-`training.safetensors` (the optimiser's moments, hidden states, random numbers) and
+`training.safetensors` (the optimiser's moments, hidden states) and
 `checkpoint.json`, which has the sizes and digests of both, and its own. A run keeps its last
 checkpoint and its best; `checkpoints.json` names them, and takes a new one in only when it is on
 the disk. It notes as `leftovers` what a kill would leave behind; no other folder is ever removed.
@@ -361,9 +361,8 @@ def _kind(tensor: Tensor | None) -> tuple[torch.dtype, torch.Size] | None:
     return None if tensor is None else (tensor.dtype, tensor.shape)
 
 
-_OPTIMISER, _STATE, _STARTS, _RANDOM = "optimiser", "state", "starts", "random"
-"""Groups of the training tensors. Random numbers of training are keyed by seed and update: only a
-user's own agent could draw from torch's generators."""
+_OPTIMISER, _STATE, _STARTS = "optimiser", "state", "starts"
+"""Groups of the training tensors."""
 
 
 @dataclass(slots=True)
@@ -411,13 +410,11 @@ class TrainState:
 
 
 def pack(optimiser: Optimizer, state: State, episode_starts: Tensor) -> dict[str, Tensor]:
-    """Return an optimiser's moments, an agent's memory and torch's random numbers by name.
+    """Return an optimiser's moments, an agent's memory and where episodes start, by name.
 
     `state` (n, …) and `episode_starts` (n,) bool are those of all environments.
     """
-    tensors = {f"{_RANDOM}/cpu": torch.get_rng_state(), _STARTS: episode_starts}
-    if torch.cuda.is_available():
-        tensors[f"{_RANDOM}/cuda"] = torch.cuda.get_rng_state()
+    tensors = {_STARTS: episode_starts}
     for number, moments in optimiser.state_dict()["state"].items():
         tensors |= {f"{_OPTIMISER}/{number}/{name}": value for name, value in moments.items()}
     return tensors | {f"{_STATE}/{name}": value for name, value in state.items()}
@@ -426,7 +423,7 @@ def pack(optimiser: Optimizer, state: State, episode_starts: Tensor) -> dict[str
 def unpack(
     tensors: Mapping[str, Tensor], optimiser: Optimizer, blank: State, local: range, count: int
 ) -> tuple[State, Tensor]:
-    """Restore optimiser and random numbers; return the memory and starts of some environments.
+    """Restore an optimiser; return the memory and the episode starts of some environments.
 
     Parameters
     ----------
@@ -467,12 +464,6 @@ def unpack(
 
     state = {name: rows(f"{_STATE}/{name}", like) for name, like in blank.items()}
     episode_starts = rows(_STARTS, torch.zeros(1, dtype=torch.bool))
-    try:
-        torch.set_rng_state(tensors[f"{_RANDOM}/cpu"])
-        if f"{_RANDOM}/cuda" in tensors and torch.cuda.is_available():
-            torch.cuda.set_rng_state(tensors[f"{_RANDOM}/cuda"])
-    except (KeyError, RuntimeError, TypeError) as error:
-        raise CorruptDataError(f"checkpoint: {_RANDOM}: {error}") from error
     return state, episode_starts
 
 

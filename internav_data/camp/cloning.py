@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from internav_data.camp.agents.protocol import Agent, Batch, StepRecord
 from internav_data.camp.ppo import Reduce, alone, check_finite, step
-from internav_data.camp.rollout import ObservationRows
+from internav_data.camp.rollout import StepRows
 from internav_data.envs.loop import EnvironmentLoop, Environments
 from internav_data.records import Episode
 from internav_data.records.errors import CorruptDataError, UsageError
@@ -106,13 +105,11 @@ class Demonstrations:
 
     def collect(self, steps: int) -> Batch[Any]:
         """Take T steps everywhere; the batch begins with the memory in `state`."""
-        seen = ObservationRows(steps, self.agent.device)
-        start_rows: list[Tensor] = []
+        seen = StepRows(steps, self.agent.device)
         records: list[StepRecord] = []
 
         def act(observations: Observations, episode_starts: Bools) -> Actions:
-            seen.append(observations)
-            start_rows.append(torch.from_numpy(episode_starts))
+            seen.append(observations, episode_starts)
             for k in np.flatnonzero(episode_starts).tolist():
                 self._begin(k, str(self.loop.infos["episode_id"][k]))
             rows = [_row(own, t) for own, t in zip(self._records, self._taken, strict=True)]
@@ -123,8 +120,7 @@ class Demonstrations:
             self._taken = [taken + 1 for taken in self._taken]
             for k, taken in enumerate(self._taken):
                 taken_step.reset_mask[k] |= taken == len(self._actions[k])
-        record = type(records[0]).stack(records).map(lambda values: values.to(self.agent.device))
-        return Batch(seen.rows, torch.stack(start_rows).to(self.agent.device), self.state, record)
+        return seen.batch(self.state, records)
 
     def _begin(self, k: int, episode_id: str) -> None:
         self._actions[k], self._records[k] = self.agent.labels(self._experts(episode_id))

@@ -17,6 +17,8 @@ Intent = Literal["integrated", "policy", "recursive", "none"]
 TrainPreset = Literal["paper", "small"]
 INTERACTION_ACTIONS: Final = 11
 """Maximum number of actions of an interaction (the released code cuts after more than 10)."""
+_PAPER_PIXELS: Final = 36
+"""Least size of pictures of which the encoder of the paper leaves anything."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,11 +271,10 @@ class CampConfig:
                 f"network.{key}: pictures have no use for it; leave it out, or set "
                 "network.observation to 'map'"
             )
-        least = 36 if self.network.encoder == "paper" else 16
-        if self.network.image_size < least:
+        if network.encoder == "paper" and network.image_size < _PAPER_PIXELS:
             raise UsageError(
-                f"network.image_size is {self.network.image_size}: the {self.network.encoder!r} "
-                f"encoder needs {least} pixels a side at least"
+                f"network.image_size is {network.image_size}: the 'paper' encoder needs "
+                f"{_PAPER_PIXELS} pixels a side at least"
             )
         shares = self.stages.auxiliary_share + self.stages.single_room_share
         if shares > 1.0:

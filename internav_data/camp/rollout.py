@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from internav_data.camp.agents.protocol import Agent, AgentStep, Batch, State
+from internav_data.camp.agents.protocol import Agent, AgentStep, Batch, State, StepRecord
 from internav_data.camp.config import PPOConfig
 from internav_data.envs.loop import EnvironmentLoop, Environments, LoopStep
 from internav_data.records import Purpose, TrainingStream, generator
@@ -145,9 +145,8 @@ class Collector:
         """
         agent, device, chunk_steps = self.agent, self.agent.device, chunk_steps or len(uniforms)
         states: list[State] = []
-        seen = ObservationRows(len(uniforms), device, self._rows)
+        rows = StepRows(len(uniforms), device, self._rows)
         taken: list[AgentStep[Any]] = []
-        start_rows: list[Tensor] = []
         ends: list[tuple[Tensor, ...]] = []
         finished: list[Finished] = []
 
@@ -155,10 +154,9 @@ class Collector:
             self._check(observations)
             if len(taken) % chunk_steps == 0:
                 states.append(self.state)
-            row = seen.append(observations)
-            start_rows.append(torch.from_numpy(episode_starts).to(device))
+            seen, begun = rows.append(observations, episode_starts)
             draws = uniforms[len(taken)].to(device)
-            taken.append(agent.act(row, self.state, start_rows[-1], draws))
+            taken.append(agent.act(seen, self.state, begun, draws))
             self.state = taken[-1].state
             actions: Actions = taken[-1].action.cpu().numpy()
             return actions
@@ -175,9 +173,8 @@ class Collector:
         rewards, terminated, truncated, final_values = (
             torch.stack(column).to(device) for column in zip(*ends, strict=True)
         )
-        record = type(taken[0].record).stack([step.record for step in taken])
         return Rollout(
-            Batch(seen.rows, torch.stack(start_rows), states[0], record),
+            rows.batch(states[0], [step.record for step in taken]),
             states, rewards, terminated, truncated,
             values=torch.stack([step.value for step in taken]),
             log_probs=torch.stack([step.log_prob for step in taken]),
@@ -202,8 +199,8 @@ class Collector:
                 )
 
 
-class ObservationRows:
-    """Observations of T steps, (T, n, …) by sensor: environments overwrite theirs.
+class StepRows:
+    """Observations and episode starts of T steps, to become a batch.
 
     Parameters
     ----------
@@ -211,27 +208,34 @@ class ObservationRows:
         Number of steps T.
     device
         Device of the tensors.
-    rows
+    observations
         Tensors of earlier steps, by sensor, to be overwritten; this object changes it.
     """
 
     def __init__(
-        self, steps: int, device: torch.device, rows: dict[str, Tensor] | None = None
+        self, steps: int, device: torch.device, observations: dict[str, Tensor] | None = None
     ) -> None:
-        self._steps, self._device, self._next = steps, device, 0
-        self.rows: dict[str, Tensor] = {} if rows is None else rows
+        self._steps, self._device = steps, device
+        self._observations: dict[str, Tensor] = {} if observations is None else observations
+        self._episode_starts: list[Tensor] = []
 
-    def append(self, observations: Observations) -> dict[str, Tensor]:
-        """Copy the observations of a step; return the copy, (n, …) by sensor."""
+    def append(
+        self, observations: Observations, episode_starts: Bools
+    ) -> tuple[dict[str, Tensor], Tensor]:
+        """Copy what a step shows, as environments overwrite it; return the copies, (n, …) each."""
+        rows, t = self._observations, len(self._episode_starts)
         for name, array in observations.items():
             values = torch.from_numpy(array)
-            if name not in self.rows or len(self.rows[name]) != self._steps:
-                self.rows[name] = values.new_empty(
-                    (self._steps, *values.shape), device=self._device
-                )
-            self.rows[name][self._next].copy_(values)
-        self._next += 1
-        return {name: self.rows[name][self._next - 1] for name in observations}
+            if name not in rows or len(rows[name]) != self._steps:
+                rows[name] = values.new_empty((self._steps, *values.shape), device=self._device)
+            rows[name][t].copy_(values)
+        self._episode_starts.append(torch.from_numpy(episode_starts).to(self._device))
+        return {name: rows[name][t] for name in observations}, self._episode_starts[-1]
+
+    def batch(self, state: State, records: Sequence[StepRecord]) -> Batch[Any]:
+        """Return the steps with the memory (n, …) before the first, and their records (n, …)."""
+        record = type(records[0]).stack(records).map(lambda values: values.to(self._device))
+        return Batch(self._observations, torch.stack(self._episode_starts), state, record)
 
 
 def _finished(t: int, step: LoopStep) -> list[Finished]:

@@ -62,19 +62,15 @@ def begin(request: Request) -> Trainer:
     InternavError
         The disk is full; the last checkpoint is whole.
     """
-    with _writing(request.out):
-        return _begin(request)
-
-
-def _begin(request: Request) -> Trainer:
     out = request.out
-    if has_checkpoint(out) or ((out / LOG).exists() and not (out / CONFIG).exists()):
-        raise UsageError(
-            f"{out}: a run is there already: go on with it by --resume, or choose another --out"
-        )
-    trainer = Trainer(request, TrainState(request.parts, request.clones))
-    _write_config(trainer)
-    trainer.fit()
+    with _writing(out):
+        if has_checkpoint(out) or ((out / LOG).exists() and not (out / CONFIG).exists()):
+            raise UsageError(
+                f"{out}: a run is there already: go on with it by --resume, or choose another --out"
+            )
+        trainer = Trainer(request, TrainState(request.parts, request.clones))
+        _write_config(trainer)
+        trainer.fit()
     return trainer
 
 

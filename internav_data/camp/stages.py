@@ -156,6 +156,12 @@ def check_parts(parts: Sequence[str]) -> None:
         )
 
 
+def torch_seed(seed: int, stage: str, update: int) -> int:
+    """Return the seed of torch's own random numbers in an update of a stage."""
+    key = (_NUMBERS.index(stage), TrainingStream.TORCH)
+    return int(generator(seed, Purpose.TRAINING, *key, draw=update).integers(2**62))
+
+
 def order_seed(seed: int, stage: str) -> int:
     """Return the seed of environment 0 in a stage; environment k has the k-th after it."""
     rng = generator(

@@ -118,7 +118,7 @@ class TrainingStream(IntEnum):
     AUXILIARY = 4
     """Obstacle that an auxiliary episode is about."""
     TORCH = 5
-    """Torch's own random numbers."""
+    """Torch's own random numbers of an update; `scene` is the stage, `draw` the update."""
 
 
 def generator(

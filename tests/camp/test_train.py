@@ -107,6 +107,24 @@ def test_resumed_runs_are_unbroken_ones_to_the_last_byte(request_for, method, st
     assert len({row.get("stage") for row in whole[0]}) == 4  # cloning has none
 
 
+def test_an_agent_that_draws_from_torch_is_resumed_to_the_last_bit(request_for, monkeypatch):
+    class Noisy(PPOAgent):
+        """It has a loss beside PPO's of random weights."""
+
+        def evaluate(self, batch):
+            found = super().evaluate(batch)
+            return replace(found, loss=torch.rand_like(found.value) * found.value)
+
+    monkeypatch.setattr(train_module, "make_agent", lambda _, config: Noisy(config))
+    begin(request_for("whole", "ppo"))
+    broken = request_for("broken", "ppo")
+    with pytest.raises(InterruptedRunError):
+        begin(replace(broken, interrupted=after(5)))
+    torch.rand(7)  # another history
+    resume(broken, {})
+    assert written(request_for("whole").out)[2:] == written(broken.out)[2:]
+
+
 def test_a_finished_run_is_left_as_it_is(request_for):
     asked = request_for("done", "ppo")
     begin(asked)
