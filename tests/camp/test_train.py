@@ -15,7 +15,7 @@ from safetensors.torch import load_file  # noqa: E402
 
 from internav_data.camp import data as data_module  # noqa: E402
 from internav_data.camp import train as train_module  # noqa: E402
-from internav_data.camp.agents import make_agent  # noqa: E402
+from internav_data.camp.agents import AGENTS, Method, make_agent  # noqa: E402
 from internav_data.camp.agents.flat import PPOAgent  # noqa: E402
 from internav_data.camp.checkpoint import find, load_agent, read  # noqa: E402
 from internav_data.camp.config import (  # noqa: E402
@@ -115,9 +115,9 @@ def test_an_agent_that_draws_from_torch_is_resumed_to_the_last_bit(request_for, 
             found = super().evaluate(batch)
             return replace(found, loss=torch.rand_like(found.value) * found.value)
 
-    monkeypatch.setattr(train_module, "make_agent", lambda _, config: Noisy(config))
-    begin(request_for("whole", "ppo"))
-    broken = request_for("broken", "ppo")
+    monkeypatch.setitem(AGENTS, "noisy", Method(Noisy, "ppo with noise"))
+    begin(request_for("whole", "noisy"))
+    broken = request_for("broken", "noisy")
     with pytest.raises(InterruptedRunError):
         begin(replace(broken, interrupted=after(5)))
     torch.rand(7)  # another history
