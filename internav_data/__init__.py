@@ -43,7 +43,7 @@ ensure_compile_cache()
 _public, __dir__ = lazy_imports(
     __name__,
     {
-        "camp": ["export_agent", "load_agent"],
+        "camp.checkpoint": ["export_agent", "load_agent"],
         "dataset": ["Dataset", "compute_stats", "load_dataset"],
         "evaluation": ["evaluate"],
         "generation": ["generate_episodes", "generate_house"],

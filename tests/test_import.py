@@ -113,6 +113,24 @@ PhysicsConfig().check()
     assert not modules_after(code) & HEAVY
 
 
+@pytest.mark.parametrize(
+    "package",
+    ["internav_data"]
+    + [
+        f"internav_data.{room}"
+        for room in (
+            *("camp", "dataset", "envs", "episodes", "evaluation", "generation", "houses"),
+            *("interop", "physics", "verification", "viewer", "views", "world"),
+        )
+    ],
+)
+def test_every_public_name_is_there(package):
+    pytest.importorskip("torch")
+    module = importlib.import_module(package)
+    for name in module.__all__:
+        assert getattr(module, name) is not None, name
+
+
 def test_push_and_settle_are_functions_whatever_was_imported_before():
     """A module that were called like one of them would hide it once it is imported."""
     import internav_data.physics.pushing
