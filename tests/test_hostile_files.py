@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import shutil
@@ -18,9 +19,11 @@ from internav_data.camp.config import config_of, preset
 from internav_data.catalog.user_manifest import read_notes
 from internav_data.core.config import config_toml
 from internav_data.core.files import with_sha256
-from internav_data.dataset import load_dataset, write_parquet
+from internav_data.dataset import load_dataset
 from internav_data.dataset.commit import identity_of, open_staging
+from internav_data.dataset.encode import to_table
 from internav_data.dataset.manifest import read_manifest
+from internav_data.dataset.parquet import parquet_bytes
 from internav_data.envs.slot import EpisodeSnapshot
 from internav_data.evaluation.archive import read_evaluation
 from internav_data.evaluation.metrics import RESULTS
@@ -39,9 +42,12 @@ PLAN = {
     "windows": [{"room": "living", "at": [2.0, 0.0]}],
     "ceiling_m": 2.6,
 }
+NO_RESULTS = parquet_bytes(to_table([], RESULTS), RESULTS)
 EVALUATION = {
-    "format": 2,
+    "format": 3,
     "episodes": 0,
+    "table_bytes": len(NO_RESULTS),
+    "table_sha256": hashlib.sha256(NO_RESULTS).hexdigest(),
     "name": "camp",
     "method": "camp",
     "dataset": "d",
@@ -134,7 +140,7 @@ def _resumable():
 
 
 def _evaluation(path):
-    write_parquet(path.parent / "episodes.parquet", [], RESULTS)
+    path.with_name("episodes.parquet").write_bytes(NO_RESULTS)
     read_evaluation(path.parent)
 
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 import re
 from dataclasses import asdict, dataclass, fields
+from io import BytesIO
 from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Final, get_args, get_type_hints
 
 from internav_data.core.files import FileLimits, check_sha256, read_json, with_sha256
 from internav_data.core.storage import write_atomically
-from internav_data.dataset import from_table, logical_digest, write_parquet
+from internav_data.dataset import from_table, write_parquet
 from internav_data.dataset.parquet import open_parquet
 from internav_data.evaluation.metrics import RESULTS, EpisodeResult
 from internav_data.records.errors import CorruptDataError, InternavError, UsageError
@@ -24,8 +26,10 @@ ABOUT: Final = "evaluation.json"
 """Name of the JSON file."""
 EPISODES: Final = "episodes.parquet"
 """Name of the table."""
-FORMAT: Final = 2
+FORMAT: Final = 3
 """Version of both files."""
+_TABLE_KEYS: Final = {"episodes": int, "table_bytes": int, "table_sha256": str}
+"""Keys of `evaluation.json` about the table: its rows, size and digest."""
 _FILE: Final = FileLimits(remedy="evaluate again with `camp-eval RUN DATASET`", max_number=2.0**63)
 _MAX_ROWS: Final = 5_000_000
 _MAX_DEPTH: Final = 3
@@ -80,13 +84,22 @@ class Evaluation:
     """Results in order of episode_id."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Table:
+    """Table of results, as `evaluation.json` describes it."""
+
+    rows: int
+    bytes: int
+    sha256: str
+
+
 def write_evaluation(folder: Path, about: About, results: Sequence[EpisodeResult]) -> None:
     """Write an evaluation; `evaluation.json` comes last, so a folder that has it is complete."""
     ordered = sorted(results, key=lambda result: result.episode_id)
     (folder / ABOUT).unlink(missing_ok=True)
     info = write_parquet(folder / EPISODES, ordered, RESULTS)
     values = {"format": FORMAT, **asdict(about), "episodes": info.rows}
-    values["logical_digest"] = info.logical_digest
+    values |= {"table_bytes": info.bytes, "table_sha256": info.sha256}
     write_atomically(folder / ABOUT, (json.dumps(with_sha256(values), indent=2) + "\n").encode())
 
 
@@ -98,25 +111,40 @@ def read_evaluation(folder: Path) -> Evaluation:
     CorruptDataError
         A file is missing, damaged, or of another version.
     """
-    path = Path(folder) / ABOUT
-    about, episodes, digest = _about(path)
-    table_path = Path(folder) / EPISODES
-    with open_parquet(table_path, RESULTS) as opened:
+    about, expected = _about(Path(folder) / ABOUT)
+    path = Path(folder) / EPISODES
+    with open_parquet(path, RESULTS, BytesIO(_verified(path, expected))) as opened:
         rows = opened.metadata.num_rows
-        if rows != episodes or rows > _MAX_ROWS:
+        if rows != expected.rows or rows > _MAX_ROWS:
             raise CorruptDataError(
-                f"{table_path}: expected {episodes} rows as {ABOUT} says (at most "
-                f"{_MAX_ROWS}), got {rows}; evaluate again"
+                f"{path}: expected {expected.rows} rows as {ABOUT} says (at most {_MAX_ROWS}), "
+                f"got {rows}; evaluate again"
             )
         table = opened.read_all()
-    if digest is not None and digest != logical_digest(table):
-        raise CorruptDataError(
-            f"{table_path}: holds other results than {ABOUT} was written with; evaluate again"
-        )
     results = tuple(from_table(table, RESULTS))
     if len({result.episode_id for result in results}) != len(results):
-        raise CorruptDataError(f"{table_path}: an episode is there twice; evaluate again")
+        raise CorruptDataError(f"{path}: an episode is there twice; evaluate again")
     return Evaluation(about, results)
+
+
+def _verified(path: Path, expected: _Table) -> bytes:
+    """Return the bytes of the table; nothing of a damaged one is parsed.
+
+    Raises
+    ------
+    CorruptDataError
+        It is missing, or not the file that `evaluation.json` was written with.
+    """
+    try:
+        size = path.stat().st_size
+        data = path.read_bytes() if size == expected.bytes else b""
+    except OSError as error:
+        raise CorruptDataError(f"{path}: {error.strerror}; evaluate again") from None
+    if hashlib.sha256(data).hexdigest() != expected.sha256:
+        raise CorruptDataError(
+            f"{path}: damaged, or holds other results than {ABOUT} was written with; evaluate again"
+        )
+    return data
 
 
 def folder_name(name: str) -> str:
@@ -154,8 +182,8 @@ def find_evaluations(path: Path) -> list[Path]:
     return found
 
 
-def _about(path: Path) -> tuple[About, int, str | None]:
-    """Return what `evaluation.json` says: policy and settings, number and digest of results."""
+def _about(path: Path) -> tuple[About, _Table]:
+    """Return what `evaluation.json` says: policy and settings, and the table of results."""
 
     def wrong(text: str) -> InternavError:
         return _FILE.refusal(path, text)
@@ -164,7 +192,7 @@ def _about(path: Path) -> tuple[About, int, str | None]:
     if not isinstance(values, dict) or values.get("format") != FORMAT:
         raise wrong(f"expected an evaluation of format {FORMAT}")
     names = [field.name for field in fields(About)]
-    check_sha256(values, path, _FILE, ["format", *names, "episodes", "logical_digest"])
+    check_sha256(values, path, _FILE, ["format", *names, *_TABLE_KEYS])
     if missing := [name for name in names if name not in values]:
         raise wrong(f"{missing[0]} is missing")
     hints = get_type_hints(About)
@@ -174,7 +202,9 @@ def _about(path: Path) -> tuple[About, int, str | None]:
         if kind not in kinds and not (kind is int and float in kinds):
             expected = " or ".join("null" if k is NoneType else k.__name__ for k in kinds)
             raise wrong(f"{field.name}: expected {expected}, got {kind.__name__}")
-    if type(values.get("episodes")) is not int:
-        raise wrong("episodes: expected a count")
+    for key, kind in _TABLE_KEYS.items():
+        if type(values.get(key)) is not kind:
+            expected = "a count" if kind is int else "a digest"
+            raise wrong(f"{key}: expected {expected}")
     about = About(**{name: values[name] for name in names})
-    return about, values["episodes"], values.get("logical_digest")
+    return about, _Table(*(values[key] for key in _TABLE_KEYS))

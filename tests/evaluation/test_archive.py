@@ -4,6 +4,7 @@ import json
 from dataclasses import asdict, replace
 
 import pytest
+from damage import flipped
 
 from internav_data.core.files import with_sha256
 from internav_data.evaluation.archive import (
@@ -52,8 +53,8 @@ def test_whole_numbers_do_for_seconds(written):
 @pytest.mark.parametrize(
     ("change", "word"),
     [
-        ({"format": 1}, "format 2"),
-        ({"format": None}, "format 2"),
+        ({"format": 1}, "format 3"),
+        ({"format": None}, "format 3"),
         ({"seed": "0"}, "seed"),
         ({"greedy": 1}, "greedy"),
         ({"name": None}, "name"),
@@ -82,7 +83,7 @@ def test_a_flipped_bit_of_a_description_is_noticed(written):
     path = written / ABOUT
     data = path.read_bytes()
     for k in (k for k in range(len(data)) if data[k] not in b" \n"):
-        path.write_bytes(data[:k] + bytes([data[k] ^ (1 << k % 7)]) + data[k + 1 :])
+        path.write_bytes(flipped(data, k, k % 7))
         with pytest.raises(CorruptDataError):
             read_evaluation(written)
 
@@ -99,6 +100,15 @@ def test_what_is_no_description_is_refused(written, text):
     (written / ABOUT).write_text(text)
     with pytest.raises(CorruptDataError, match="evaluate again"):
         read_evaluation(written)
+
+
+def test_a_flipped_bit_of_the_table_is_noticed(written):
+    path = written / EPISODES
+    data = path.read_bytes()
+    for k in range(0, len(data), 7):
+        path.write_bytes(flipped(data, k, k % 8))
+        with pytest.raises(CorruptDataError, match="damaged"):
+            read_evaluation(written)
 
 
 def test_damaged_and_missing_rows_are_told(written, row):

@@ -369,7 +369,7 @@ KINDS = {
     "stats": _beside("stats.json"),
     "card": _beside("README.md"),
     "evaluation.json": Kind(_evaluation("evaluation.json"), _evaluation_noticed, _last_byte),
-    "evaluation.parquet": Kind(_evaluation("episodes.parquet"), _evaluation_noticed, _first_magic),
+    "evaluation.parquet": Kind(_evaluation("episodes.parquet"), _evaluation_noticed),
     "cache": Kind(_cache, _cache_noticed, _everything),
     "checkpoint": Kind(_checkpoint("checkpoint.json"), _checkpoint_noticed, _last_byte),
     "pointer": Kind(_pointer, _pointer_noticed, _last_byte),
