@@ -182,6 +182,33 @@ def test_chunks_of_a_gru_are_its_steps():
     torch.testing.assert_close(after, h, atol=1e-5, rtol=0)
 
 
+@pytest.mark.parametrize("steps", [1, 13])
+def test_gradients_and_outputs_of_stacked_grus_are_those_of_pytorchs(steps):
+    """Each of them run for itself, with episodes that begin in between."""
+    torch.manual_seed(0)
+    grus = [torch.nn.GRU(size, 7) for size in (5, 8, 6)]
+    inputs = [torch.randn(steps, 4, gru.input_size, requires_grad=True) for gru in grus]
+    hidden = [torch.randn(4, 7, requires_grad=True) for _ in grus]
+    episode_starts = torch.rand(steps, 4) < 0.15
+    episode_starts[0, 1] = True
+    segments = EpisodeSegments(episode_starts)
+    apart = [segments.run(*each) for each in zip(grus, inputs, hidden, strict=True)]
+    outs, after = segments.run_together(grus, inputs, hidden)
+    weights = torch.randn(3, steps, 4, 7)
+    leaves = [*inputs, *hidden, *(p for gru in grus for p in gru.parameters())]
+    gradients = []
+    for ran in (apart, list(zip(outs, after, strict=True))):
+        loss = sum(
+            (w * out).sum() + last.sum() for w, (out, last) in zip(weights, ran, strict=True)
+        )
+        gradients.append(torch.autograd.grad(loss, leaves))
+    for one, (out, last) in zip(zip(outs, after, strict=True), apart, strict=True):
+        torch.testing.assert_close(one[0], out, atol=1e-6, rtol=0)
+        torch.testing.assert_close(one[1], last, atol=1e-6, rtol=0)
+    for one, other in zip(*gradients, strict=True):
+        torch.testing.assert_close(one, other, atol=1e-5, rtol=1e-5)
+
+
 def test_a_chunk_is_one_call():
     """Boundaries are only where an episode begins."""
     episode_starts = torch.zeros(10, 3, dtype=torch.bool)

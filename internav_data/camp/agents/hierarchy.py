@@ -411,29 +411,37 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
             P(i) as it was recorded; None to compute it.
         """
         segments = batch.segments
+        policies: list[networks.RecurrentActorCritic] = list(self.policies)
         views = [encoder(batch.observations) for encoder in self.encoders]  # (T, n, size) each
         inputs = [
             views[0],
             *(torch.cat([views[k % len(views)], option_features], -1) for k in (PUSH, PICK)),
         ]
-        hidden, log_probs, terminations = list(batch.state["hidden"].unbind(1)), [], []
+        features, intended = torch.cat([views[0], option_features], -1), None
+        if not self.uses_intent:
+            intent = networks.uniform_intent(features, self.global_policy.embed.in_features)
+        if intent is not None:  # else the action policies must run first
+            policies.append(self.global_policy)
+            inputs.append(self.global_policy.condition(features, intent))
+        hidden = list(batch.state["hidden"].unbind(1))
+        grus = [policy.gru for policy in policies]
+        outs, hidden[: len(grus)] = segments.run_together(grus, inputs, hidden[: len(grus)])
+        log_probs, terminations = [], []
         for k, policy in enumerate(self.policies):
-            out, hidden[k] = segments.run(policy.gru, inputs[k], hidden[k])
-            logits = policy.actor(out)
+            logits = policy.actor(outs[k])
             may_end = k == NAVIGATE or self.hand_back_step
             log_probs.append(action_log_probs_of(k, logits, may_end=may_end))
             terminations.append(logits[..., -1] - logits[..., :-1].logsumexp(-1))
         termination = torch.stack(terminations, -1)
         acts = torch.stack([*log_probs, self.done.expand_as(log_probs[0])], -2)  # (T, n, 4, A)
-        features, intended = torch.cat([views[0], option_features], -1), None
-        if not self.uses_intent:
-            intent = networks.uniform_intent(features, self.global_policy.embed.in_features)
-        elif intent is None:
+        if intent is None:
             intended, intent, hidden[INTENT] = self.intent(
                 features, hidden[INTENT], segments, lambda p: self.mixed(p, acts), self.mask
             )
-        conditioned = self.global_policy.condition(features, intent)
-        out, hidden[GLOBAL] = segments.run(self.global_policy.gru, conditioned, hidden[GLOBAL])
+            conditioned = self.global_policy.condition(features, intent)
+            out, hidden[GLOBAL] = segments.run(self.global_policy.gru, conditioned, hidden[GLOBAL])
+            outs.append(out)
+        out = outs[GLOBAL]
         option_log_probs = torch.log_softmax(self.global_policy.actor(out) + self.mask, -1)
         value, after = self.global_policy.value(out), torch.stack(hidden, 1)
         return ForwardOutput(
