@@ -186,7 +186,7 @@ def run(key: str, folder: Path):
     _again(out)
     differences = difference(contents(out), whole_contents(SCENES))
     assert not differences, f"after the same command again: {differences}"
-    return {**figures, "of_s": round(_seconds(), 3), "readable": readable}
+    return {**figures, "readable": readable}
 
 
 @functools.cache
