@@ -6,8 +6,9 @@
 arithmetic done as in the released code: a Python loop over environments and steps, each sample
 through encoder, GRUs and heads for itself. First both learn from one small rollout, and must say
 the same losses and gradients to 1e-4. `methods`: steps a second in three tiers (environments alone,
-collecting, all of training), the simulator's share of it all, and what collecting costs besides
-environments and networks. Seconds are of processor time, so that neighbours do not count.
+collecting, all of training), the shares of simulator, inference and learning, and what collecting
+costs besides environments and networks. Seconds are of processor time, so that neighbours do not
+count.
 Targets: ten times faster; the simulator under a third; under 50 us a step and environment.
 """
 
@@ -155,6 +156,8 @@ def method_row(dataset: Path, method: str, config: CampConfig, rollouts: int) ->
         "steps_per_s": round(taken / whole),
         "wall_steps_per_s": round(taken / (time.perf_counter() - wall)),
         "simulator_share": round(spent["env"] / whole, 3),
+        "inference_share": round(spent["agent"] / whole, 3),
+        "learning_share": round(1.0 - spent["collect"] / whole, 3),
         "networks_us": round(1e6 * spent["agent"] / taken, 1),
         "overhead_us": round(1e6 * other / taken, 1),
         "parameters": sum(parameter.numel() for parameter in agent.optimised()),
