@@ -155,7 +155,6 @@ def test_episodes_can_be_chosen(call, dataset, tmp_path):
         (("random", "DATA", "--where", "a=1"), 2, ["--where is now called --filter"]),
         (("random", "DATA", "--no-oracles"), 2, ["now called --no-reference-policies"]),
         (("random", "DATA", "--oracles"), 2, ["--oracles is now called --reference-policies"]),
-        (("expert,planner", "DATA"), 2, ["planner is now called shortest_path"]),
         (("random",), 5, ["internav-dataset", "internav-gen generate"]),
         (("compare",), 2, ["RUNS"]),
         (("compare", "nowhere"), 2, ["nowhere", "camp-eval RUN DATASET"]),
