@@ -8,6 +8,7 @@ it would take compiled ones of before from its cache.
 from __future__ import annotations
 
 import functools
+import itertools
 import os
 import signal
 import subprocess
@@ -47,10 +48,10 @@ def drawn(name: str) -> list[int]:
 
 
 def cases() -> Iterator[str]:
-    """Yield each module as it is, then its mutants; those of quick tests first."""
-    for name in TARGETS:
-        yield f"{name} none"
-        yield from (f"{name} {number}" for number in drawn(name))
+    """Yield each module as it is, then its mutants; modules in turns."""
+    rows = [[f"{name} none", *(f"{name} {number}" for number in drawn(name))] for name in TARGETS]
+    for some in itertools.zip_longest(*rows):
+        yield from filter(None, some)
 
 
 def run(key: str, folder: Path) -> Mapping[str, Any]:
