@@ -96,6 +96,18 @@ def test_the_mixture_is_equation_7_by_hand(collected):
     assert (meant[..., PICK] * acts[..., PICK, 1]).max() > 1e-3
 
 
+def test_termination_is_as_probable_as_done_among_the_actions_of_an_option(collected, config):
+    agent, _, (_, rollout) = collected("camp")
+    with torch.no_grad():
+        for policy in agent.policies:
+            policy.actor.bias.copy_(torch.linspace(-1.0, 1.0, len(policy.actor.bias)))
+    twin = make_agent("camp", config(agent={"hand_back_step": True}))
+    twin.load_state_dict(agent.state_dict())
+    beta = ran_of(agent, rollout.batch).termination.sigmoid()
+    done = ran_of(twin, rollout.batch).action_log_probs[..., DONE].exp()
+    torch.testing.assert_close(beta[..., [PUSH, PICK]], done[..., [PUSH, PICK]])
+
+
 @pytest.mark.parametrize("method", ["camp", "camp with a step", "hrl"])
 def test_what_is_drawn_has_the_probability_of_its_parts(collected, method):
     """[open] (log beta or log(1 - beta)) + decide log pi_Omega + log pi_omega(a), by hand.

@@ -10,7 +10,7 @@ import pytest
 from manifests import edit_manifest as edit
 from memory_store import MemoryStore
 
-from internav_data.dataset import load_dataset, read_manifest, write_manifest
+from internav_data.dataset import load_dataset, locate, read_manifest, write_manifest
 from internav_data.records.errors import CorruptDataError
 
 BEFORE_DIGESTS = Path(__file__).parents[1] / "data" / "dataset-10" / "manifest.json"
@@ -262,3 +262,14 @@ def test_errors_of_unfinished_and_absent_datasets_differ(tmp_path):
     (tmp_path / ".work" / "identity.json").write_text("{}")
     with pytest.raises(CorruptDataError, match="resume"):
         load_dataset(tmp_path)
+
+
+def test_the_place_of_a_file_that_is_cut_or_missing_is_not_given(damaged_folder):
+    file = read_manifest(damaged_folder).files[0]
+    path = locate(damaged_folder, file)
+    path.write_bytes(path.read_bytes()[:-1])
+    with pytest.raises(CorruptDataError, match="bytes"):
+        locate(damaged_folder, file)
+    path.unlink()
+    with pytest.raises(CorruptDataError, match="missing"):
+        locate(damaged_folder, file)
