@@ -51,7 +51,7 @@ ASKED = {
         "torture/test_torture.py::test_a_group_killed_at_an_fsync_goes_on",
     ),
     "states": (
-        "200 runs of 20 steps of a state machine",
+        "200 runs of up to 20 steps of a state machine",
         "torture/test_torture.py::test_a_folder_is_what_a_model_of_it_says",
     ),
     "digests": (
@@ -60,7 +60,7 @@ ASKED = {
         "torture/test_torture.py::test_cases_of_digests_hold_every_pair_of_circumstances",
     ),
     "fuzz": (
-        "10 minutes a reader: typed errors in a line, 5 s, 300 MB",
+        "10 minutes a reader: typed errors in a line, 5 s (meshes 30 s), 300 MB",
         "torture/test_torture.py::test_changed_bytes_are_read_or_refused",
         "test_hostile_files.py::test_any_value_in_any_place_of_json_is_read_or_refused",
     ),

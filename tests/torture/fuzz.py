@@ -36,6 +36,9 @@ if TYPE_CHECKING:
 SECONDS, SEEDS = 20.0, 30
 """Processor time of a case, and cases of a reader: ten minutes in all."""
 MAX_MB, MAX_S, HANGS_S = 300, 5.0, 100
+MESHES = ("obj", "stl", "ply", "glb", "off")
+MAX_MESH_S = 30.0
+"""Of a mesh that is no longer convex but right: its decomposition (CoACD) takes seconds."""
 
 
 def beside(place: Path, name: str) -> Path:
@@ -119,7 +122,7 @@ READERS: dict[str, Callable[[], tuple[str, bytes, Callable[[Path], object]]]] = 
     "journal": lambda: _damaged("journal"),
     "cache": lambda: _damaged("cache"),
     "evaluation": lambda: _damaged("evaluation.parquet"),
-    **{suffix: functools.partial(_mesh, suffix) for suffix in ("obj", "stl", "ply", "glb", "off")},
+    **{suffix: functools.partial(_mesh, suffix) for suffix in MESHES},
     "url": lambda: ("url", _URL, _url),
     **{name: functools.partial(_small, name) for name in SMALL},
 }
@@ -186,7 +189,7 @@ def hammer(name: str, seed: int, seconds: float, folder: Path) -> int:
             raise AssertionError(f"{where}: {type(error).__name__}: {error}") from error
         signal.alarm(0)
         took, more = time.process_time() - began, _peak_mb() - before
-        assert took < MAX_S, f"{where}: {took:.1f} s"
+        assert took < (MAX_MESH_S if name in MESHES else MAX_S), f"{where}: {took:.1f} s"
         assert more < MAX_MB, f"{where}: {more:.0f} MB"
         number += 1
     return number
