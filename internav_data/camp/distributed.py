@@ -7,6 +7,7 @@ of an update is a sum across ranks (`ppo.update`). The first rank writes the run
 from __future__ import annotations
 
 import atexit
+import gc
 import os
 from datetime import timedelta
 from typing import Any
@@ -99,9 +100,17 @@ def distributed_context(device: torch.device) -> DistributedContext:
     if not distributed.is_initialized():
         backend = "nccl" if device.type == "cuda" else "gloo"
         distributed.init_process_group(backend, timeout=timedelta(hours=_TIMEOUT_H))
-        # gloo's threads must have ended before the interpreter does, or the process aborts.
-        atexit.register(distributed.destroy_process_group)
+        atexit.register(_leave)
     return DistributedContext(device, distributed.get_rank(), size)
+
+
+def _leave() -> None:
+    """Leave the process group: its threads must have ended before the interpreter does.
+
+    They end with the last reference to it; one in a cycle would live on, and the process abort.
+    """
+    distributed.destroy_process_group()
+    gc.collect()
 
 
 def is_first_rank() -> bool:
