@@ -107,7 +107,7 @@ def distributed_context(device: torch.device) -> DistributedContext:
 def _leave() -> None:
     """Leave the process group: its threads must have ended before the interpreter does.
 
-    They end with the last reference to it; one in a cycle would live on, and the process abort.
+    They end with the last reference to it, and one in a cycle may live on.
     """
     distributed.destroy_process_group()
     gc.collect()
