@@ -47,6 +47,8 @@ MOMENTS = 200
 """Random moments of each target."""
 MIN_KILLED = 0.6
 """Least share of a target's cases that must kill: at a drawn moment nobody may be there."""
+WORKERS_SHARE = 0.5
+"""Share of a run in which it has workers, about: of 200 moments in 1.05 runs, 103 met one."""
 _WAIT_S = 120.0
 
 
@@ -162,7 +164,8 @@ def _killed(target: str, number: int, out: Path) -> tuple[bool, float]:
     process = _started(out)
     if number % 10:  # most of the time passes before there is one
         _wait_for_workers(out.parent)
-    moment = float(rng([len(target), number]).uniform(0.0, 1.05 * seconds))
+    share = WORKERS_SHARE if target == "worker" else 1.05
+    moment = float(rng([len(target), number]).uniform(0.0, share * seconds))
     time.sleep(moment)
     worker_killed = _kill(target, process, out.parent)
     run_killed = _ended(process, out)
