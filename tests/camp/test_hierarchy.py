@@ -17,6 +17,8 @@ from internav_data.camp.agents.hierarchy import (  # noqa: E402
     STOP,
     WAIT,
     AuxiliaryAgent,
+    HierarchyRecord,
+    initial_probabilities,
     option_inputs,
 )
 from internav_data.camp.agents.protocol import Agent  # noqa: E402
@@ -357,6 +359,87 @@ def test_hrl_decides_at_every_step_and_its_interactions_never_hand_back(collecte
         assert not record.used.any()
         acting = (record.option == PUSH) | (record.option == PICK)
         assert (record.choice[acting] != DONE).all()
+
+
+def test_a_step_ends_the_episode_by_the_global_policys_done_or_by_navigates(collected):
+    """An open interaction has to end first."""
+    agent, _, lived = collected(
+        "camp", changes={"agent": {"initial_interaction_probability": 0.3}}, rollouts=2
+    )
+    for rollout in lived:
+        record, ran = rollout.batch.record, ran_of(agent, rollout.batch)
+        beta = ran.termination.take_along_dim(record.open.unsqueeze(-1), -1).squeeze(-1).sigmoid()
+        closed = torch.where(record.open != 0, beta, 1.0)
+        options = ran.option_log_probs.exp()
+        done = ran.action_log_probs[..., NAVIGATE, DONE].exp()
+        right = closed * (options[..., STOP] + options[..., NAVIGATE] * done)
+        torch.testing.assert_close(record.done_probability, right, atol=1e-6, rtol=1e-4)
+    assert record.open.any()
+
+
+def test_options_are_at_first_in_the_stated_proportions():
+    actions, options = initial_probabilities(end=0.1, interact=0.2)
+    navigate, push, pick, stop = options
+    assert sum(options) == sum(actions) == pytest.approx(1.0)
+    assert (push / navigate, pick / navigate) == pytest.approx((2 / 5, 2 / 5))  # 1 - 2 * .2 - .1
+    assert (stop, navigate * actions[-1]) == pytest.approx((0.05, 0.05))
+    assert actions[:-1] == pytest.approx([actions[0]] * (len(ACTIONS_OF[NAVIGATE]) - 1))
+
+
+def test_networks_are_given_which_option_is_open_and_the_elevenths_used():
+    inputs = option_inputs(torch.tensor([0, PUSH, PICK]), torch.tensor([0, 3, 10]))
+    torch.testing.assert_close(
+        inputs, torch.tensor([[0.0, 0.0, 0.0], [1.0, 0.0, 3 / 11], [0.0, 1.0, 10 / 11]])
+    )
+
+
+def decisions(**fields):
+    """Return four steps: Navigate, a push of two actions, a pickup that closes at its 11th."""
+    columns = {
+        "choice": [0, ACTIONS_OF[PUSH][0], ACTIONS_OF[PUSH][0], ACTIONS_OF[PICK][0]],
+        "option": [NAVIGATE, PUSH, PUSH, PICK],
+        "open": [0, 0, PUSH, PUSH],
+        "used": [0, 0, 1, 2],
+    }
+    decide = torch.tensor([True, True, False, True])
+    record = {name: torch.tensor(column) for name, column in columns.items()}
+    return HierarchyRecord(**(record | {"decide": decide} | fields))
+
+
+def test_a_rollout_is_logged_by_its_options_and_decisions():
+    record = decisions(
+        forced=torch.tensor([False, False, False, True]),
+        done_probability=torch.tensor([0.1, 0.2, 9.0, 0.3]),
+        option_probs=torch.tensor([[0.5, 0.5, 0.0, 0.0]] * 4),
+        intended_option_probs=torch.tensor([[0.25, 0.75, 0.0, 0.0]] * 4),
+    )
+    assert record.statistics() == pytest.approx({
+        "share_navigate": 0.25,
+        "share_push": 0.5,
+        "share_pick": 0.25,
+        "share_done": 0.0,
+        "done_probability": 0.2,  # where it was decided
+        "interactions": 2,
+        "interaction_length": 1.5,
+        "forced_share": 0.5,  # the push was handed back at the fourth step
+        "intent_kl": 0.5 * np.log(0.5 / 0.25) + 0.5 * np.log(0.5 / 0.75),
+    })  # fmt: skip
+
+
+def test_what_a_rollout_lacks_is_not_logged():
+    """Labels of an expert have no probabilities; a rollout may have no decision."""
+    found = decisions().statistics()
+    assert found["done_probability"] == 0.0
+    assert "intent_kl" not in found
+    undecided = decisions(
+        decide=torch.zeros(4, dtype=torch.bool),
+        open=torch.zeros(4, dtype=torch.int64),
+        done_probability=torch.full((4,), 0.5),
+        option_probs=torch.full((4, 4), 0.25),
+        intended_option_probs=torch.full((4, 4), 0.25),
+    ).statistics()
+    assert (undecided["done_probability"], undecided["interactions"]) == (0.0, 0)
+    assert not {"interaction_length", "forced_share", "intent_kl"} & undecided.keys()
 
 
 @pytest.mark.parametrize("method", AGENTS)

@@ -196,6 +196,18 @@ def killed_after(out, deadline, monkeypatch):
     return steps
 
 
+@pytest.mark.parametrize("committed", [False, True])
+def test_quarantined_scenes_are_done_unless_they_are_to_be_tried_again(tmp_path, committed):
+    staging = build(tmp_path, range(5), quarantined={4})
+    stage_quarantine(staging, 5, "killed", split="train", attempts=3, died=True)
+    if committed:
+        assemble(tmp_path, IDENTITY, ASSETS, 6)
+    again = {
+        retry: set(range(6)) - done_scenes(staging, retry) for retry in ("none", "died", "all")
+    }
+    assert again == {"none": set(), "died": {5}, "all": {4, 5}}
+
+
 def test_missing_scene_is_named(tmp_path):
     build(tmp_path, [0, 1, 3])
     with pytest.raises(CorruptDataError, match="first 2"):

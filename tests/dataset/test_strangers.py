@@ -23,6 +23,7 @@ from internav_data.dataset import (
     open_staging,
     read_manifest,
     shards,
+    staged_scenes,
 )
 from internav_data.dataset.journal import journal_bytes, journal_names
 from internav_data.dataset.metadata_files import METADATA
@@ -100,6 +101,21 @@ def test_a_strangers_files_survive_a_commit_killed_anywhere():
         assemble(left, IDENTITY, ASSETS, 12)
         assert left.blobs == whole.blobs
         assert found(left) == BESIDE
+
+
+@pytest.mark.parametrize("name", ["manifest.json", "README.md", ".work/journal.json"])
+def test_the_half_of_a_file_that_a_kill_left_goes_with_the_next_commit(name):
+    begun = MemoryStore()
+    build(begun, range(4))
+    whole = MemoryStore(begun.blobs)
+    assemble(whole, IDENTITY, ASSETS, 4)
+    store = MemoryStore(begun.blobs, whole.log.index(("put", name)))
+    with pytest.raises(KilledError):
+        assemble(store, IDENTITY, ASSETS, 4)
+    assert storage.temporary_of(name) in store.blobs
+    left = MemoryStore(store.blobs)
+    assemble(left, IDENTITY, ASSETS, 4)
+    assert left.blobs == whole.blobs
 
 
 @pytest.mark.parametrize("name", sorted(METADATA))
@@ -188,6 +204,7 @@ def test_later_scenes_stay_staged_after_a_commit(tmp_path):
     staging = build(tmp_path, range(12))
     commit_scenes(staging, IDENTITY, ASSETS, 9)
     assert read_manifest(tmp_path).scenes == 9
+    assert set(staged_scenes(staging)) == {9, 10, 11}, "those of the commit are in the dataset"
     assert done_scenes(staging) == frozenset(range(12))
     assert len(load_dataset(tmp_path)) == 18
     open_staging(tmp_path, IDENTITY)

@@ -34,12 +34,20 @@ class Target:
 
     module: str
     tests: tuple[str, ...]
+    """Files or tests below `tests/`, quick ones first: a mutant is dead with the first failure."""
     functions: tuple[str, ...] = ()
     """Functions and classes that are changed; all if none is named."""
     drawn: int = 60
     """Number of mutants that are drawn."""
 
 
+_LABELS = (
+    *("test_a_run_of_pushes_is_push", "test_pickup_rotations_and_drop_are_pick"),
+    *("test_a_hand_back_may_be_a_step", "test_decisions_and_the_state_before_them"),
+    *("test_the_eleventh_action_closes", "test_hrl_decides_at_every_step_and_never_waits"),
+    *("test_labels_are_what_the_model_could_have_done",),
+)
+"""Tests of an expert's labels, among others that need a dataset."""
 TARGETS = {
     "advantages": Target(
         "internav_data.camp.rollout", ("camp/test_advantages.py",), ("advantages",), 40
@@ -52,10 +60,24 @@ TARGETS = {
     ),
     "commit": Target(
         "internav_data.dataset.commit",
-        ("dataset/test_commit.py", "dataset/test_strangers.py", "dataset/test_links.py"),
+        (
+            "dataset/test_staging.py",
+            "dataset/test_strangers.py",
+            "dataset/test_links.py",
+            "generation/test_parts.py::test_another_range_in_the_folder_of_a_part_is_refused",
+            "dataset/test_commit.py",
+        ),
     ),
     "journal": Target("internav_data.dataset.journal", ("dataset/test_strangers.py",), drawn=20),
-    "intent": Target("internav_data.camp.agents.hierarchy", ("camp/test_hierarchy.py",), drawn=100),
+    "intent": Target(
+        "internav_data.camp.agents.hierarchy",
+        (
+            "camp/test_hierarchy.py",
+            "camp/test_replayed_rollouts.py",
+            *(f"camp/test_cloning.py::{name}" for name in _LABELS),
+        ),
+        drawn=100,
+    ),
 }
 _COMPARISONS = {
     ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq,
