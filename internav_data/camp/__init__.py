@@ -15,10 +15,9 @@ if TYPE_CHECKING:
         AgentStep,
         Batch,
         Evaluated,
+        ForwardOutput,
         State,
         StepRecord,
-        one_step,
-        reset_where_done,
     )
     from internav_data.camp.config import CampConfig, preset
     from internav_data.camp.networks import (
@@ -38,15 +37,14 @@ __all__ = [
     "Collector",
     "Encoder",
     "Evaluated",
+    "ForwardOutput",
     "RecurrentActorCritic",
     "State",
     "StepRecord",
     "drawn",
     "entropy_of",
     "log_prob_of",
-    "one_step",
     "preset",
-    "reset_where_done",
     "uniforms_of",
 ]
 
@@ -54,8 +52,7 @@ __getattr__, __dir__ = lazy_imports(
     __name__,
     {
         "agents.protocol": [
-            "Agent", "AgentStep", "Batch", "Evaluated", "State", "StepRecord", "one_step",
-            "reset_where_done",
+            "Agent", "AgentStep", "Batch", "Evaluated", "ForwardOutput", "State", "StepRecord",
         ],
         "config": ["CampConfig", "preset"],
         "networks": ["Encoder", "RecurrentActorCritic", "drawn", "entropy_of", "log_prob_of"],

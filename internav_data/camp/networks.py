@@ -510,20 +510,20 @@ def drawn(log_probs: Tensor, uniforms: Tensor | None) -> Tensor:
 
     Parameters
     ----------
-    log_probs : (n, choices)
+    log_probs : (…, n, choices)
         Log-probabilities.
     uniforms : (n,)
         Random numbers in [0, 1); None for the most probable choice.
 
     Returns
     -------
-    (n,) int64; never a choice of probability 0
+    (…, n) int64; never a choice of probability 0
     """
     if uniforms is None:
         return log_probs.argmax(-1)
     # A number in float32 has 24 bits: in float64 its product with the sum stays below the sum.
     sums = log_probs.double().exp().cumsum(-1)
-    return (sums <= uniforms.double().unsqueeze(-1) * sums[:, -1:]).sum(-1)
+    return (sums <= uniforms.double().unsqueeze(-1) * sums[..., -1:]).sum(-1)
 
 
 def log_prob_of(log_probs: Tensor, choice: Tensor) -> Tensor:

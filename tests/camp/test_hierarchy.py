@@ -28,7 +28,7 @@ from internav_data.records.errors import UsageError  # noqa: E402
 from internav_data.world.actions import ACTION_COUNT  # noqa: E402
 
 ALLOWED = torch.zeros(4, ACTION_COUNT, dtype=torch.bool)
-for _option, _actions in enumerate((*ACTIONS_OF, (DONE,))):
+for _option, _actions in enumerate(ACTIONS_OF):
     ALLOWED[_option, list(_actions)] = True
 
 
@@ -41,8 +41,8 @@ VARIANTS = ["integrated", "policy", "recursive", "none"]
 
 
 def ran_of(agent, batch):
-    record = batch.record
-    return agent.run(batch, option_inputs(record.open, record.used))
+    """Run an agent over the steps; it works out P(i) once more."""
+    return agent.run(with_intent(batch, None))
 
 
 def insist(agent, option, choice=None):
@@ -65,7 +65,7 @@ def test_mixtures_sum_to_one_and_masked_actions_have_no_chance(collected, method
     agent, _, (_, rollout) = collected(method, changes={"agent": {"intent": intent}})
     ran = ran_of(agent, rollout.batch)
     torch.testing.assert_close(ran.intent.sum(-1), torch.ones(8, 4))
-    chances = ran.action_log_probs.exp()
+    chances = ran.log_probs.exp()
     torch.testing.assert_close(chances.sum(-1), torch.ones(8, 4, 4))
     assert (chances[..., ~ALLOWED] == 0).all()
     acts = ALLOWED.clone()
@@ -86,12 +86,12 @@ def test_the_mixture_is_equation_7_by_hand(collected):
     ran = ran_of(agent, batch)
     meant, acts = (
         record.intended_option_probs.double().numpy(),
-        ran.action_log_probs.exp().detach().double().numpy(),
+        ran.log_probs.exp().detach().double().numpy(),
     )
     right = np.zeros((8, 4, ACTION_COUNT))
     for t in range(8):
         for k in range(4):
-            for option, actions in enumerate((*ACTIONS_OF, (DONE,))):
+            for option, actions in enumerate(ACTIONS_OF):
                 for action in actions:
                     right[t, k, action] += meant[t, k, option] * acts[t, k, option, action]
     assert record.intent.numpy() == pytest.approx(right, abs=1e-5)
@@ -105,9 +105,13 @@ def test_termination_is_as_probable_as_done_among_the_actions_of_an_option(colle
             policy.actor.bias.copy_(torch.linspace(-1.0, 1.0, len(policy.actor.bias)))
     twin = make_agent("camp", config(agent={"hand_back_step": True}))
     twin.load_state_dict(agent.state_dict())
-    beta = ran_of(agent, rollout.batch).termination.sigmoid()
-    done = ran_of(twin, rollout.batch).action_log_probs[..., DONE].exp()
-    torch.testing.assert_close(beta[..., [PUSH, PICK]], done[..., [PUSH, PICK]])
+    for option in (PUSH, PICK):
+        opened = torch.full_like(rollout.batch.record.open, option)
+        record = dataclasses.replace(rollout.batch.record, open=opened)
+        batch = dataclasses.replace(rollout.batch, record=record)
+        beta = ran_of(agent, batch).ends[..., 0].exp()
+        done = ran_of(twin, batch).log_probs[..., option, DONE].exp()
+        torch.testing.assert_close(beta, done)
 
 
 @pytest.mark.parametrize("method", ["camp", "camp with a step", "hrl"])
@@ -136,15 +140,15 @@ def test_what_is_drawn_has_the_probability_of_its_parts(collected, method):
                 opened, decided = record.open[t, k], bool(record.decide[t, k])
                 right = entropy = torch.zeros(())
                 if opened and not step:
-                    beta = ran.termination[t, k, opened].sigmoid()
+                    beta = ran.ends[t, k, 0].exp()
                     right = right + (beta if decided else 1 - beta).log()
                     entropy = entropy + entropy_of(torch.stack([beta, 1 - beta]))
                 if decided:
                     right = right + ran.option_log_probs[t, k, option]
                     entropy = entropy + entropy_of(ran.option_log_probs[t, k].exp())
                 if option != STOP:
-                    right = right + ran.action_log_probs[t, k, option, choice]
-                    entropy = entropy + entropy_of(ran.action_log_probs[t, k, option].exp())
+                    right = right + ran.log_probs[t, k, option, choice]
+                    entropy = entropy + entropy_of(ran.log_probs[t, k, option].exp())
                 assert rollout.log_probs[t, k] == pytest.approx(right.item(), abs=1e-5)
                 assert now.entropy[t, k].item() == pytest.approx(entropy.item(), abs=1e-4)
                 kinds.add((opened.item() > 0, decided))
@@ -236,6 +240,7 @@ def test_who_does_not_execute_gets_no_gradient(collected, method):
             assert torch.equal(before[policy], after[policy]) == (policy != changed)
 
 
+@torch.no_grad()
 def acted(agent, count=1, steps=14, starts_at=()):
     """Act on noise; return (option, choice, action, decide, open before, used before) a step."""
     torch.manual_seed(3)
@@ -251,9 +256,10 @@ def acted(agent, count=1, steps=14, starts_at=()):
         episode_starts = torch.full((count,), t == 0 or t in starts_at)
         step = agent.act(seen, state, episode_starts, torch.rand(count, 2))
         state, record = step.state, step.record
-        names = ("option", "choice", "decide", "open", "used", "forced")
+        names = ("option", "choice", "decide", "open", "used")
         rows.append({name: getattr(record, name)[0].item() for name in names})
         rows[-1]["action"] = step.action[0].item()
+        rows[-1]["forced"] = record.map(lambda values: values[:1]).statistics().get("forced_share")
     return rows
 
 
@@ -264,7 +270,7 @@ def test_an_interaction_that_never_hands_back_has_eleven_actions_then_global_dec
     rows = acted(insist(make_agent("camp", config()), option, 1), steps=25)
     assert [row["decide"] for row in rows] == [t % 11 == 0 for t in range(25)]
     assert [row["used"] for row in rows] == [t % 11 for t in range(25)]
-    assert [row["forced"] for row in rows] == [t % 11 == 10 for t in range(25)]
+    assert [row["forced"] for row in rows] == [1.0 if t % 11 == 10 else None for t in range(25)]
     assert [row["action"] for row in rows] == [ACTIONS_OF[option][1]] * 25  # none is replaced
 
 
@@ -291,7 +297,7 @@ def test_a_hand_back_is_one_step_of_waiting_and_ends_nothing(config, option, fak
     agent = always_ending(config, option, hand_back_step=True)
     rows = acted(agent, steps=5)
     assert all(row["action"] == WAIT and row["choice"] == DONE for row in rows)
-    assert all(row["decide"] and not row["forced"] for row in rows)
+    assert all(row["decide"] and row["forced"] == 0.0 for row in rows)
     env = fake(length=50)
     collector = Collector(env, agent)
     collector.loop.reset()
@@ -368,10 +374,9 @@ def test_a_step_ends_the_episode_by_the_global_policys_done_or_by_navigates(coll
     )
     for rollout in lived:
         record, ran = rollout.batch.record, ran_of(agent, rollout.batch)
-        beta = ran.termination.take_along_dim(record.open.unsqueeze(-1), -1).squeeze(-1).sigmoid()
-        closed = torch.where(record.open != 0, beta, 1.0)
+        closed = torch.where(record.open != 0, ran.ends[..., 0].exp(), 1.0)
         options = ran.option_log_probs.exp()
-        done = ran.action_log_probs[..., NAVIGATE, DONE].exp()
+        done = ran.log_probs[..., NAVIGATE, DONE].exp()
         right = closed * (options[..., STOP] + options[..., NAVIGATE] * done)
         torch.testing.assert_close(record.done_probability, right, atol=1e-6, rtol=1e-4)
     assert record.open.any()
@@ -394,33 +399,32 @@ def test_networks_are_given_which_option_is_open_and_the_elevenths_used():
 
 
 def decisions(**fields):
-    """Return four steps: Navigate, a push of two actions, a pickup that closes at its 11th."""
+    """Return five steps: Navigate, a push of two actions, a pickup's first and 11th."""
     columns = {
-        "choice": [0, ACTIONS_OF[PUSH][0], ACTIONS_OF[PUSH][0], ACTIONS_OF[PICK][0]],
-        "option": [NAVIGATE, PUSH, PUSH, PICK],
-        "open": [0, 0, PUSH, PUSH],
-        "used": [0, 0, 1, 2],
+        "choice": [0, *[ACTIONS_OF[PUSH][0]] * 2, *[ACTIONS_OF[PICK][0]] * 2],
+        "option": [NAVIGATE, PUSH, PUSH, PICK, PICK],
+        "open": [0, 0, PUSH, PUSH, PICK],
+        "used": [0, 0, 1, 2, 10],
     }
-    decide = torch.tensor([True, True, False, True])
+    decide = torch.tensor([True, True, False, True, False])
     record = {name: torch.tensor(column) for name, column in columns.items()}
     return HierarchyRecord(**(record | {"decide": decide} | fields))
 
 
 def test_a_rollout_is_logged_by_its_options_and_decisions():
     record = decisions(
-        forced=torch.tensor([False, False, False, True]),
-        done_probability=torch.tensor([0.1, 0.2, 9.0, 0.3]),
-        option_probs=torch.tensor([[0.5, 0.5, 0.0, 0.0]] * 4),
-        intended_option_probs=torch.tensor([[0.25, 0.75, 0.0, 0.0]] * 4),
+        done_probability=torch.tensor([0.1, 0.2, 9.0, 0.3, 9.0]),
+        option_probs=torch.tensor([[0.5, 0.5, 0.0, 0.0]] * 5),
+        intended_option_probs=torch.tensor([[0.25, 0.75, 0.0, 0.0]] * 5),
     )
     assert record.statistics() == pytest.approx({
-        "share_navigate": 0.25,
-        "share_push": 0.5,
-        "share_pick": 0.25,
+        "share_navigate": 0.2,
+        "share_push": 0.4,
+        "share_pick": 0.4,
         "share_done": 0.0,
         "done_probability": 0.2,  # where it was decided
         "interactions": 2,
-        "interaction_length": 1.5,
+        "interaction_length": 2.0,
         "forced_share": 0.5,  # the push was handed back at the fourth step
         "intent_kl": 0.5 * np.log(0.5 / 0.25) + 0.5 * np.log(0.5 / 0.75),
     })  # fmt: skip
@@ -432,11 +436,12 @@ def test_what_a_rollout_lacks_is_not_logged():
     assert found["done_probability"] == 0.0
     assert "intent_kl" not in found
     undecided = decisions(
-        decide=torch.zeros(4, dtype=torch.bool),
-        open=torch.zeros(4, dtype=torch.int64),
-        done_probability=torch.full((4,), 0.5),
-        option_probs=torch.full((4, 4), 0.25),
-        intended_option_probs=torch.full((4, 4), 0.25),
+        decide=torch.zeros(5, dtype=torch.bool),
+        open=torch.zeros(5, dtype=torch.int64),
+        used=torch.zeros(5, dtype=torch.int64),
+        done_probability=torch.full((5,), 0.5),
+        option_probs=torch.full((5, 4), 0.25),
+        intended_option_probs=torch.full((5, 4), 0.25),
     ).statistics()
     assert (undecided["done_probability"], undecided["interactions"]) == (0.0, 0)
     assert not {"interaction_length", "forced_share", "intent_kl"} & undecided.keys()
@@ -455,7 +460,7 @@ def test_every_learner_ends_an_episode_with_the_same_chance(fake, config, method
     collector = Collector(env, agent)
     collector.loop.reset()
     record = collector.collect(uniforms_of(0, 0, range(4), 1)).batch.record
-    assert record.done_probability.numpy() == pytest.approx(chance, rel=0.03)
+    assert record.statistics()["done_probability"] == pytest.approx(chance, rel=0.03)
     if method in {"hrl", "camp"} and chance == 0.01:
         plan = record.option_probs[0, 0].tolist()
         assert plan[:3] == pytest.approx([0.9, 0.045, 0.045], rel=0.03)
@@ -488,7 +493,7 @@ def test_recursive_intent_is_the_intent_policy_run_on_its_own_first_intent(colle
     at = {name: what[:1] for name, what in batch.observations.items()}
     inputs = torch.cat([agent.encoders[0](at), torch.zeros(1, 4, 3)], -1)
     mind, intent = agent.intent, torch.full((1, 4, ACTION_COUNT), 1.0 / ACTION_COUNT)
-    acts = ran_of(agent, batch).action_log_probs[:1].exp()
+    acts = ran_of(agent, batch).log_probs[:1].exp()
     for _ in range(2):
         out, _ = mind.gru(torch.cat([inputs, mind.embed(intent)], -1))  # from zeros, twice
         meant = torch.softmax(mind.actor(out), -1)

@@ -158,7 +158,7 @@ def _part(agent, optimiser, rollout, config, columns):
     returns = (advantages + rollout.values)[:, columns]
     advantages = (advantages - advantages.mean()) / (advantages.std(correction=0) + 1e-8)
     advantages = advantages[:, columns]
-    now = agent.evaluate(rollout.batch.select(torch.tensor(columns)))
+    now = agent.evaluate(rollout.batch.chunked(torch.tensor(columns), [rollout.batch.state]))
     ratio = (now.log_prob - rollout.log_probs[:, columns]).exp()
     gain = torch.minimum(ratio * advantages, ratio.clamp(0.8, 1.2) * advantages)
     loss = -gain.mean() + 0.25 * (now.value - returns).square().mean()
@@ -227,7 +227,7 @@ def _columns(rollout, part):
         for f in dataclasses.fields(Rollout)
         if f.name not in {"batch", "states", "last_value", "finished"}
     }
-    batch = rollout.batch.select(torch.tensor(part))
+    batch = rollout.batch.chunked(torch.tensor(part), [rollout.batch.state])
     states = [{name: values[part] for name, values in each.items()} for each in rollout.states]
     return Rollout(batch, states, last_value=rollout.last_value[part], **tensors)
 

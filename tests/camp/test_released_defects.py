@@ -21,7 +21,7 @@ def test_defect_1_no_option_lives_on_a_module(collected):
         "camp", rollouts=4, changes={"agent": {"initial_interaction_probability": 0.4}}
     )
     buffers = {name for name, _ in agent.named_buffers() if not name.endswith("critic.scale")}
-    assert buffers == {"mask", "done"}
+    assert buffers == {"mask"}
     before = {k: v for k, v in vars(agent).items() if not k.startswith("_")}
     inside = False
     for rollout in lived:
@@ -41,9 +41,9 @@ def test_defect_2_the_mixture_is_a_distribution(collected):
     """Pick's rotations are added to Navigate's, and Navigate's Done and Look keep their mass."""
     agent, _, (_, rollout) = collected("camp")
     batch = rollout.batch
-    ran = agent.run(batch, option_inputs(batch.record.open, batch.record.used))
+    ran = agent.run(batch)
     torch.testing.assert_close(ran.intent.sum(-1), torch.ones(8, 4))
-    acts, meant = ran.action_log_probs.exp(), ran.intended_option_probs
+    acts, meant = ran.log_probs.exp(), batch.record.intended_option_probs
     for look in (3, 4):
         right = meant[..., NAVIGATE] * acts[..., NAVIGATE, look]
         torch.testing.assert_close(ran.intent[..., look], right)

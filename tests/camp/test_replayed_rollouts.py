@@ -7,7 +7,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from internav_data.camp.agents import AGENTS, make_agent  # noqa: E402
-from internav_data.camp.agents.hierarchy import AuxiliaryAgent, option_inputs  # noqa: E402
+from internav_data.camp.agents.hierarchy import AuxiliaryAgent  # noqa: E402
 from internav_data.camp.agents.protocol import Batch  # noqa: E402
 from internav_data.camp.networks import EpisodeSegments  # noqa: E402
 from internav_data.camp.ppo import replayed  # noqa: E402
@@ -44,7 +44,7 @@ def test_log_probabilities_and_values_are_those_of_the_rollout(
         now = agent.evaluate(rollout.batch)
         torch.testing.assert_close(now.log_prob, rollout.log_probs, atol=1e-5, rtol=0)
         torch.testing.assert_close(now.value, rollout.values, atol=1e-5, rtol=0)
-        parts = rollout.batch.select(torch.tensor([2, 0]))
+        parts = rollout.batch.chunked(torch.tensor([2, 0]), [rollout.batch.state])
         mine = agent.evaluate(parts).log_prob
         torch.testing.assert_close(mine, rollout.log_probs[:, [2, 0]], atol=1e-5, rtol=0)
     assert any(rollout.batch.episode_starts[1:].any() for rollout in lived)
@@ -157,10 +157,8 @@ def test_intents_worked_out_again_are_those_recorded(collected, curious, method,
         record = dataclasses.replace(batch.record, intent=None)
         unknown = dataclasses.replace(batch, record=record)
         again = agent.evaluate(unknown)
-        if method == "camp":
-            intent = agent.run(unknown, option_inputs(record.open, record.used)).intent
-        else:
-            intent = agent.run(unknown).inputs["intent"]
+        ran = agent.run(unknown)
+        intent = ran.intent if method == "camp" else ran.recorded["intent"]
         torch.testing.assert_close(intent, recorded, atol=1e-5, rtol=0)
         torch.testing.assert_close(again.log_prob, rollout.log_probs, atol=1e-5, rtol=0)
         assert recorded.std(0).max() > 1e-3  # intents differ from step to step

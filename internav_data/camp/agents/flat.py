@@ -5,22 +5,19 @@ Shapes: T steps, n environments, A actions (`ACTION_COUNT`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import torch
 from torch import Tensor, nn
 
 from internav_data.camp import networks
 from internav_data.camp.agents.protocol import (
-    AgentStep,
+    Agent,
     Batch,
-    Evaluated,
-    RecurrentAgent,
+    ForwardOutput,
     State,
     StepRecord,
-    Uniforms,
 )
 from internav_data.camp.config import CampConfig
 from internav_data.records.errors import UsageError
@@ -33,8 +30,6 @@ class FlatRecord(StepRecord):
 
     action_probs: Tensor | None = None
     """P(a), (…, A)."""
-    done_probability: Tensor | None = None
-    """Probability that the step ends the episode."""
     intent: Tensor | None = None
     """P(i), (…, A), of `ppo-intent`."""
     objects: Tensor | None = None
@@ -44,30 +39,15 @@ class FlatRecord(StepRecord):
 
     def statistics(self) -> dict[str, float]:
         """Return the statistics of a rollout's decisions that are logged; see docs/training.md."""
-        found = {}
-        if self.done_probability is not None:
-            found["done_probability"] = float(self.done_probability.mean())
-        if self.action_probs is not None and self.intent is not None:
+        if self.action_probs is None:
+            return {}
+        found = {"done_probability": float(self.action_probs[..., Action.DONE].contiguous().mean())}
+        if self.intent is not None:
             found["intent_kl"] = networks.divergence(self.action_probs, self.intent)
         return found
 
 
-class FlatOutput(NamedTuple):
-    """Outputs of the networks over T steps."""
-
-    log_probs: Tensor
-    """(T, n, A): log P(a)."""
-    value: Tensor
-    """(T, n): the critic's values."""
-    out: Tensor
-    """(T, n, hidden): outputs of the GRU, from which actions and values come."""
-    state: State
-    """(n, …): memory after the last step."""
-    inputs: dict[str, Tensor]
-    """(T, n, …): fields of `FlatRecord` that the networks worked out besides the observation."""
-
-
-class PPOAgent(RecurrentAgent[FlatRecord]):
+class PPOAgent(Agent[FlatRecord]):
     """Encoder, GRU, actor and critic.
 
     Parameters
@@ -77,6 +57,8 @@ class PPOAgent(RecurrentAgent[FlatRecord]):
     extra
         Number of further inputs of the GRU.
     """
+
+    record_type = FlatRecord
 
     def __init__(self, config: CampConfig, extra: int = 0) -> None:
         super().__init__()
@@ -96,42 +78,23 @@ class PPOAgent(RecurrentAgent[FlatRecord]):
         weight = self.policy.actor.weight
         return {"hidden": weight.new_zeros(count, self.hidden)}
 
-    def step(self, batch: Batch[Any], uniforms: Uniforms) -> AgentStep[FlatRecord]:
-        """See `Agent`."""
-        ran = self.run(batch)
-        log_probs = ran.log_probs[0]
-        choice = networks.drawn(log_probs, uniforms[1])
-        probs = log_probs.exp()
-        inputs = {name: values[0] for name, values in ran.inputs.items()}
-        record = FlatRecord(choice, probs, probs[:, Action.DONE], **inputs)
-        log_prob = networks.log_prob_of(log_probs, choice)
-        return AgentStep(choice, log_prob, ran.value[0], record, ran.state)
-
-    def evaluate(self, batch: Batch[FlatRecord]) -> Evaluated:
-        """See `Agent`."""
-        ran = self.run(batch)
-        log_prob = networks.log_prob_of(ran.log_probs, batch.record.choice)
-        entropy = networks.entropy_of(ran.log_probs)
-        return Evaluated(log_prob, ran.value, entropy, ran.state, critic_inputs=ran.out)
-
-    def labels(self, actions: Sequence[int]) -> tuple[list[int], FlatRecord]:
-        """See `Agent`."""
-        return list(actions), FlatRecord(torch.tensor(actions))
-
     def critics(self) -> list[nn.Module]:
         """See `Agent`."""
         return [self.policy.critic]
 
-    def run(self, batch: Batch[Any]) -> FlatOutput:
-        """Run the networks over T steps of n environments; the record of new ones is None."""
+    def run(self, batch: Batch[Any]) -> ForwardOutput:
+        """See `Agent`."""
         return self.decide(self.encoder(batch.observations), batch)
 
-    def decide(self, features: Tensor, batch: Batch[Any], **inputs: Tensor) -> FlatOutput:
-        """Run GRU, actor and critic on features (T, n, …); `inputs` are those to be recorded."""
+    def decide(self, features: Tensor, batch: Batch[Any], **recorded: Tensor) -> ForwardOutput:
+        """Run GRU, actor and critic on features (T, n, …); `recorded` is what the record keeps."""
         out, hidden = batch.segments.run(self.policy.gru, features, batch.state["hidden"])
         log_probs = torch.log_softmax(self.policy.actor(out), -1)
-        state = {**batch.state, "hidden": hidden}
-        return FlatOutput(log_probs, self.policy.value(out), out, state, inputs)
+        return ForwardOutput(
+            log_probs=log_probs, value=self.policy.value(out),
+            state={**batch.state, "hidden": hidden}, critic_inputs=out,
+            recorded={"action_probs": log_probs.detach().exp(), **recorded},
+        )  # fmt: skip
 
 
 class PPOIntentAgent(PPOAgent):
@@ -158,7 +121,7 @@ class PPOIntentAgent(PPOAgent):
         state = super().initial_state(count)
         return {**state, "intent_hidden": torch.zeros_like(state["hidden"])}
 
-    def run(self, batch: Batch[Any]) -> FlatOutput:
+    def run(self, batch: Batch[Any]) -> ForwardOutput:
         """See `PPOAgent`."""
         features, hidden = self.encoder(batch.observations), batch.state["intent_hidden"]
         intent = None if batch.record is None else batch.record.intent
@@ -168,9 +131,10 @@ class PPOIntentAgent(PPOAgent):
             no_mask = features.new_zeros(ACTION_COUNT)
             # With a single policy P(i) is P(omega') itself.
             _, intent, hidden = self.intent(features, hidden, batch.segments, lambda p: p, no_mask)
-        inputs = {"intent": intent} if self.uses_intent else {}
-        ran = self.decide(self.policy.condition(features, intent), batch, **inputs)
-        return ran._replace(state={**ran.state, "intent_hidden": hidden})
+        recorded = {"intent": intent} if self.uses_intent else {}
+        ran = self.decide(self.policy.condition(features, intent), batch, **recorded)
+        ran.state["intent_hidden"] = hidden
+        return ran
 
     def synchronise(self) -> None:
         """See `Agent`."""

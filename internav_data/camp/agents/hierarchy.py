@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, TypeVar
 
 import torch
 from torch import Tensor, nn
@@ -17,10 +17,9 @@ from torch.nn import functional
 
 from internav_data.camp import networks
 from internav_data.camp.agents.protocol import (
-    AgentStep,
+    Agent,
     Batch,
-    Evaluated,
-    RecurrentAgent,
+    ForwardOutput,
     State,
     StepRecord,
     Uniforms,
@@ -43,9 +42,10 @@ DONE: Final = int(Action.DONE)
 WAIT: Final = int(Action.WAIT)
 """Action of the step at which an interaction hands control back (`agent.hand_back_step`)."""
 ACTIONS_OF: Final[tuple[tuple[int, ...], ...]] = tuple(
-    tuple(int(action) for action in actions_of_option(option)) for option in OPTION_NAMES[:STOP]
+    tuple(int(action) for action in actions_of_option(option)) for option in OPTION_NAMES
 )
-"""Actions of the three policies (table 1), in the order of their logits; Done is the last."""
+"""Actions of the options (table 1), in the order of their policies' logits; Done is the last."""
+N = TypeVar("N", int, Tensor)
 
 
 def _letters(actions: Iterable[int]) -> str:
@@ -84,8 +84,6 @@ class HierarchyRecord(OptionRecord):
     """Whether the global policy decided, bool."""
     intent: Tensor | None = None
     """P(i), (…, A or 4): equation 7."""
-    forced: Tensor | None = None
-    """Whether the interaction was closed by its 11th action, bool."""
     option_probs: Tensor | None = None
     """P(omega), (…, 4): equation 5."""
     intended_option_probs: Tensor | None = None
@@ -102,14 +100,13 @@ class HierarchyRecord(OptionRecord):
         if self.done_probability is not None and decide.any():
             found["done_probability"] = float(self.done_probability[decide].mean())
         interacting = (self.option == PUSH) | (self.option == PICK)
+        begun = self.used.masked_fill(decide, 0)
+        _, _, handed_back, forced = option_step(self.option, self.choice, begun)
         found["interactions"] = opened = int((interacting & decide).sum())
         if opened:
             found["interaction_length"] = float(interacting.sum()) / opened
-        forced = 0 if self.forced is None else int(self.forced.sum())
-        handed_back = (interacting & (self.choice == DONE)) | (decide & (self.open != 0))
-        ended = forced + int(handed_back.sum())
-        if ended:
-            found["forced_share"] = forced / ended
+        if ended := int((forced | handed_back | (decide & (self.open != 0))).sum()):
+            found["forced_share"] = int(forced.sum()) / ended
         chosen, intended = self.option_probs, self.intended_option_probs
         if chosen is not None and intended is not None and decide.any():
             found["intent_kl"] = networks.divergence(chosen[decide], intended[decide])
@@ -151,10 +148,8 @@ def option_inputs(opened: Tensor, used: Tensor) -> Tensor:
     return torch.stack([part.to(torch.float32) for part in parts], -1)
 
 
-def option_step(
-    option: Tensor, choice: Tensor, used: Tensor
-) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """Return the option state after an action; all (n,).
+def option_step(option: N, choice: N, used: N, *, extended: bool = True) -> tuple[N, N, N, N]:
+    """Return the option state after an action; tensors of one shape, or numbers.
 
     After its 11th action an interaction closes; Done of Push or Pick, which is an action only where
     a hand-back is a step, closes it too, even as the first one.
@@ -165,6 +160,8 @@ def option_step(
         Option that acted, and its action.
     used
         Actions that it had used before: 0 if it has just been opened.
+    extended
+        Whether interactions stay open over several actions.
 
     Returns
     -------
@@ -173,12 +170,11 @@ def option_step(
     handed_back, forced
         Whether the interaction was closed by its Done, or by its 11th action.
     """
-    interacting = (option == PUSH) | (option == PICK)
-    handed_back = interacting & (choice == DONE)
-    spent = used + 1
-    forced = interacting & ~handed_back & (spent >= INTERACTION_ACTIONS)
-    still = (interacting & ~handed_back & ~forced).to(option.dtype)
-    return option * still, spent * still, handed_back, forced
+    spent, interacting = used + 1, extended & ((option == PUSH) | (option == PICK))
+    acting = interacting & (choice != DONE)
+    still = acting & (spent < INTERACTION_ACTIONS)
+    forced = acting & (spent >= INTERACTION_ACTIONS)
+    return option * still, spent * still, interacting & (choice == DONE), forced
 
 
 def option_labels(
@@ -227,9 +223,8 @@ def option_labels(
         for number, action in enumerate(taken):
             decide = not extended or number % INTERACTION_ACTIONS == 0
             rows.append((action, acting, opened, used, decide))
-            spent = 1 if decide else used + 1
-            still = extended and spent < INTERACTION_ACTIONS and action != DONE
-            opened, used = (acting, spent) if still else (NAVIGATE, 0)
+            begun = 0 if decide else used
+            opened, used, _, _ = option_step(acting, action, begun, extended=extended)
     choice, option, opens, uses, decides = torch.tensor(rows).reshape(-1, 5).unbind(1)
     waits = (choice == DONE) & (option != NAVIGATE)
     record = HierarchyRecord(choice, option, opens, uses, decide=decides.bool())
@@ -240,28 +235,57 @@ GLOBAL, INTENT, GRUS = 3, 4, 5
 """Hidden states: those of the three action policies, numbered as options are, then these two."""
 
 
-class ForwardOutput(NamedTuple):
-    """Outputs of all networks over T steps."""
+def open_option(batch: Batch[Any]) -> tuple[Tensor, Tensor]:
+    """Return the open interaction and the actions that it has used, (T, n), before each step."""
+    if batch.record is None:
+        return batch.state["open"][None], batch.state["used"][None]
+    return batch.record.open, batch.record.used
+
+
+@dataclass(slots=True, kw_only=True)
+class HierarchyOutput(ForwardOutput):
+    """Outputs of all networks over T steps; `log_probs` (T, n, 4, A) are those of each option."""
 
     option_log_probs: Tensor
     """(T, n, 4): log P(omega), equation 5."""
-    action_log_probs: Tensor
-    """(T, n, 4, A): log-probabilities of the actions of each option; STOP's is Done."""
-    termination: Tensor
-    """(T, n, 3): logits of beta, the probability that Navigate, Push, Pick end on arrival."""
-    value: Tensor
-    """(T, n): the global policy's values."""
-    out: Tensor
-    """(T, n, hidden): outputs of the global policy's GRU."""
+    ends: Tensor
+    """(T, n, 2): log beta and log(1 - beta) of the open interaction; 0 and -inf if none is."""
     intended_option_probs: Tensor | None
     """(T, n, 4): P(omega'), equation 6; None where the intent was given."""
     intent: Tensor
     """(T, n, A or 4): P(i), equation 7."""
-    hidden: Tensor
-    """(n, 5, hidden): hidden states after the last step."""
+
+    @property
+    def decisions(self) -> Tensor:
+        """Log-probabilities of what is decided on arrival, (T, n, 5).
+
+        The global policy takes each option, or the open one stays: log beta + log pi_Omega(omega),
+        and log(1 - beta).
+        """
+        return torch.cat([self.option_log_probs + self.ends[..., :1], self.ends[..., 1:]], -1)
+
+    def of_option(self, option: Tensor) -> Tensor:
+        """Return the log-probabilities (T, n, A) of the actions of the options that act."""
+        return self.log_probs.take_along_dim(option[..., None, None], -2).squeeze(-2)
+
+    def log_prob(self, record: HierarchyRecord) -> Tensor:
+        """See `ForwardOutput`.
+
+        [open] (log beta or log(1 - beta)) + decide log pi_Omega(omega) + log pi_omega(a); the last
+        is 0 for omega = Done.
+        """
+        decision = record.option.masked_fill(~record.decide, STAY)
+        acted = networks.log_prob_of(self.of_option(record.option), record.choice)
+        return networks.log_prob_of(self.decisions, decision) + acted
+
+    def entropy(self, record: HierarchyRecord) -> Tensor:
+        """See `ForwardOutput`."""
+        decided = record.decide * networks.entropy_of(self.option_log_probs)
+        acted = networks.entropy_of(self.of_option(record.option))
+        return networks.entropy_of(self.ends) + decided + acted
 
 
-class Hierarchy(RecurrentAgent[HierarchyRecord]):
+class Hierarchy(Agent[HierarchyRecord]):
     """Encoders, three action policies, the global policy, and the intent policy that copies it.
 
     All five GRUs are stepped at every step, each with its own hidden state, whichever policy acts.
@@ -282,7 +306,6 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
     """
 
     mask: Tensor
-    done: Tensor
 
     def __init__(self, config: CampConfig, *, temporally_extended: bool = True) -> None:
         super().__init__()
@@ -317,9 +340,6 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
         mask = torch.zeros(OPTIONS)
         mask[[PUSH if name == "push" else PICK for name in agent.forbidden]] = -torch.inf
         self.register_buffer("mask", mask, persistent=False)
-        done = torch.full((ACTION_COUNT,), -torch.inf)
-        done[DONE] = 0.0
-        self.register_buffer("done", done, persistent=False)
 
     @property
     def policies(self) -> tuple[networks.RecurrentActorCritic, ...]:
@@ -333,84 +353,32 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
         hidden = weight.new_zeros(count, GRUS, self.hidden)
         return {"hidden": hidden, "open": idle, "used": idle.clone()}
 
-    def step(self, batch: Batch[Any], uniforms: Uniforms) -> AgentStep[HierarchyRecord]:
+    def draw(
+        self, ran: HierarchyOutput, state: State, uniforms: Uniforms
+    ) -> tuple[Tensor, HierarchyRecord, State]:
         """See `Agent`."""
-        before, used = batch.state["open"], batch.state["used"]
-        ran = self.run(batch, option_inputs(before, used)[None])
-        decisions, ends = (values[0] for values in self.decisions(ran, before[None]))
-        action_log_probs = ran.action_log_probs[0]
-        decision = networks.drawn(decisions, uniforms[0])
+        opened, used = state["open"][None], state["used"][None]
+        decision = networks.drawn(ran.decisions, uniforms[0])
         decide = decision != STAY
-        option = torch.where(decide, decision, before)
-        choice = networks.drawn(_of_option(action_log_probs, option), uniforms[1])
-        opened, spent, handed_back, forced = option_step(
-            option, choice, used.masked_fill(decide, 0)
-        )
-        if not self.temporally_extended:
-            opened, spent, forced = opened * 0, spent * 0, forced & False
-        option_probs, intended = ran.option_log_probs[0].exp(), ran.intended_option_probs
+        option = torch.where(decide, decision, opened)
+        choice = networks.drawn(ran.of_option(option), uniforms[1])
         # An episode ends by the global policy's Done, or by Navigate and its Done.
-        done = action_log_probs[:, NAVIGATE, DONE].exp()
-        ending = (option_probs[:, STOP] + option_probs[:, NAVIGATE] * done) * ends[:, 0].exp()
+        probs, done = ran.option_log_probs.exp(), ran.log_probs[..., NAVIGATE, DONE].exp()
+        ending = (probs[..., STOP] + probs[..., NAVIGATE] * done) * ran.ends[..., 0].exp()
         record = HierarchyRecord(
-            choice, option, before, used, decide, ran.intent[0], forced,
-            option_probs, None if intended is None else intended[0], ending,
+            choice, option, opened, used, decide, ran.intent,
+            probs, ran.intended_option_probs, ending,
         )  # fmt: skip
-        log_prob = _log_prob(decisions, action_log_probs, record)
-        after = {"hidden": ran.hidden, "open": opened, "used": spent}
-        return AgentStep(
-            choice.masked_fill(handed_back, WAIT), log_prob, ran.value[0], record, after
+        opened, used, handed_back, _ = option_step(
+            option, choice, used.masked_fill(decide, 0), extended=self.temporally_extended
         )
+        after = {"open": opened[0], "used": used[0]}
+        return choice.masked_fill(handed_back, WAIT), record, after
 
-    def evaluate(self, batch: Batch[HierarchyRecord]) -> Evaluated:
+    def run(self, batch: Batch[Any]) -> HierarchyOutput:
         """See `Agent`."""
-        record = batch.record
-        ran = self.run(batch, option_inputs(record.open, record.used), record.intent)
-        decisions, ends = self.decisions(ran, record.open)
-        log_prob = _log_prob(decisions, ran.action_log_probs, record)
-        decided = record.decide * networks.entropy_of(ran.option_log_probs)
-        acted = networks.entropy_of(_of_option(ran.action_log_probs, record.option))
-        state = {**batch.state, "hidden": ran.hidden}
-        entropy = networks.entropy_of(ends) + decided + acted
-        return Evaluated(log_prob, ran.value, entropy, state, critic_inputs=ran.out)
-
-    def decisions(self, ran: ForwardOutput, opened: Tensor) -> tuple[Tensor, Tensor]:
-        """Return what is decided on arrival, where interactions `opened` (T, n) are open.
-
-        Returns
-        -------
-        decisions : (T, n, 5)
-            Log-probabilities that the global policy takes each option, and that the open one
-            stays: log beta + log pi_Omega(omega), and log(1 - beta).
-        ends : (T, n, 2)
-            log beta and log(1 - beta): 0 and minus infinity where none is open.
-        """
-        is_open = opened != NAVIGATE
-        if self.hand_back_step:  # its own Done closes it, after the step
-            logit = torch.full_like(ran.value, -torch.inf)
-            ends = torch.stack([logit, torch.zeros_like(logit)], -1)
-        else:
-            logit = ran.termination.take_along_dim(opened.unsqueeze(-1), -1)
-            ends = functional.logsigmoid(torch.cat([logit, -logit], -1))
-        none = ends.new_tensor([0.0, -torch.inf])
-        ends = torch.where(is_open.unsqueeze(-1), ends, none)
-        return torch.cat([ran.option_log_probs + ends[..., :1], ends[..., 1:]], -1), ends
-
-    def run(
-        self, batch: Batch[Any], option_features: Tensor, intent: Tensor | None = None
-    ) -> ForwardOutput:
-        """Run all networks over T steps of n environments.
-
-        Parameters
-        ----------
-        batch
-            Steps; their record is not read.
-        option_features : (T, n, 3)
-            `option_inputs` before each step.
-        intent : (T, n, A or 4)
-            P(i) as it was recorded; None to compute it.
-        """
-        segments = batch.segments
+        segments, (opened, used) = batch.segments, open_option(batch)
+        option_features = option_inputs(opened, used)
         policies: list[networks.RecurrentActorCritic] = list(self.policies)
         views = [encoder(batch.observations) for encoder in self.encoders]  # (T, n, size) each
         inputs = [
@@ -418,6 +386,7 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
             *(torch.cat([views[k % len(views)], option_features], -1) for k in (PUSH, PICK)),
         ]
         features, intended = torch.cat([views[0], option_features], -1), None
+        intent = None if batch.record is None else batch.record.intent
         if not self.uses_intent:
             intent = networks.uniform_intent(features, self.global_policy.embed.in_features)
         if intent is not None:  # else the action policies must run first
@@ -426,14 +395,7 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
         hidden = list(batch.state["hidden"].unbind(1))
         grus = [policy.gru for policy in policies]
         outs, hidden[: len(grus)] = segments.run_together(grus, inputs, hidden[: len(grus)])
-        log_probs, terminations = [], []
-        for k, policy in enumerate(self.policies):
-            logits = policy.actor(outs[k])
-            may_end = k == NAVIGATE or self.hand_back_step
-            log_probs.append(action_log_probs_of(k, logits, may_end=may_end))
-            terminations.append(logits[..., -1] - logits[..., :-1].logsumexp(-1))
-        termination = torch.stack(terminations, -1)
-        acts = torch.stack([*log_probs, self.done.expand_as(log_probs[0])], -2)  # (T, n, 4, A)
+        acts, termination = self.heads(outs)
         if intent is None:
             intended, intent, hidden[INTENT] = self.intent(
                 features, hidden[INTENT], segments, lambda p: self.mixed(p, acts), self.mask
@@ -442,11 +404,33 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
             out, hidden[GLOBAL] = segments.run(self.global_policy.gru, conditioned, hidden[GLOBAL])
             outs.append(out)
         out = outs[GLOBAL]
-        option_log_probs = torch.log_softmax(self.global_policy.actor(out) + self.mask, -1)
-        value, after = self.global_policy.value(out), torch.stack(hidden, 1)
-        return ForwardOutput(
-            option_log_probs, acts, termination, value, out, intended, intent, after
-        )
+        logit = termination.take_along_dim(opened.unsqueeze(-1), -1)
+        return HierarchyOutput(
+            log_probs=acts, ends=functional.logsigmoid(torch.cat([logit, -logit], -1)),
+            option_log_probs=torch.log_softmax(self.global_policy.actor(out) + self.mask, -1),
+            intended_option_probs=intended, intent=intent, value=self.global_policy.value(out),
+            state={**batch.state, "hidden": torch.stack(hidden, 1)}, critic_inputs=out,
+        )  # fmt: skip
+
+    def heads(self, outs: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
+        """Return what the outputs of the action policies' GRUs (T, n, hidden) lead to.
+
+        Returns
+        -------
+        log_probs : (T, n, 4, A)
+            Log-probabilities of the actions of each option; STOP's is Done.
+        termination : (T, n, 3)
+            Logits of beta, the probability that the open option ends on arrival.
+        """
+        # Navigate lasts a step; interactions that end by a step of their own never do on arrival.
+        fixed = (torch.inf, *[-torch.inf if self.hand_back_step else 0.0] * 2)
+        acts, termination = [], []
+        for k, policy in enumerate(self.policies):
+            logits = policy.actor(outs[k])
+            acts.append(action_log_probs_of(k, logits, may_end=fixed[k] != 0.0))
+            termination.append(fixed[k] + logits[..., -1] - logits[..., :-1].logsumexp(-1))
+        acts.append(action_log_probs_of(STOP, logits[..., -1:]))
+        return torch.stack(acts, -2), torch.stack(termination, -1)
 
     def mixed(self, intended: Tensor, action_log_probs: Tensor) -> Tensor:
         """Return P(i), (T, n, A), equation 7: the policies' actions, weighted by P(omega').
@@ -486,7 +470,7 @@ class Hierarchy(RecurrentAgent[HierarchyRecord]):
             self.intent.synchronise(self.global_policy)
 
 
-class AuxiliaryAgent(RecurrentAgent[OptionRecord]):
+class AuxiliaryAgent(Agent[OptionRecord]):
     """Action policies of a hierarchy, one in each environment, with critics of their own.
 
     Done ends the task. The policies' inputs on the open option are those of the whole model: none
@@ -516,55 +500,26 @@ class AuxiliaryAgent(RecurrentAgent[OptionRecord]):
         state = self.hierarchy.initial_state(count)
         return {**state, "hidden": state["hidden"][:, 0]}
 
-    def step(self, batch: Batch[Any], uniforms: Uniforms) -> AgentStep[OptionRecord]:
+    def draw(
+        self, ran: ForwardOutput, state: State, uniforms: Uniforms
+    ) -> tuple[Tensor, OptionRecord, State]:
         """See `Agent`."""
-        option, opened, used = self._option, batch.state["open"], batch.state["used"]
-        log_probs, value, hidden = self.run(batch, option_inputs(opened, used)[None], option)
-        choice = networks.drawn(log_probs[0], uniforms[1])
-        record = OptionRecord(choice, option, opened, used)
-        opened, used, _, _ = option_step(option, choice, used)
-        if not self.hierarchy.temporally_extended:  # `hrl` has no such inputs later either
-            opened, used = opened * 0, used * 0
-        after = {"hidden": hidden, "open": opened, "used": used}
-        log_prob = networks.log_prob_of(log_probs[0], choice)
-        return AgentStep(choice, log_prob, value[0], record, after)
+        choice = networks.drawn(ran.log_probs, uniforms[1])
+        record = OptionRecord(choice, self._option[None], state["open"][None], state["used"][None])
+        opened, used, _, _ = option_step(  # `hrl` has no such inputs later either
+            record.option, choice, record.used, extended=self.hierarchy.temporally_extended
+        )
+        return choice, record, {"open": opened[0], "used": used[0]}
 
-    def evaluate(self, batch: Batch[OptionRecord]) -> Evaluated:
-        """See `Agent`."""
-        record = batch.record
-        option_features = option_inputs(record.open, record.used)
-        log_probs, value, hidden = self.run(batch, option_features, record.option[0])
-        log_prob = networks.log_prob_of(log_probs, record.choice)
-        state = {**batch.state, "hidden": hidden}
-        return Evaluated(log_prob, value, networks.entropy_of(log_probs), state)
-
-    def run(
-        self, batch: Batch[Any], option_features: Tensor, option: Tensor
-    ) -> tuple[Tensor, Tensor, Tensor]:
-        """Run each policy over its own environments.
-
-        Parameters
-        ----------
-        batch
-            Steps; their record is not read.
-        option_features : (T, n, 3)
-            `option_inputs` before each step.
-        option : (n,)
-            Policy that acts in each environment.
-
-        Returns
-        -------
-        log_probs : (T, n, A)
-            Log-probabilities of the actions.
-        value : (T, n)
-            Values by the policies' own critics.
-        hidden : (n, hidden)
-            Hidden states after the last step.
-        """
+    def run(self, batch: Batch[Any]) -> ForwardOutput:
+        """See `Agent`: each policy runs over its own environments, with its own critic."""
+        option = self._option if batch.record is None else batch.record.option[0]
+        option_features = option_inputs(*open_option(batch))
         parts: list[tuple[Tensor, Tensor, Tensor]] = []
         columns = [(option == task).nonzero().flatten() for task in (NAVIGATE, PUSH, PICK)]
         for task in (task for task, numbers in enumerate(columns) if len(numbers)):
-            policy, own = self.hierarchy.policies[task], batch.select(columns[task])
+            policy = self.hierarchy.policies[task]
+            own = batch.chunked(columns[task], [batch.state])
             inputs = self.hierarchy.encoders[task % len(self.hierarchy.encoders)](own.observations)
             if task != NAVIGATE:
                 inputs = torch.cat([inputs, option_features[:, columns[task]]], -1)
@@ -572,11 +527,10 @@ class AuxiliaryAgent(RecurrentAgent[OptionRecord]):
             parts.append((action_log_probs_of(task, policy.actor(out)), policy.value(out), after))
         order = torch.cat(columns).argsort()
         log_probs, value, hidden = zip(*parts, strict=True)
-        return (
-            torch.cat(log_probs, 1)[:, order],
-            torch.cat(value, 1)[:, order],
-            torch.cat(hidden)[order],
-        )
+        return ForwardOutput(
+            log_probs=torch.cat(log_probs, 1)[:, order], value=torch.cat(value, 1)[:, order],
+            state={**batch.state, "hidden": torch.cat(hidden)[order]},
+        )  # fmt: skip
 
     def optimised(self) -> list[nn.Parameter]:
         """See `Agent`: encoders and policies that have environments, critics too."""
@@ -588,19 +542,3 @@ class AuxiliaryAgent(RecurrentAgent[OptionRecord]):
     def critics(self) -> list[nn.Module]:
         """See `Agent`."""
         return [self.hierarchy.policies[task].critic for task in self._trained]
-
-
-def _of_option(action_log_probs: Tensor, option: Tensor) -> Tensor:
-    """Return the log-probabilities (…, A) of the option that acts, of (…, 4, A)."""
-    return action_log_probs.take_along_dim(option[..., None, None], -2).squeeze(-2)
-
-
-def _log_prob(decisions: Tensor, action_log_probs: Tensor, record: HierarchyRecord) -> Tensor:
-    """Return the log-probability of all draws of a step.
-
-    [open] (log beta or log(1 - beta)) + decide log pi_Omega(omega) + log pi_omega(a); the last is 0
-    for omega = Done.
-    """
-    decision = record.option.masked_fill(~record.decide, STAY)
-    acted = networks.log_prob_of(_of_option(action_log_probs, record.option), record.choice)
-    return networks.log_prob_of(decisions, decision) + acted

@@ -10,15 +10,14 @@ metres from the eye; the object's type is no input.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any, Final
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from internav_data.camp.agents.flat import FlatOutput, FlatRecord, PPOAgent
-from internav_data.camp.agents.protocol import Batch, Evaluated, ObservationTensors
+from internav_data.camp.agents.flat import FlatRecord, PPOAgent
+from internav_data.camp.agents.protocol import Batch, ForwardOutput, ObservationTensors
 from internav_data.camp.config import CampConfig
 from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.records.errors import UsageError
@@ -49,11 +48,14 @@ class NIEAgent(PPOAgent):
         self.query = nn.Linear(self.encoder.size, SUMMARY)
         self.content = nn.Linear(SUMMARY + 3 * _CORNERS * ACTION_COUNT, SUMMARY)
 
-    def run(self, batch: Batch[Any]) -> FlatOutput:
+    def run(self, batch: Batch[Any]) -> ForwardOutput:
         """See `PPOAgent`: features, and a summary of the predicted motion of objects in sight."""
         objects, corners = self.sight(batch)
         features = self.summarised(self.encoder(batch.observations), objects, corners)
-        return self.decide(features, batch, objects=objects, corners=corners)
+        ran = self.decide(features, batch, objects=objects, corners=corners)
+        if batch.record is not None:
+            ran.loss = self.loss(batch, objects, corners)
+        return ran
 
     def sight(self, batch: Batch[Any]) -> tuple[Tensor, Tensor]:
         """Return objects (T, n, K) and corners (T, n, K, 8, 3), recorded or found anew."""
@@ -79,19 +81,16 @@ class NIEAgent(PPOAgent):
         ahead: Tensor = padded @ affine.transpose(-1, -2)
         return ahead
 
-    def evaluate(self, batch: Batch[FlatRecord]) -> Evaluated:
-        """See `Agent`; the loss is the L1 error of the predicted keypoints."""
-        objects, corners = self.sight(batch)
-        record = replace(batch.record, objects=objects, corners=corners)
-        found = super().evaluate(replace(batch, record=record))
-        index = record.choice[..., None, None, None, None]
+    def loss(self, batch: Batch[FlatRecord], objects: Tensor, corners: Tensor) -> Tensor:
+        """Return the L1 error (T, n) of the predicted keypoints, weighted."""
+        index = batch.record.choice[..., None, None, None, None]
         ahead = self.predicted(self.object(corners.flatten(-2)), corners)
         ahead = ahead.take_along_dim(index, -3).squeeze(-3)  # after the action that was taken
         same = objects[:-1, :, :, None] == objects[1:, :, None, :]
         same &= (objects[:-1, :, :, None] >= 0) & ~batch.episode_starts[1:, :, None, None]
         apart = (ahead[:-1, :, :, None] - corners[1:, :, None]).abs().mean((-1, -2))
         loss = (apart * same).sum((-1, -2)) / same.sum((-1, -2)).clamp(min=1)
-        return replace(found, loss=self._weight * functional.pad(loss, (0, 0, 0, 1)))
+        return self._weight * functional.pad(loss, (0, 0, 0, 1))
 
     @torch.no_grad()
     def sighted(self, observations: ObservationTensors) -> tuple[Tensor, Tensor]:

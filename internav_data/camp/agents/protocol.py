@@ -9,14 +9,21 @@ from __future__ import annotations
 import copy
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any, Generic, Self, TypeVar
 
 import torch
 from torch import Tensor, nn
 
-from internav_data.camp.networks import ENCODERS, EpisodeSegments, SensorEncoder
+from internav_data.camp.networks import (
+    ENCODERS,
+    EpisodeSegments,
+    SensorEncoder,
+    drawn,
+    entropy_of,
+    log_prob_of,
+)
 from internav_data.envs.sensors import DEFAULT_SENSORS, Sensor
 from internav_data.records.errors import UsageError
 
@@ -85,21 +92,12 @@ class Batch(Generic[R]):
     state: State
     """(n, …): memory before the first step."""
     record: R
-    """(T, n, …): records of the steps."""
+    """(T, n, …): records of the steps; None of a new one."""
 
     @cached_property
     def segments(self) -> EpisodeSegments:
         """Episode segments that GRUs run over."""
         return EpisodeSegments(self.episode_starts)
-
-    def select(self, columns: Tensor) -> Batch[R]:
-        """Return the steps of some environments, by number (m,)."""
-        return Batch(
-            {name: values[:, columns] for name, values in self.observations.items()},
-            self.episode_starts[:, columns],
-            {name: values[columns] for name, values in self.state.items()},
-            self.record and self.record.map(lambda values: values[:, columns]),
-        )
 
     def chunked(self, columns: Tensor, states: Sequence[State]) -> Batch[R]:
         """Return the steps of m environments cut into C chunks, each of which is a column.
@@ -109,7 +107,8 @@ class Batch(Generic[R]):
         columns : (m,)
             Numbers of the environments.
         states
-            Memory (n, …) before the first step of each of the C chunks; C divides T.
+            Memory (n, …) before the first step of each of the C chunks; C divides T. `[self.state]`
+            for whole steps.
 
         Returns
         -------
@@ -127,6 +126,34 @@ class Batch(Generic[R]):
             {name: torch.cat([each[name][columns] for each in states]) for name in self.state},
             self.record and self.record.map(cut),
         )
+
+
+@dataclass(slots=True, kw_only=True)
+class ForwardOutput:
+    """Outputs of an agent's networks over T steps, of which each draws one action.
+
+    An agent of more draws has an output class of its own.
+    """
+
+    log_probs: Tensor
+    """(T, n, A): log P(a)."""
+    value: Tensor
+    """(T, n): the critic's values."""
+    state: State
+    """(n, …): memory after the last step, but for what `Agent.draw` adds."""
+    critic_inputs: Tensor | None = None
+    loss: Tensor | None = None
+    """See `Evaluated`."""
+    recorded: dict[str, Tensor] = field(default_factory=dict)
+    """(T, n, …): fields of the record besides the choice."""
+
+    def log_prob(self, record: Any) -> Tensor:  # noqa: ANN401 - of the agent's own class
+        """Return the log-probabilities (T, n) of everything that was drawn."""
+        return log_prob_of(self.log_probs, record.choice)
+
+    def entropy(self, record: Any) -> Tensor:  # noqa: ANN401, ARG002 - there is one distribution
+        """Return the entropies (T, n) of the distributions that were drawn from."""
+        return entropy_of(self.log_probs)
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,12 +175,17 @@ class Evaluated:
 
 
 class Agent(nn.Module, ABC, Generic[R]):
-    """Learner; see `internav_data.camp.agents` for how to add one's own."""
+    """Learner; see `internav_data.camp.agents` for how to add one's own.
+
+    Acting, and evaluating what was done, are one run of its networks each.
+    """
 
     sensors: tuple[str | Sensor, ...] = DEFAULT_SENSORS
     """Sensors that the agent takes, or their names; see `internav_data.envs.sensors`."""
     sensor_encoders: Mapping[str, type[SensorEncoder]] = ENCODERS
     """Encoders of its sensors, by name."""
+    record_type: type[StepRecord] = StepRecord
+    """Class of its records."""
     uses_intent: bool = False
     """Whether its decisions take an intent P(i)."""
 
@@ -167,6 +199,28 @@ class Agent(nn.Module, ABC, Generic[R]):
         """Return the memory of `count` environments whose episodes begin: zeros, (count, …)."""
 
     @abstractmethod
+    def run(self, batch: Batch[Any]) -> ForwardOutput:
+        """Run the networks over T steps of n environments, with gradients.
+
+        The record of a new step is None. Where it lacks a value that the agent worked out (P(i)),
+        it is recomputed.
+        """
+
+    def draw(self, ran: Any, state: State, uniforms: Uniforms) -> tuple[Tensor, Any, State]:  # noqa: ANN401, ARG002
+        """Draw from what `run` returned for a new step, (1, n, …), after the memory `state`.
+
+        Returns
+        -------
+        action : (1, n) int64
+            Numbers of `ACTIONS`, or -1 to wait.
+        record
+            Record of the draws, (1, n, …).
+        state
+            Memory (n, …) that depends on them.
+        """
+        choice = drawn(ran.log_probs, uniforms[1])
+        return choice, self.record_type(choice, **ran.recorded), {}
+
     def act(
         self,
         observations: ObservationTensors,
@@ -188,20 +242,29 @@ class Agent(nn.Module, ABC, Generic[R]):
             Random numbers in [0, 1) that options and actions are drawn by; None for the most
             probable.
         """
+        begun = {
+            name: values.masked_fill(episode_starts.reshape(-1, *[1] * (values.ndim - 1)), 0)
+            for name, values in state.items()
+        }
+        draws = (None, None) if uniforms is None else (uniforms[:, 0], uniforms[:, 1])
+        ran = self.run(_new_step(observations, begun))
+        action, record, after = self.draw(ran, begun, draws)
+        return AgentStep(
+            action[0], ran.log_prob(record)[0], ran.value[0],
+            record.map(lambda values: values[0]), {**ran.state, **after},
+        )  # fmt: skip
 
     def value(self, observations: ObservationTensors, state: State) -> Tensor:
         """Return the critic's values (n,) of observations (n, …) after `state`."""
-        episode_starts = torch.zeros(
-            len(observations["goal"]), dtype=torch.bool, device=self.device
-        )
-        return self.act(observations, state, episode_starts, None).value
+        return self.run(_new_step(observations, state)).value[0]
 
-    @abstractmethod
     def evaluate(self, batch: Batch[R]) -> Evaluated:
-        """Run over recorded steps with the present parameters, with gradients.
-
-        Where the record lacks a value that the agent worked out (P(i)), it is recomputed.
-        """
+        """Run over recorded steps with the present parameters, with gradients."""
+        ran, record = self.run(batch), batch.record
+        return Evaluated(
+            ran.log_prob(record), ran.value, ran.entropy(record), ran.state, ran.loss,
+            ran.critic_inputs,
+        )  # fmt: skip
 
     def labels(self, actions: Sequence[int]) -> tuple[list[int], R]:
         """Return an expert's actions as this agent would take them.
@@ -213,7 +276,7 @@ class Agent(nn.Module, ABC, Generic[R]):
         record
             Record (L, …) of the same steps for `evaluate`.
         """
-        record: Any = StepRecord(torch.tensor(actions))
+        record: Any = self.record_type(torch.tensor(actions))
         return list(actions), record
 
     def optimised(self) -> list[nn.Parameter]:
@@ -242,38 +305,7 @@ class Agent(nn.Module, ABC, Generic[R]):
         return other
 
 
-class RecurrentAgent(Agent[R]):
-    """Agent whose networks run over a batch, whether its steps are new or recorded."""
-
-    def act(
-        self,
-        observations: ObservationTensors,
-        state: State,
-        episode_starts: Tensor,
-        uniforms: Tensor | None,
-    ) -> AgentStep[R]:
-        """See `Agent`."""
-        seen, segments = one_step(observations)
-        state = reset_where_done(state, episode_starts)
-        batch: Batch[Any] = Batch(seen, segments.episode_starts, state, None)
-        draws = (None, None) if uniforms is None else (uniforms[:, 0], uniforms[:, 1])
-        return self.step(batch, draws)
-
-    @abstractmethod
-    def step(self, batch: Batch[Any], uniforms: Uniforms) -> AgentStep[R]:
-        """Choose actions (n,) in a batch of one new step, (1, n, …), whose record is None."""
-
-
-def reset_where_done(state: State, episode_starts: Tensor) -> State:
-    """Return a memory (n, …) that is zero where an episode begins; episode_starts (n,) bool."""
-    return {
-        name: values.masked_fill(episode_starts.reshape(-1, *[1] * (values.ndim - 1)), 0)
-        for name, values in state.items()
-    }
-
-
-def one_step(observations: ObservationTensors) -> tuple[ObservationTensors, EpisodeSegments]:
-    """Return observations (n, …) as (1, n, …), and the segments of a step without a start."""
-    goal = observations["goal"]
-    segments = EpisodeSegments(torch.zeros(1, len(goal), dtype=torch.bool, device=goal.device))
-    return {name: values.unsqueeze(0) for name, values in observations.items()}, segments
+def _new_step(observations: ObservationTensors, state: State) -> Batch[Any]:
+    """Return a new step, (n, …) by sensor, that begins no episode, as a batch (1, n, …)."""
+    seen = {name: values.unsqueeze(0) for name, values in observations.items()}
+    return Batch(seen, torch.zeros_like(seen["goal"][..., 0], dtype=torch.bool), state, None)
