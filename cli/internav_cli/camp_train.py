@@ -12,6 +12,7 @@ import click
 
 from internav_cli.main import launch
 from internav_cli.options import DATASET, JSON, dataset_to_read, renamed_option
+from internav_data.core.machine import keep_freed_memory
 
 if TYPE_CHECKING:
     from internav_data.camp.config import CampConfig
@@ -144,6 +145,7 @@ def command(**given: Any) -> int:  # noqa: ANN401 - the options above
         return 0
     if given["dry_run"] and given["resume"]:
         raise click.UsageError("--dry-run tells of a new run: leave --resume out")
+    keep_freed_memory()
     request = _request(given)
     if given["dry_run"]:
         return _forecast(request, as_json=given["as_json"])

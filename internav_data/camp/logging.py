@@ -232,9 +232,10 @@ class ProgressReporter(ProgressLine):
             )
         success = row["episode"].get("success")
         words = "" if success is None else f"success {success:.0%}, "
+        new = row["time"]["new_push_share"]
         return (
-            f"{row['stage']}: {row['step']:,} steps ({share:.0%}), {words}{rate:,.0f} steps/s, "
-            f"{left} left"
+            f"{row['stage']}: {row['step']:,} steps ({share:.0%}), {words}{rate:,.0f} steps/s "
+            f"({new:.0%} of pushes new), {left} left"
         )
 
     def summary(self, run: Path) -> str:

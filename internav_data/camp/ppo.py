@@ -96,9 +96,10 @@ def update(
     rows: list[dict[str, float]] = []
     stopped, device = False, rollout.rewards.device
     permuted = [torch.tensor(order, device=device) for order in orders]
+    ranks = reduce(torch.ones((), device=device))
     for environments in (part for each in permuted for part in each.chunk(config.num_minibatches)):
         targets = advantages[:, environments], returns[:, environments]
-        losses, row = _losses(agent, rollout, environments, targets, config, reduce)
+        losses, row = _losses(agent, rollout, environments, targets, config, reduce, ranks)
         rows.append(row)
         # Stop before the step that would leave the rollout's policy too far behind.
         stopped = row["kl"] > limit
@@ -155,8 +156,8 @@ def fit_critic(
 
 def moments(values: Tensor, reduce: Reduce = alone) -> tuple[Tensor, Tensor]:
     """Return mean and variance of values (T, n) across ranks, float32."""
-    count = reduce(values.new_tensor(float(values.numel())))
-    mean = reduce(values.sum()) / count
+    count, total = reduce(torch.stack([values.new_tensor(float(values.numel())), values.sum()]))
+    mean = total / count
     return mean, reduce((values - mean).square().sum()) / count
 
 
@@ -226,6 +227,7 @@ def _losses(
     estimates: tuple[Tensor, Tensor],
     config: PPOConfig,
     reduce: Reduce,
+    ranks: Tensor,
 ) -> tuple[dict[str, Tensor], dict[str, float]]:
     """Return the means of a minibatch, with gradients, and as they are logged, across ranks.
 
@@ -244,7 +246,7 @@ def _losses(
         near = before + (now.value - before).clamp(-config.clip_coef, config.clip_coef)
         errors = torch.maximum(errors, (near - returns).square())
     extra = torch.zeros_like(gain) if now.loss is None else now.loss
-    count = reduce(gain.new_tensor(float(gain.numel())))
+    count = gain.numel() * ranks
     losses = {
         "policy_loss": -gain.sum() / count,
         "value_loss": 0.5 * errors.sum() / count,

@@ -237,7 +237,7 @@ class Trainer:
             tasks = stage.tasks[local.start : local.stop]
             learner = AuxiliaryAgent(self.agent, tasks, stage.tasks)
         eps = _CLONING_EPS if stage.clones else self.config.ppo.adam_eps
-        optimiser = torch.optim.Adam(learner.optimised(), stage.rate, eps=eps)
+        optimiser = torch.optim.Adam(learner.optimised(), stage.rate, eps=eps, fused=True)
         source: Collector | Demonstrations = Collector(env, learner, seed, overwrites=True)
         if stage.clones:
             source = Demonstrations(
@@ -304,7 +304,9 @@ class Trainer:
         )
         rate = ppo.set_rate(now.optimiser, stage.rate, decay)
         uniforms = uniforms_of(self.config.seed, state.updates, now.local, config.num_steps)
+        pushes = collector.loop.env.solver_counts()
         rollout = collector.collect(uniforms, config.chunk_steps)
+        new_pushes = collector.loop.env.solver_counts().new_share(since=pushes)
         collected_s = time.perf_counter() - began
         learnt = state.critics.get(stage.critic, 0)
         critic_only = learnt < config.critic_warmup_rollouts and bool(now.learner.critics())
@@ -326,7 +328,10 @@ class Trainer:
             "updates": self._total_updates, "stage": stage.name, "stage_update": state.done,
             "learning_rate": rate, "critic_only": int(critic_only),
             "episode": episodes, "decision": decisions, "ppo": losses,
-            "time": rates(steps, (collector.loop.env_s, collected_s, self.lap())),
+            "time": {
+                **rates(steps, (collector.loop.env_s, collected_s, self.lap())),
+                "new_push_share": round(new_pushes, 4),
+            },
         }  # fmt: skip
 
     def _check_replay(self, ratio_error: float) -> None:

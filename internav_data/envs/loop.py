@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from internav_data.core.typing import Bools, Floats
     from internav_data.envs.slot import EpisodeSnapshot
     from internav_data.envs.types import Actions, Observations, Stepped
+    from internav_data.physics.cache import SolverCounts
 
     Act = Callable[[Observations, Bools], Actions]
     """Function that chooses the actions (n,) of n environments, from their observations and where
@@ -39,6 +40,9 @@ class Environments(Protocol):
 
     def step(self, actions: Actions) -> Stepped:
         """Take actions (n,), -1 to wait; return what `VectorEnv.step` returns, arrays (n, …)."""
+
+    def solver_counts(self) -> SolverCounts:
+        """Return the counters of the environments' pushes."""
 
     def state(self) -> Sequence[EpisodeSnapshot]:
         """Return a snapshot of each environment."""

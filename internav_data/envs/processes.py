@@ -28,6 +28,7 @@ from internav_data.envs.vector import (
     reset_choices,
     split_seeds,
 )
+from internav_data.physics.cache import SolverCounts
 from internav_data.records.errors import InternavError, UsageError
 
 if TYPE_CHECKING:
@@ -279,6 +280,10 @@ class InterNavProcesses(PlainSpec, VectorEnv[Any, Any, Any]):
     def action_masks(self) -> Bools:
         """Return which actions could succeed, (N, actions) bool: `internav_data.world.masks`."""
         return np.concatenate(self._ask_all("action_masks"))
+
+    def solver_counts(self) -> SolverCounts:
+        """Return the counters of the processes' pushes, summed."""
+        return SolverCounts.total(self._ask_all("solver_counts"))
 
     def state(self) -> tuple[EpisodeSnapshot, ...]:
         """Return a snapshot of each environment."""

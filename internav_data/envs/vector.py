@@ -20,6 +20,7 @@ from internav_data.envs.slot import (
     take_sensors,
 )
 from internav_data.envs.spaces import RENDER_SIZE, ObservationBuffer, observation_space
+from internav_data.physics.registry import solver_counts
 from internav_data.records.errors import UsageError
 from internav_data.render.camera import Camera
 from internav_data.world import ACTION_COUNT
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from internav_data.dataset import Dataset
     from internav_data.envs.sensors import Sensor
     from internav_data.envs.types import Observations, Stepped
+    from internav_data.physics.cache import SolverCounts
     from internav_data.records import Episode
 
 _RARE = ("episode_id", "metrics", "final_obs", "final_info")
@@ -271,6 +273,10 @@ class InterNavVectorEnv(Rebuilt, VectorEnv[Any, Any, Any]):
         for k, state in enumerate(snapshots):
             if state is not None:
                 self._restore_slot(k, state)
+
+    def solver_counts(self) -> SolverCounts:
+        """Return the counters of this process's pushes, of other environments too."""
+        return solver_counts()
 
     def state(self) -> tuple[EpisodeSnapshot, ...]:
         """Return a snapshot of each environment."""

@@ -31,7 +31,7 @@ from internav_data.physics.sweep import PATH_POSE_BYTES
 from internav_data.records import Pose
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from internav_data.physics.engines.protocol import Engine
     from internav_data.physics.result_cache import ResultCache
@@ -78,6 +78,26 @@ def _pushes(capacity: int) -> LRUCache[tuple[PushSpec, PhysicsScene], PushSoluti
     return LRUCache(capacity, _bytes_of)
 
 
+@dataclass(slots=True)
+class SolverCounts:
+    """Counters of a solver's pushes; one push in a house may be several problems."""
+
+    asked: int = 0
+    """Number of problems that were asked."""
+    solved: int = 0
+    """Number of those that were simulated, as no cache held their solution."""
+
+    @classmethod
+    def total(cls, parts: Iterable[SolverCounts]) -> SolverCounts:
+        """Return the sums of several counters."""
+        asked, solved = zip((0, 0), *((each.asked, each.solved) for each in parts), strict=True)
+        return cls(sum(asked), sum(solved))
+
+    def new_share(self, since: SolverCounts) -> float:
+        """Return the share of the problems since earlier counters that were simulated; 0 of 0."""
+        return (self.solved - since.solved) / max(self.asked - since.asked, 1)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Solver:
     """Solver on one engine: it simulates only problems whose solution is not known yet.
@@ -97,6 +117,8 @@ class Solver:
     _crowded: LRUCache[tuple[PushSpec, PhysicsScene], PushSolution] = field(
         default_factory=lambda: _pushes(_CROWDED_BYTES)
     )
+    counts: SolverCounts = field(default_factory=SolverCounts)
+    """Counters of the pushes that this process asked."""
 
     @property
     def name(self) -> str:
@@ -132,8 +154,10 @@ class Solver:
         """Push the first body of the scene along +x."""
 
         def solve() -> PushSolution:
+            self.counts.solved += 1
             return solve_push(self.engine, scene, spec)
 
+        self.counts.asked += 1
         known = self._lone if _is_lone(scene) else self._crowded
         return known.get(
             (spec, scene), lambda: self._find(repr(spec), scene, solve, pack_push, unpack_lone_push)

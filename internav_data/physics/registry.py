@@ -7,7 +7,7 @@ from contextvars import ContextVar
 from typing import TYPE_CHECKING, Final
 
 from internav_data.core.locks import ThreadLock
-from internav_data.physics.cache import Solver, origin
+from internav_data.physics.cache import Solver, SolverCounts, origin
 from internav_data.physics.engines import DEFAULT_ENGINE, ENGINES
 from internav_data.physics.engines.installed import require_engine
 from internav_data.physics.result_cache import ResultCache, result_cache
@@ -63,3 +63,8 @@ def get_solver(name: str = DEFAULT_ENGINE) -> Solver:
 def _with_cache(engine: Engine, known: ResultCache | None) -> Solver:
     where = origin(engine)
     return Solver(engine, known if where else None, where or "")
+
+
+def solver_counts() -> SolverCounts:
+    """Return the counters of this process's pushes, summed over its solvers."""
+    return SolverCounts.total(solver.counts for solver in list(_CACHED.values()))

@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -156,6 +157,31 @@ def test_a_dataset_has_the_bytes_that_it_has_elsewhere(tmp_path):
     for name in ("validate", "stats"):
         said = command(tmp_path, name, "there", code=code)
         assert said.returncode == 0, said.stderr
+
+
+FREED = """
+import sys
+import psutil
+from internav_data.core.machine import keep_freed_memory
+print(keep_freed_memory() if sys.argv[1] == "keep" else "")
+before = psutil.Process().memory_info().rss
+blocks = [b"x" * (4 << 20) for _ in range(16)]
+del blocks
+print(psutil.Process().memory_info().rss - before)
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="a setting of glibc")
+def test_memory_that_is_freed_can_be_kept_for_its_next_use():
+    def ran(word):
+        words = [sys.executable, "-c", FREED, word]
+        return subprocess.run(words, capture_output=True, text=True, check=True).stdout.split()
+
+    done, kept = ran("keep")
+    (given_back,) = ran("give back")
+    assert done == "True"
+    assert int(kept) > 60 << 20
+    assert int(given_back) < 20 << 20
 
 
 def test_signals_that_end_a_command_are_those_that_there_are():

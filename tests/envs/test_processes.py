@@ -1,16 +1,19 @@
 """Environments in processes of their own: how they start and end."""
 
+import contextlib
 import signal
 import subprocess
 import sys
 import textwrap
 import time
 
+import numpy as np
 import psutil
 import pytest
 from gymnasium.spaces import Box
 
-from internav_data.envs import InterNavProcesses, Sensor
+from internav_data.envs import InterNavProcesses, InterNavVectorEnv, Sensor
+from internav_data.physics.registry import solver_counts
 from internav_data.records.errors import InternavError, UsageError
 
 LIMIT_S = 120.0
@@ -93,3 +96,17 @@ def test_a_process_that_is_killed_is_named(small):
     began = time.monotonic()
     env.close()
     assert time.monotonic() - began < LIMIT_S
+
+
+def test_the_pushes_of_all_processes_are_counted(small):
+    actions = np.random.default_rng(0).integers(12, size=(40, 4))
+    before = solver_counts()
+    alone = InterNavVectorEnv(4, small, 16)
+    with contextlib.closing(alone), contextlib.closing(InterNavProcesses(4, small, 2, 16)) as env:
+        for each in (alone, env):
+            each.reset(seed=0)
+            for row in actions:
+                each.step(row)
+        asked, solved = env.solver_counts().asked, env.solver_counts().solved
+        assert asked == alone.solver_counts().asked - before.asked
+        assert 0 < solved <= asked

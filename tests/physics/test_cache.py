@@ -27,6 +27,7 @@ from internav_data.physics import (
 )
 from internav_data.physics.cache import (
     Solver,
+    SolverCounts,
     origin,
     pack_push,
     pack_settle,
@@ -79,6 +80,20 @@ def test_a_push_among_others_is_kept_by_its_process_alone(tmp_path):
     assert solver.engine.asked == 1
     assert solver.result_cache.count() == 0
     assert remembering(tmp_path).push(PAIR, FORCE) == pushed
+
+
+def test_pushes_that_no_cache_knew_are_counted(tmp_path):
+    first = remembering(tmp_path)
+    first.push(LONE, FORCE), first.push(LONE, FORCE), first.push(PAIR, FORCE)
+    assert first.counts == SolverCounts(asked=3, solved=2)
+    first.result_cache.flush()
+    second = remembering(tmp_path)  # reads the push of one object from the file
+    second.push(LONE, FORCE), second.push(PAIR, FORCE)
+    assert second.counts == SolverCounts(asked=2, solved=1)
+    both = SolverCounts.total([first.counts, second.counts])
+    assert both == SolverCounts(asked=5, solved=3)
+    assert both.new_share(since=first.counts) == 0.5
+    assert both.new_share(since=both) == 0.0
 
 
 def test_memory_of_solutions_is_counted_in_bytes(monkeypatch):
