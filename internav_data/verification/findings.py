@@ -170,7 +170,7 @@ class FindingCollector:
         self.notes[
             f"made on {_text(made_on)}: compared within {1000.0 * ELSEWHERE_M:g} mm; "
             f"{differing} of {compared} falls, outcomes and experts end otherwise here"
-        ] += self.counts["replayed"]
+        ] += self.counts["made elsewhere"]
         if differing > max(1.0, MAX_DIFFERING * compared):
             self.found = sorted(self.found + self.differences)[:MAX_FINDINGS]
             self.by_predicate.update(found.predicate for found in self.differences)

@@ -13,6 +13,7 @@ from internav_data.core.worker_pool import WorkerPool
 from internav_data.dataset import ASSETS, EPISODES, SCENES, from_table
 from internav_data.dataset.manifest import MANIFEST, MANIFEST_LIMITS
 from internav_data.dataset.parquet import open_stored
+from internav_data.dataset.scene_hardware import ranges_of
 from internav_data.records import LoaderStream, Purpose, generator
 from internav_data.records.errors import InternavError, UsageError
 from internav_data.verification.checked_config import CheckedConfig, checked_config
@@ -70,6 +71,14 @@ class Unit:
     catalogue_version: int
     physics: CheckedConfig | None = None
     """Settings for the level `physics`; None to omit it."""
+    made_here: tuple[range, ...] = ()
+    """Numbers of scenes of a mixed dataset that this machine's arithmetic made."""
+
+    def physics_of(self, scene_id: str) -> CheckedConfig | None:
+        """Return the settings for one of its scenes."""
+        if self.physics is None or not any(number_of(scene_id) in each for each in self.made_here):
+            return self.physics
+        return replace(self.physics, same_hardware=True)
 
 
 def validate(
@@ -191,7 +200,9 @@ def _validate_once(
             whole.notes[UNTRUE] += sum(counts.episodes for counts in manifest.counts.values())
         _check_scenes(store, manifest, damaged, whole, sample, workers, progress_callback, physics)
         if physics is not None and not physics.same_hardware:
-            whole.judge_differences("; ".join(manifest.hardware) or "hardware that is not stated")
+            known = manifest.hardware_scenes is not None
+            names = [name for name in manifest.hardware if not known or name != hardware()]
+            whole.judge_differences("; ".join(names) or "hardware that is not stated")
     found = whole.findings(level)
     _account_for(manifest, found, sample, store.at(""))
     return found
@@ -267,6 +278,7 @@ def _check_scenes(
         rng = generator(manifest.seed, Purpose.LOADER, attempt=LoaderStream.ROWS, draw=sample)
         chosen = sorted(rng.permutation(len(shard_refs))[:sample].tolist())
         shard_refs = [shard_refs[k] for k in chosen]
+    made_here = ranges_of((manifest.hardware_scenes or {}).get(hardware(), ""))
     units = [
         Unit(
             store,
@@ -274,6 +286,7 @@ def _check_scenes(
             tuple(shard_refs[k : k + SCENES_A_UNIT]),
             manifest.catalogue_version,
             physics,
+            made_here,
         )
         for k in range(0, len(shard_refs), SCENES_A_UNIT)
     ]
@@ -375,9 +388,10 @@ def check_unit(unit: Unit) -> FindingCollector:
         report = FindingCollector(file, shard_ref.scene_id)
         with report.guard(CHECKABLE):
             house, episodes = reader.house(shard_ref), reader.episodes(shard_ref)
+            physics = unit.physics_of(shard_ref.scene_id)
             report.absorb(
                 check_scene(
-                    *(house, episodes, _shapes(unit), file, unit.physics, unit.catalogue_version)
+                    *(house, episodes, _shapes(unit), file, physics, unit.catalogue_version)
                 )
             )
         reports.append(report)

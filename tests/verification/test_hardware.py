@@ -102,3 +102,20 @@ def test_the_manifest_decides_how_a_dataset_is_compared(tmp_path, scenes):
         (note,) = found.notes
         made_on = "; ".join(names) or "hardware that is not stated"
         assert note.startswith(f"made on {made_on}: compared within 1 mm")
+
+
+def test_scenes_that_this_hardware_made_are_compared_to_the_last_bit(tmp_path, scenes):
+    root = tmp_path / "ds"
+    nearly = obstacle_changed(scenes[:2], 0, 0, settle_s=0.5)
+    manifest = write_dataset(root, nearly)
+    both = tuple(sorted((hardware(), OTHER)))
+    for mine, theirs in (("0:1", "1:2"), ("1:2", "0:1")):
+        whose = {hardware(): mine, OTHER: theirs}
+        write_manifest(root, replace(manifest, hardware=both, hardware_scenes=whose))
+        found = validate(root, "physics")
+        note = next(note for note in found.notes if "compared within" in note)
+        assert note.startswith(f"made on {OTHER}: ")
+        number = int(theirs[0])
+        assert found.notes[note] == len(scenes[number][1])
+        wrong = {"physics.settle-time": 1} if mine == "0:1" else {}
+        assert found.by_predicate == wrong

@@ -65,6 +65,7 @@ def _replay(scene: CheckedScene, episode: Episode, report: FindingCollector) -> 
     if made == here and is_sampled(episode):
         _check_house(scene, episode, expect, report)
     report.counts["replayed"] += 1
+    report.counts["made elsewhere"] += not scene.config.same_hardware
 
 
 def _second_engine(episode: Episode, report: FindingCollector) -> str | None:
