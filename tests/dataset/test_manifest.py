@@ -90,6 +90,15 @@ def test_paths_out_of_the_dataset_are_refused(damaged_folder, path):
         read_manifest(damaged_folder)
 
 
+@pytest.mark.parametrize(
+    "path", ["/etc/passwd", "../x", "data/x.txt", "manifest.json", ".work/x", "", None]
+)
+def test_paths_that_are_not_beside_the_data_are_refused(damaged_folder, path):
+    edit(damaged_folder, lambda raw: raw["metadata"][0].update(path=path))
+    with pytest.raises(CorruptDataError, match="expected a file beside data/"):
+        read_manifest(damaged_folder)
+
+
 def flipped(text, bits):
     """Yield a text with one bit flipped, for each of some numbers of bits."""
     for bit in bits:
@@ -222,6 +231,26 @@ def test_a_file_of_other_rows_than_stated_is_refused(damaged_folder):
 def test_sizes_are_bounded(damaged_folder, name, value):
     edit(damaged_folder, lambda raw: raw["files"][0].update({name: value}))
     with pytest.raises(CorruptDataError, match=f"{name}: expected"):
+        read_manifest(damaged_folder)
+
+
+@pytest.mark.parametrize("value", [-1, 1 << 60, "9", None])
+def test_sizes_of_files_beside_the_data_are_bounded(damaged_folder, value):
+    edit(damaged_folder, lambda raw: raw["metadata"][0].update(bytes=value))
+    with pytest.raises(CorruptDataError, match="bytes: expected"):
+        read_manifest(damaged_folder)
+
+
+def test_a_table_may_have_no_rows(damaged_folder):
+    edit(damaged_folder, lambda raw: raw["files"][-1].update(rows=0))
+    assert read_manifest(damaged_folder).of("assets")[0].rows == 0
+
+
+def test_more_files_than_a_dataset_has_are_refused(damaged_folder):
+    entry = dict.fromkeys(("path", "table", "sha256", "footer_sha256", "logical_digest"), "")
+    entry |= {"split": None, "rows": 0, "bytes": 0}
+    edit(damaged_folder, lambda raw: raw.update(files=[entry] * 100_001))
+    with pytest.raises(CorruptDataError, match="names more than 100000 files"):
         read_manifest(damaged_folder)
 
 

@@ -56,7 +56,11 @@ TARGETS = {
     "metrics": Target("internav_data.evaluation.metrics", ("evaluation/test_metrics.py",)),
     "manifest": Target(
         "internav_data.dataset.manifest",
-        ("dataset/test_manifest.py", "dataset/test_corruption.py"),
+        (
+            "dataset/test_manifest.py",
+            "dataset/test_merging.py::test_a_part_is_a_dataset_that_says_so",
+            "dataset/test_corruption.py",
+        ),
     ),
     "commit": Target(
         "internav_data.dataset.commit",
