@@ -21,6 +21,7 @@ from internav_data.dataset import (
     commit_scenes,
     done_scenes,
     has_manifest,
+    held_config,
     load_dataset,
     open_staging,
     read_manifest,
@@ -287,6 +288,16 @@ def test_tuples_in_a_configuration_are_lists_on_disk(tmp_path):
     assemble(tmp_path, IDENTITY, ASSETS, 2)
     open_staging(tmp_path, same)
     assert done_scenes(staging_of(tmp_path)) == frozenset(range(2)), "nothing is made again"
+
+
+def test_the_config_of_a_folder_is_that_of_its_dataset_or_of_its_staged_scenes(tmp_path):
+    assert held_config(tmp_path) is None
+    open_staging(tmp_path, IDENTITY)
+    assert held_config(tmp_path) is None, "nothing of that config is there yet"
+    build(tmp_path, range(2))
+    assert held_config(tmp_path) == IDENTITY.config
+    assemble(tmp_path, IDENTITY, ASSETS, 2)
+    assert held_config(tmp_path) == IDENTITY.config
 
 
 def test_foreign_folder_and_file_are_refused_untouched(tmp_path):

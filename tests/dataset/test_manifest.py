@@ -34,7 +34,7 @@ def test_newer_version_says_upgrade(damaged_folder):
 
 def test_version_1_is_refused_with_advice(damaged_folder):
     edit(damaged_folder, lambda raw: raw.update(format_version=1))
-    with pytest.raises(CorruptDataError, match="format version 1, .*: generate the dataset anew"):
+    with pytest.raises(CorruptDataError, match=r"format version 1, .*: generate the dataset anew"):
         load_dataset(damaged_folder)
 
 
