@@ -286,7 +286,7 @@ class FolderStore:
             Another process holds it; `busy` says what to do, and the process is named.
 
         """
-        self.root.mkdir(parents=True, exist_ok=True)
+        _make_folders(self.root)
         with hold_lock(*_lock_file(self.root), str(self.root), busy):
             yield
 
@@ -441,15 +441,17 @@ def write_atomically(path: Path, data: bytes) -> None:
     After an error (a full disk, an interrupt) the temporary file is removed and `path` is as it
     was before. A device, pipe, socket or folder is refused.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
+    _make_folders(path.parent)
     _write_atomically(path, data)
 
 
-def _make_folders(folder: Path, top: Path) -> None:
-    """Make a folder and those between it and `top`, never `top` itself."""
+def _make_folders(folder: Path, top: Path | None = None) -> None:
+    """Make a folder and those above it, never `top` itself, and wait until they are on the disk."""
     if folder != top and not folder.is_dir():
         _make_folders(folder.parent, top)
         folder.mkdir(exist_ok=True)
+        with contextlib.suppress(PermissionError):  # one may write there, and not read
+            sync(folder.parent)
 
 
 def _write_atomically(path: Path, data: bytes) -> None:
@@ -471,7 +473,7 @@ def write_folder_atomically(folder: Path, fill: Callable[[Path], object]) -> Non
 
     After an error nothing stays behind.
     """
-    folder.parent.mkdir(parents=True, exist_ok=True)
+    _make_folders(folder.parent)
     temporary = _new(folder, Path.mkdir)
     try:
         fill(temporary)

@@ -120,7 +120,7 @@ def test_a_setting_that_a_method_has_no_use_for_is_refused(name):
     """What a method reads changes its agent or its labels; the rest would change nothing."""
     changes = {
         "intent": "none", "sync_every": 1, "hand_back_step": True, "forbidden": ["push"],
-        "nie_objects": 2, "nie_weight": 1.0,
+        "initial_interaction_probability": 0.1, "nie_objects": 2, "nie_weight": 1.0,
     }  # fmt: skip
     assert {each for method in AGENTS.values() for each in method.settings} == set(changes)
     for setting, value in changes.items():

@@ -13,7 +13,7 @@ import sys
 import time
 from dataclasses import replace
 from importlib import util
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 import pytest
@@ -59,6 +59,27 @@ def test_a_fault_at_a_call_loses_nothing(tmp_path, fault):
     chosen = {"EIO": "fsync", "ENOSPC": "write", "SIGKILL": "rename"}[fault]
     for at in (first[chosen], calls.index((chosen, "d/.manifest.json"))):
         faults.run_one("extend", fault, at, tmp_path / str(at), f"{chosen} {at}")
+
+
+@pytest.mark.parametrize("name", faults.SCENARIOS)
+def test_a_file_and_its_folders_are_on_the_disk_before_a_manifest_names_it(name):
+    """After a power cut, all that a manifest names is there."""
+    written, entered = set(), set()  # files and folders that the disk does not hold yet
+    for kind, path in faults.calls(name):
+        folder = str(PurePosixPath(path).parent)
+        if kind == "fsync":
+            written.discard(path)
+            entered.discard(path)
+        elif kind in {"write", "truncate"}:
+            written.add(path)
+        elif kind == "mkdir":
+            entered.add(folder)
+        elif kind == "rename":
+            assert path not in written
+            if path.endswith("/.manifest.json"):
+                assert not entered - {"."}
+            entered.add(folder)
+    assert not entered - {"."}  # not watched itself
 
 
 def test_a_damaged_journal_is_noticed(tmp_path):

@@ -42,18 +42,19 @@ class Method:
         return "intent" in self.settings
 
 
+_OPENS: Final = "initial_interaction_probability"
 AGENTS: Final = {
     "camp": Method(
         Hierarchy,
         "a global policy opens Navigate, Push or Pick, conditioned on what the whole model is "
         "about to do (section 4)",
-        settings=("intent", "sync_every", "hand_back_step", "forbidden"),
+        settings=("intent", "sync_every", "hand_back_step", "forbidden", _OPENS),
     ),
     "hrl": Method(
         partial(Hierarchy, temporally_extended=False),
         "the same policies and the same pretraining; global decides at every step, Push and Pick "
         "have no Done, no intent",
-        settings=("forbidden",),
+        settings=("forbidden", _OPENS),
     ),
     "ppo": Method(PPOAgent, "one policy over all actions"),
     "ppo-intent": Method(
