@@ -33,22 +33,7 @@ from internav_data.camp.agents.protocol import Agent, State
 from internav_data.camp.config import CampConfig, from_mapping, preset
 from internav_data.camp.stages import check_parts
 from internav_data.core import config as values
-from internav_data.core.config import Bounds
-from internav_data.core.files import (
-    FileLimits,
-    check_sha256,
-    read_json,
-    size_of_regular,
-    with_sha256,
-)
-from internav_data.core.storage import (
-    file_sha256,
-    final_of,
-    sync,
-    temporary_of,
-    write_atomically,
-    write_folder_atomically,
-)
+from internav_data.core import files, storage
 from internav_data.records.errors import CorruptDataError, InternavError, UsageError
 
 if TYPE_CHECKING:
@@ -62,7 +47,7 @@ _SERIAL: Final = re.compile(r"\d{6,}")
 ABOUT, WEIGHTS, TRAINING = "checkpoint.json", "weights.safetensors", "training.safetensors"
 _EXPORTED: Final = ("environment_steps", "cloned_frames", "training_s", "dataset")
 """Progress that goes with an agent alone: evaluations show it."""
-_FILE: Final = FileLimits(
+_FILE: Final = files.FileLimits(
     remedy="copy the checkpoint again", max_bytes=256_000_000, max_values=50_000_000
 )
 """Limits of the JSON files; the actions of 65,536 environments stay below."""
@@ -98,15 +83,15 @@ def save(run: Path, checkpoint: Checkpoint, *, score: float | None = None) -> Pa
     known = _swept(run, _pointer(run))
     folder = _next_folder(run, known)
     # Noted before they are written, so that what a kill leaves is told from a stranger's folders.
-    leftovers = [folder.name, temporary_of(folder.name)]
-    _write_pointer(run, known | {"leftovers": leftovers})
+    leftovers = [folder.name, storage.temporary_of(folder.name)]
+    _write_json(run / POINTER, known | {"leftovers": leftovers})
     _write_folder(folder, checkpoint)
     pointer = {**known, "format": FORMAT, "serial": int(folder.name), "last": folder.name}
     best = best_score(run)
     if score is not None and (best is None or score >= best):
         pointer |= {"best": folder.name, "best_score": score}
     replaced = {known.get("last"), known.get("best")} - {pointer["last"], pointer.get("best")}
-    _write_pointer(run, pointer | {"leftovers": sorted(filter(None, replaced))})
+    _write_json(run / POINTER, pointer | {"leftovers": sorted(filter(None, replaced))})
     _swept(run, _pointer(run))
     return folder
 
@@ -126,17 +111,17 @@ def _swept(run: Path, pointer: dict[str, Any]) -> dict[str, Any]:
         for name in filter(_is_ours, found):
             if name not in {rest.get("last"), rest.get("best")}:
                 shutil.rmtree(run / FOLDER / name, ignore_errors=True)
-        _write_pointer(run, rest)
+        _write_json(run / POINTER, rest)
     return rest
 
 
 def _is_ours(name: object) -> bool:
-    return isinstance(name, str) and bool(_SERIAL.fullmatch(final_of(name) or name))
+    return isinstance(name, str) and bool(_SERIAL.fullmatch(storage.final_of(name) or name))
 
 
-def _write_pointer(run: Path, pointer: Mapping[str, Any]) -> None:
-    text = json.dumps(with_sha256(pointer), indent=1)
-    write_atomically(run / POINTER, (text + "\n").encode())
+def _write_json(path: Path, content: Mapping[str, Any]) -> None:
+    text = json.dumps(files.with_sha256(content), indent=1)
+    storage.write_atomically(path, (text + "\n").encode())
 
 
 def best_score(run: Path) -> float | None:
@@ -199,17 +184,18 @@ def read(path: Path, which: str = "last", *, training: bool = True) -> Checkpoin
             f"{folder / ABOUT}: format {about.get('format')!r}: this release reads {FORMAT}; "
             "read it with the release that wrote it"
         )
-    check_sha256(about, folder / ABOUT, _FILE, ())
-    method, files, progress = (about.get(name) for name in ("method", "files", "progress"))
-    if not isinstance(method, str) or not isinstance(files, dict) or not isinstance(progress, dict):
-        raise CorruptDataError(f"{folder / ABOUT}: expected a method, files and progress")
+    files.check_sha256(about, folder / ABOUT, _FILE, ())
+    kinds = {"method": str, "config": dict, "files": dict, "progress": dict}
+    if not all(isinstance(about.get(name), kind) for name, kind in kinds.items()):
+        raise CorruptDataError(f"{folder / ABOUT}: expected {', '.join(kinds)}")
+    method, known = about["method"], about["files"]
     try:
-        config = from_mapping(preset("small"), _object(about.get("config"), "config"), "config")
+        config = from_mapping(preset("small"), about["config"], "config")
         with torch.device("meta"):  # names and shapes, without their memory
             wanted = make_agent(method, config).state_dict()
     except InternavError as error:
         raise CorruptDataError(f"{folder / ABOUT}: {error}") from error
-    weights = _tensors(folder / WEIGHTS, files)
+    weights = _tensors(folder / WEIGHTS, known)
     for name in sorted({*weights, *wanted}):
         found, right = _kind(weights.get(name)), _kind(wanted.get(name))
         if found != right:
@@ -217,8 +203,8 @@ def read(path: Path, which: str = "last", *, training: bool = True) -> Checkpoin
                 f"{folder / WEIGHTS}: {name} has type and shape {found}, the method and sizes of "
                 f"{ABOUT} want {right}: these are another agent's weights"
             )
-    rest = _tensors(folder / TRAINING, files) if training else {}
-    return Checkpoint(method, config, weights, progress, rest)
+    rest = _tensors(folder / TRAINING, known) if training else {}
+    return Checkpoint(method, config, weights, about["progress"], rest)
 
 
 def load_agent(path: str | Path, which: str = "last") -> Agent[Any]:
@@ -282,7 +268,7 @@ def export_agent(path: str | Path, folder: str | Path, which: str = "last") -> P
 
 def _write_folder(folder: Path, checkpoint: Checkpoint) -> None:
     def fill(temporary: Path) -> None:
-        files = {}
+        described = {}
         for name, tensors in ((WEIGHTS, checkpoint.weights), (TRAINING, checkpoint.training)):
             copies = {key: value.detach().cpu().contiguous() for key, value in tensors.items()}
             try:
@@ -291,24 +277,22 @@ def _write_folder(folder: Path, checkpoint: Checkpoint) -> None:
                 raise OSError(None, str(error), str(temporary / name)) from error
             # safetensors makes files private: readers of the folder may read them too.
             (temporary / name).chmod(temporary.stat().st_mode & 0o666)
-            size = (temporary / name).stat().st_size
-            files[name] = {"bytes": size, "sha256": file_sha256(temporary / name)}
-            sync(temporary / name)
+            described[name] = _size_and_digest(temporary / name)
+            storage.sync(temporary / name)
         about = {
             "format": FORMAT,
             "method": checkpoint.method,
             "config": values.plain(checkpoint.config),
             "progress": checkpoint.progress,
-            "files": files,
+            "files": described,
             "versions": {
                 "python": platform.python_version(),
                 **{name: version(name) for name in ("internav-data", "torch", "numpy")},
             },
         }
-        text = json.dumps(with_sha256(about), indent=1)
-        write_atomically(temporary / ABOUT, (text + "\n").encode())
+        _write_json(temporary / ABOUT, about)
 
-    write_folder_atomically(folder, fill)
+    storage.write_folder_atomically(folder, fill)
 
 
 def _pointer(run: Path) -> dict[str, Any]:
@@ -316,33 +300,24 @@ def _pointer(run: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
     pointer = _json(path)
-    check_sha256(pointer, path, _FILE, ())
+    files.check_sha256(pointer, path, _FILE, ())
     return pointer
 
 
 def _json(path: Path) -> dict[str, Any]:
-    return _object(read_json(path, _FILE), path)
-
-
-def _object(value: object, path: Path | str) -> dict[str, Any]:
+    value = files.read_json(path, _FILE)
     if not isinstance(value, dict):
         raise CorruptDataError(f"{path}: expected a JSON object, got {type(value).__name__}")
     return value
 
 
-def _tensors(path: Path, files: Mapping[str, Any]) -> dict[str, Tensor]:
-    """Read tensors whose file has the size and digest that `files` tell."""
-    known = files.get(path.name)
-    if not isinstance(known, dict):
-        raise CorruptDataError(f"{path.parent / ABOUT}: files: {path.name} is missing")
+def _tensors(path: Path, known: Mapping[str, Any]) -> dict[str, Tensor]:
+    """Read tensors whose file has the size and digest that `known` has."""
     try:
-        size = size_of_regular(path)
-        if size != known.get("bytes") or size > _MAX_TENSOR_BYTES:
+        if _size_and_digest(path) != known.get(path.name):
             raise CorruptDataError(
-                f"{path}: {size} bytes, expected {known.get('bytes')}: copy the checkpoint again"
+                f"{path}: its bytes are not those that {ABOUT} knows: copy the checkpoint again"
             )
-        if file_sha256(path) != known.get("sha256"):
-            raise CorruptDataError(f"{path}: its bytes have changed: copy the checkpoint again")
         tensors = load_file(path)
     except OSError as error:
         raise CorruptDataError(f"{path}: {error.strerror or error}") from error
@@ -354,6 +329,14 @@ def _tensors(path: Path, files: Mapping[str, Any]) -> dict[str, Tensor]:
                 f"{path}: {name} holds what is no finite number: take an earlier checkpoint"
             )
     return tensors
+
+
+def _size_and_digest(path: Path) -> dict[str, Any]:
+    """Return the size of a file of tensors and the digest of its bytes."""
+    size = files.size_of_regular(path)
+    if size > _MAX_TENSOR_BYTES:
+        raise CorruptDataError(f"{path}: {size} bytes, expected {_MAX_TENSOR_BYTES} at most")
+    return {"bytes": size, "sha256": storage.file_sha256(path)}
 
 
 def _kind(tensor: Tensor | None) -> tuple[torch.dtype, torch.Size] | None:
@@ -382,11 +365,11 @@ class TrainState:
     environment_steps: int = 0
     cloned_frames: int = 0
     training_s: float = 0.0
-    critics: Mapping[str, Annotated[int, Bounds(0)]] = field(default_factory=dict)
+    critics: Mapping[str, Annotated[int, values.Bounds(0)]] = field(default_factory=dict)
     """Rollouts that each critic has learnt from."""
     window: tuple[Mapping[str, float], ...] = ()
     """Metrics of the last episodes that ended in the stage."""
-    log: Annotated[int, Bounds(0)] = 0
+    log: Annotated[int, values.Bounds(0)] = 0
     """Size of the log in bytes: later rows are of updates that are done again."""
 
     @classmethod

@@ -13,7 +13,7 @@ from internav_data.camp.ppo import Reduce, alone, check_finite, step
 from internav_data.camp.rollout import StepRows
 from internav_data.envs.loop import EnvironmentLoop, Environments
 from internav_data.records import Episode
-from internav_data.records.errors import CorruptDataError, UsageError
+from internav_data.records.errors import CorruptDataError
 
 if TYPE_CHECKING:
     from internav_data.camp.config import ExpertColumn
@@ -31,28 +31,13 @@ MAX_GRAD_NORM: Final = 0.5
 
 
 def experts_of(dataset: Dataset[Episode], column: ExpertColumn = "expert") -> Experts:
-    """Return the experts of a dataset; to ask for one that is missing raises a UsageError.
-
-    Parameters
-    ----------
-    dataset
-        Episodes.
-    column
-        Column that holds them.
-
-    """
+    """Return the experts, in a column, of a dataset each of whose episodes has one."""
     from internav_data.envs.source import open_source  # noqa: PLC0415 - the camera's kernels
 
     source = open_source(dataset)
 
     def actions(episode_id: str) -> Sequence[int]:
-        episode = source.episode(source.number_of(episode_id))
-        expert: Expert | None = getattr(episode, column)
-        if expert is None:
-            raise UsageError(
-                f"episode {episode_id} has no expert to clone: generate the dataset with "
-                "experts, or train without --pretrain bc"
-            )
+        expert: Expert = getattr(source.episode(source.number_of(episode_id)), column)
         return expert.actions
 
     return actions

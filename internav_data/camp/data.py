@@ -15,6 +15,7 @@ from internav_data.dataset import Dataset, load_dataset
 from internav_data.dataset.select import condition
 from internav_data.envs.tasks import InteractiveNavigation, Task
 from internav_data.evaluation.evaluator import EvaluationConfig, evaluate
+from internav_data.evaluation.metrics import summary
 from internav_data.records import Episode
 from internav_data.records.errors import UsageError
 
@@ -153,9 +154,6 @@ class TrainingData:
             max_steps=config.run.max_steps,
             limit=limit,
         )
-        results = evaluate(policy, episodes, settings)
-        means = {
-            name: sum(float(getattr(each, name)) for each in results) / len(results)
-            for name in _MEANS
-        }
-        return {**means, "episodes": float(len(results))}
+        found = summary(evaluate(policy, episodes, settings))
+        means = {name: found.values[name] or 0.0 for name in _MEANS}
+        return {**means, "episodes": float(found.episodes)}

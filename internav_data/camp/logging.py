@@ -57,7 +57,6 @@ class MetricsLogger:
                 f"{path}: {size} bytes, the checkpoint knows of {position}: put the log back that "
                 "belongs to it"
             )
-        self._path = path
         self._file = path.open("ab", buffering=0)
         self._file.truncate(position)
         self.position = position
@@ -77,9 +76,9 @@ class MetricsLogger:
         line = (json.dumps(row, allow_nan=False) + "\n").encode()
         try:
             write_all(self._file, line)
-        except OSError as error:
+        except OSError:
             self._file.truncate(self.position)
-            raise OSError(error.errno, error.strerror, str(self._path)) from error
+            raise
         self.position += len(line)
         if self._board is not None:
             self._board.write(row["step"], _scalars(row))
@@ -103,8 +102,7 @@ class _TensorBoard:
     def __init__(self, folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         name = f"events.out.tfevents.{time.time_ns()}.{socket.gethostname()}.{os.getpid()}"
-        self._path = folder / name
-        self._file = self._path.open("xb", buffering=0)
+        self._file = (folder / name).open("xb", buffering=0)
         self._write(file_version="brain.Event:2")
 
     def write(self, step: int, scalars: Iterable[tuple[str, float]]) -> None:
@@ -119,20 +117,26 @@ class _TensorBoard:
 
         record = io.BytesIO()
         RecordWriter(record).write(Event(wall_time=time.time(), **fields).SerializeToString())
-        try:
-            write_all(self._file, record.getvalue())
-        except OSError as error:
-            raise OSError(error.errno, error.strerror, str(self._path)) from error
+        write_all(self._file, record.getvalue())
 
     def close(self) -> None:
         self._file.close()
 
 
 def write_all(file: io.FileIO, data: bytes) -> None:
-    """Write all bytes to an unbuffered file, which may take a part at a time."""
+    """Write all bytes to an unbuffered file, which may take a part at a time.
+
+    Raises
+    ------
+    OSError
+        The disk is full: the file is named.
+    """
     rest = memoryview(data)
-    while rest:
-        rest = rest[file.write(rest) :]
+    try:
+        while rest:
+            rest = rest[file.write(rest) :]
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(file.name)) from error
 
 
 def _scalars(row: Mapping[str, Any]) -> Iterable[tuple[str, float]]:

@@ -232,8 +232,7 @@ class Encoder(nn.Module):
     ) -> None:
         super().__init__()
         names = sensor_names(sensors)
-        found = {name: kind for name, kind in encoders.items() if {*kind.sensors} <= names}
-        parts = {name: kind(config) for name, kind in found.items()}
+        parts = {n: kind(config) for n, kind in encoders.items() if {*kind.sensors} <= names}
         self.parts, self.size = nn.ModuleDict(parts), sum(part.size for part in parts.values())
         self._taken = {name: part.sensors for name, part in parts.items()}
 
@@ -316,11 +315,6 @@ class RecurrentActorCritic(nn.Module):
         self.actor = _linear(hidden, len(probabilities), _ACTOR_GAIN)
         self.actor.bias.data.copy_(torch.tensor(probabilities).log())
         self.critic = ValueHead(hidden)
-
-    def value(self, out: Tensor) -> Tensor:
-        """Return the critic's values (T, n) for the GRU's outputs (T, n, hidden)."""
-        value: Tensor = self.critic(out)
-        return value
 
 
 class IntentConditionedPolicy(RecurrentActorCritic):
@@ -406,16 +400,14 @@ class IntentPolicy(nn.Module):
         hidden : (n, hidden)
             Hidden state after the last step.
         """
-        uniform = uniform_intent(features, self.embed.in_features)
-        out, after = segments.run(self.gru, torch.cat([features, self.embed(uniform)], -1), hidden)
+        intent = uniform_intent(features, self.embed.in_features)
+        out, after = segments.run(self.gru, torch.cat([features, self.embed(intent)], -1), hidden)
         intended = torch.softmax(self.actor(out) + mask, -1)
-        intent = mix(intended)
         if self._recursive:
-            inputs = torch.cat([features, self.embed(intent)], -1)
+            inputs = torch.cat([features, self.embed(mix(intended))], -1)
             out = segments.run_again(self.gru, inputs, hidden, out)
             intended = torch.softmax(self.actor(out) + mask, -1)
-            intent = mix(intended)
-        return intended, intent, after
+        return intended, mix(intended), after
 
 
 def uniform_intent(features: Tensor, count: int) -> Tensor:

@@ -12,6 +12,7 @@ from internav_data.envs.sensors import DEFAULT_SENSORS
 from internav_data.evaluation.archive import About
 from internav_data.evaluation.evaluator import episode_generator
 from internav_data.evaluation.reference_policies import REFERENCE_POLICIES, reference_policy
+from internav_data.evaluation.tables import row_name
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import ACTIONS
 
@@ -36,6 +37,8 @@ _NOTED: Final = {
     "action_probs": ("action", "choice"),
 }
 """Distributions that agents record: their title, and the field of the choice."""
+_PROGRESS: Final = ("environment_steps", "cloned_frames", "training_s")
+"""Counters of a run that its evaluations show."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,21 +57,15 @@ class AgentPolicy:
     name
         Name of its row in tables.
     agent
-        Agent with `initial_state` and `act`, as `internav_data.camp.agents` has them.
+        Agent with `initial_state` and `act`, as `internav_data.camp.agents` has them; a user's own
+        needs no base class to be played.
     image_size
         Size of the pictures that it was trained with, pixels a side.
     greedy
         Take the most probable option and action, rather than drawn ones.
     """
 
-    def __init__(
-        self,
-        name: str,
-        agent: Any,  # noqa: ANN401 - an Agent; a user's own needs no base class to be played
-        image_size: int,
-        *,
-        greedy: bool,
-    ) -> None:
+    def __init__(self, name: str, agent: Any, image_size: int, *, greedy: bool) -> None:  # noqa: ANN401
         self.name, self.image_size = name, image_size
         self.sensors = getattr(agent, "sensors", DEFAULT_SENSORS)
         self._agent, self._greedy = agent, greedy
@@ -174,17 +171,6 @@ def reference_policies_beside(dataset: Dataset[Episode]) -> list[str]:
     return ["expert", "shortest_path"] if experts.null_count < len(experts) else ["shortest_path"]
 
 
-def row_name(about: About) -> str:
-    """Return the name of a run's row: its method, and how it differs from the default one."""
-    words = [about.method]
-    # Methods without an intent have none of these two.
-    words += [f"--intent {about.intent}"] if about.intent not in {"", "integrated"} else []
-    words += [f"--sync-every {about.sync_every}"] if about.sync_every not in {None, 3} else []
-    words += ["--without-intent"] if about.without_intent else []
-    words += ["(cloned only)"] if about.cloned_frames and about.environment_steps == 0 else []
-    return " ".join(words)
-
-
 def _observation(network: NetworkConfig) -> str:
     """Return what a row's name says of an agent's map and of hidden attributes that it shows."""
     if network.observation == "camera":
@@ -197,7 +183,7 @@ def _facts(agent: Any, about: About) -> About:  # noqa: ANN401 - what `load_agen
     """Return `about` with the agent's `method`, `config` and `progress`."""
     from internav_data.camp.agents import AGENTS  # noqa: PLC0415 - torch
 
-    config, known = agent.config, agent.progress
+    config = agent.config
     has_intent = agent.method in AGENTS and AGENTS[agent.method].intent
     return replace(
         about,
@@ -206,8 +192,6 @@ def _facts(agent: Any, about: About) -> About:  # noqa: ANN401 - what `load_agen
         intent=config.agent.intent if has_intent else "",
         sync_every=config.agent.sync_every if has_intent else None,
         training_seed=config.seed,
-        environment_steps=known.get("environment_steps"),
-        cloned_frames=known.get("cloned_frames"),
-        training_s=known.get("training_s"),
+        **{name: agent.progress.get(name) for name in _PROGRESS},
         parameters=sum(p.numel() for p in agent.parameters()),
     )

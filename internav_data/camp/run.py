@@ -17,8 +17,8 @@ from internav_data.camp.logging import LOG
 from internav_data.camp.stages import PARTS
 from internav_data.camp.train import Request, Trainer
 from internav_data.core.config import config_toml, known_keys, nested, plain
-from internav_data.core.storage import lock_folder, write_atomically
-from internav_data.records.errors import InternavError, UsageError
+from internav_data.core.storage import disk_errors, lock_folder, write_atomically
+from internav_data.records.errors import UsageError
 
 CONFIG: Final = "config.toml"
 """File of a run's resolved settings, for people and for `--config`."""
@@ -30,6 +30,8 @@ CHANGEABLE: Final = (
 _TOTAL, _EXTRA = "stages.total_timesteps", "stages.extra_timesteps"
 BUSY: Final = "another camp-train trains this run; wait for it to end, or choose another --out"
 """Reason for which a second process is refused."""
+AGAIN: Final = "go on by --resume: the last checkpoint is whole; where there is none, begin again"
+"""Advice after an error of the disk."""
 _MEASURED: Final = 2
 """Updates that a forecast is made of, after one that warms up."""
 
@@ -39,15 +41,9 @@ def _writing(out: Path) -> Iterator[None]:
     """Hold a run's lock, in the first rank alone, and turn errors of its disk into one line."""
     if out.exists() and not out.is_dir():
         raise UsageError(f"{out}: --out: expected a folder, this is a file")
-    try:
-        with lock_folder(out, BUSY) if is_first_rank() else contextlib.nullcontext():
-            yield
-    except OSError as error:
-        whole = "go on by --resume: the last checkpoint is whole"
-        raise InternavError(
-            f"{error.filename or out}: {error.strerror or error}; make room or mend it, then "
-            + (whole if has_checkpoint(out) else "begin again")
-        ) from error
+    lock = lock_folder(out, BUSY) if is_first_rank() else contextlib.nullcontext()
+    with disk_errors(out, AGAIN), lock:
+        yield
 
 
 def begin(request: Request) -> Trainer:
@@ -99,54 +95,47 @@ def resume(request: Request, asked: Mapping[str, Any]) -> Trainer:
         The disk is full; the last checkpoint is whole.
     """
     with _writing(request.out):
-        return _resume(request, asked)
+        out, checkpoint = request.out, read(request.out)
+        if not checkpoint.training:
+            raise UsageError(
+                f"{out}: an agent alone, without what a run needs to go on; resume the run "
+                "that it came from"
+            )
+        method, task = asked.get("method") or checkpoint.method, checkpoint.progress.get("task")
+        _check_same(out, "method", checkpoint.method, method, "leave --method out")
+        _check_same(out, "task", task, request.task.name, "give the same task (`Request(task=…)`)")
+        config = checkpoint.config
+        if asked.get("config") is not None:
+            config = _continued(out, config, asked["config"], asked.get("keys"))
+        state = TrainState.from_progress(checkpoint.progress)
+        if asked.get("clones") and not state.clones:
+            raise UsageError(
+                f"{out}: this run began without the expert; leave --pretrain out, or choose "
+                "another --out"
+            )
+        if asked.get("parts") is not None:
+            state.parts = tuple(asked["parts"])
+        if config.stages != checkpoint.config.stages and PARTS[-1] not in state.parts:
+            raise UsageError(
+                f"{out}: more steps go to the stage {PARTS[-1]!r}, which this run leaves out: add "
+                "it by --stages"
+            )
+        request = replace(request, method=checkpoint.method, config=config)
+        trainer = Trainer(request, state, checkpoint)
+        known, dataset = checkpoint.progress.get("dataset"), trainer.data.fingerprint
+        _check_same(out, "dataset", known, dataset, "give the same dataset")
+        if config != checkpoint.config:
+            _write_config(trainer)
+        trainer.fit()
+        return trainer
 
 
-def _resume(request: Request, asked: Mapping[str, Any]) -> Trainer:
-    out, checkpoint = request.out, read(request.out)
-    if not checkpoint.training:
+def _check_same(out: Path, what: str, known: object, asked: object, advice: str) -> None:
+    if known != asked:
         raise UsageError(
-            f"{out}: an agent alone, without what a run needs to go on; resume the run "
-            "that it came from"
+            f"{out}: a run of {what} {known!r}, asked for {asked!r}: {advice}, or choose another "
+            "--out"
         )
-    if asked.get("method") not in {None, checkpoint.method}:
-        raise UsageError(
-            f"{out}: a run of method {checkpoint.method!r}, asked for {asked['method']!r}: "
-            "leave --method out, or choose another --out"
-        )
-    if (known := checkpoint.progress.get("task")) != request.task.name:
-        raise UsageError(
-            f"{out}: a run of task {known!r}, asked for {request.task.name!r}: give the same task "
-            "(`Request(task=…)`), or choose another --out"
-        )
-    config = checkpoint.config
-    if asked.get("config") is not None:
-        config = _continued(out, config, asked["config"], asked.get("keys"))
-    state = TrainState.from_progress(checkpoint.progress)
-    if asked.get("clones") and not state.clones:
-        raise UsageError(
-            f"{out}: this run began without the expert; leave --pretrain out, or choose "
-            "another --out"
-        )
-    if asked.get("parts") is not None:
-        state.parts = tuple(asked["parts"])
-    if config.stages != checkpoint.config.stages and PARTS[-1] not in state.parts:
-        raise UsageError(
-            f"{out}: more steps go to the stage {PARTS[-1]!r}, which this run leaves out: add it "
-            "by --stages"
-        )
-    request = replace(request, method=checkpoint.method, config=config)
-    trainer = Trainer(request, state, checkpoint)
-    known = checkpoint.progress.get("dataset")
-    if known != trainer.data.fingerprint:
-        raise UsageError(
-            f"{request.dataset}: fingerprint {trainer.data.fingerprint}, the run was trained on "
-            f"{known}: give the same dataset"
-        )
-    if config != checkpoint.config:
-        _write_config(trainer)
-    trainer.fit()
-    return trainer
 
 
 def forecast(request: Request) -> list[tuple[str, int, float]]:
@@ -159,14 +148,12 @@ def forecast(request: Request) -> list[tuple[str, int, float]]:
     for stage in trainer.stages:
         now = trainer.open(stage)
         trainer.state.critics = {stage.critic: ppo.critic_warmup_rollouts}  # whole updates
-        try:
+        with contextlib.closing(now.source.loop.env):
             trainer.update(now)
             began = time.perf_counter()
             for _ in range(_MEASURED):
                 trainer.update(now)
             each = (time.perf_counter() - began) / _MEASURED
-        finally:
-            now.source.loop.env.close()
         trainer.state.done = 0
         steps = 0 if stage.clones else stage.updates * ppo.num_envs * ppo.num_steps
         found.append((stage.name, steps, each * stage.updates))

@@ -45,7 +45,7 @@ class TrainingStage:
         return self.name == CLONING
 
 
-def cloning_stage(config: CampConfig) -> TrainingStage:
+def _cloning_stage(config: CampConfig) -> TrainingStage:
     """Return the stage that clones the dataset's experts."""
     cloning = config.cloning
     an_epoch = max(1, round(cloning.frames / (cloning.num_envs * cloning.num_steps)))
@@ -54,9 +54,9 @@ def cloning_stage(config: CampConfig) -> TrainingStage:
 
 
 def schedule(
-    config: CampConfig, parts: Sequence[str], *, hierarchical: bool
+    config: CampConfig, parts: Sequence[str], *, hierarchical: bool, clones: bool = False
 ) -> list[TrainingStage]:
-    """Return the PPO stages of a run.
+    """Return the stages of a run.
 
     Every method gets the same environment steps: flat ones spend those of the auxiliary tasks on
     the main task in single rooms.
@@ -66,15 +66,20 @@ def schedule(
     config
         Training config.
     parts
-        Some of `PARTS`, one after the other.
+        Some of `PARTS`, one after the other; none for cloning alone.
     hierarchical
         Whether there are action policies to be trained in auxiliary tasks.
+    clones
+        Whether experts are cloned first.
 
     Raises
     ------
     UsageError
         An unknown part, more tasks side by side than environments, or less than one update to do.
     """
+    stages, share_before = [_cloning_stage(config)] if clones else [], 0.0
+    if clones and not parts:
+        return stages
     check_parts(parts)
     stages_config, count = config.stages, config.ppo.num_envs
     steps = count * config.ppo.num_steps
@@ -86,7 +91,6 @@ def schedule(
     shares = _shares(config, hierarchical=hierarchical)
     updates = round(stages_config.total_timesteps / steps)
     extra = round(stages_config.extra_timesteps / steps)
-    stages, share_before = [], 0.0
     for name, (tasks, share) in shares.items():
         first, last = round(updates * share_before), round(updates * (share_before + share))
         share_before += share
@@ -104,7 +108,7 @@ def schedule(
                 *(decay if stages_config.decay_over == "all" else (0.0, 1.0)),
             )
         )  # fmt: skip
-    if not stages:
+    if len(stages) == clones:
         raise UsageError(
             f"stages.total_timesteps is {stages_config.total_timesteps}: less than one update of "
             f"{steps} steps is left for {', '.join(parts)} (stages.min_auxiliary_timesteps is "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -22,14 +22,7 @@ from internav_data.camp.data import TrainingData
 from internav_data.camp.distributed import device_of, distributed_context
 from internav_data.camp.logging import EpisodeWindow, MetricsLogger, Row, rates
 from internav_data.camp.rollout import Collector, Rollout, orders_of, uniforms_of
-from internav_data.camp.stages import (
-    PARTS,
-    TrainingStage,
-    cloning_stage,
-    order_seed,
-    schedule,
-    torch_seed,
-)
+from internav_data.camp.stages import PARTS, TrainingStage, order_seed, schedule, torch_seed
 from internav_data.core.interrupts import InterruptedRunError
 from internav_data.envs.tasks import TASKS, InteractiveNavigation, Task
 from internav_data.records.errors import NotFiniteError, UsageError
@@ -159,9 +152,7 @@ class Trainer:
                 "of them out"
             )
         hierarchical = isinstance(self.agent, Hierarchy)
-        stages = [cloning_stage(config)] if state.clones else []
-        if state.parts:
-            stages += schedule(config, state.parts, hierarchical=hierarchical)
+        stages = schedule(config, state.parts, hierarchical=hierarchical, clones=state.clones)
         names = [stage.name for stage in stages]
         if state.stage in names:
             return stages[names.index(state.stage) :]
@@ -207,7 +198,7 @@ class Trainer:
         now, state, every = self.open(stage), self.state, self.config.run
         save_every = every.checkpoint_every * (_CLONING_SAVES if stage.clones else 1)
         validates = not stage.clones and not stage.tasks
-        try:
+        with closing(now.source.loop.env):
             if not state.updates and not state.done:
                 self.save(now)
             while state.done < stage.updates:
@@ -221,8 +212,6 @@ class Trainer:
                     self.save(now, score)
                 if signum:
                     raise InterruptedRunError(f"{self.run}: {INTERRUPTED}", signum)
-        finally:
-            now.source.loop.env.close()
 
     def open(self, stage: TrainingStage) -> StageRun:
         """Open a stage's environments, new or as they were in the checkpoint."""

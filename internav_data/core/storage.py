@@ -327,13 +327,17 @@ def hold_lock(path: Path, flags: int, place: str, busy: str) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def disk_errors(place: object) -> Iterator[None]:
+def disk_errors(
+    place: object, then: str = "run the same command again: finished scenes are kept"
+) -> Iterator[None]:
     """Turn errors of the disk into one that says what to do.
 
     Parameters
     ----------
     place
         Store or folder that is named where an error names no file.
+    then
+        Advice for when there is room again.
 
     Raises
     ------
@@ -347,8 +351,7 @@ def disk_errors(place: object) -> Iterator[None]:
         where = error.filename or place
         reason = f"{error.strerror or error}{_free_bytes(error, place)}"
         raise InternavError(
-            f"cannot write to {where}: {reason}; make it writable or free some "
-            "space, then run the same command again: finished scenes are kept"
+            f"cannot write to {where}: {reason}; make it writable or free some space, then {then}"
         ) from error
 
 

@@ -180,6 +180,17 @@ def table_5(methods: Mapping[str, Sequence[Evaluation]]) -> Table:
     return _table("Table 5: interactions", ("all",), _TABLE5, methods, PAPER_5)
 
 
+def row_name(about: About) -> str:
+    """Return the name of a run's row: its method, and how it differs from the default one."""
+    words = [about.method]
+    # Methods without an intent have none of these two.
+    words += [f"--intent {about.intent}"] if about.intent not in {"", "integrated"} else []
+    words += [f"--sync-every {about.sync_every}"] if about.sync_every not in {None, 3} else []
+    words += ["--without-intent"] if about.without_intent else []
+    words += ["(cloned only)"] if about.cloned_frames and about.environment_steps == 0 else []
+    return " ".join(words)
+
+
 def variant_of(about: About) -> str:
     """Return the row of the paper's Table 4 to which a run corresponds; empty for none."""
     if about.method == "ppo-intent":

@@ -12,6 +12,7 @@ from safetensors.torch import load_file, save_file  # noqa: E402
 from internav_data.camp import checkpoint as checkpoints  # noqa: E402
 from internav_data.camp.agents import AGENTS, make_agent  # noqa: E402
 from internav_data.camp.checkpoint import Checkpoint, find, load_agent, read, save  # noqa: E402
+from internav_data.core import storage  # noqa: E402
 from internav_data.core.files import with_sha256  # noqa: E402
 from internav_data.core.storage import file_sha256  # noqa: E402
 from internav_data.records.errors import CorruptDataError, UsageError  # noqa: E402
@@ -100,7 +101,8 @@ def test_last_and_best_are_kept_and_no_other(tmp_path, made):
 def test_killed_between_files_the_last_one_stands(kept, made, monkeypatch, victim, after):
     """Whatever comes last before a kill, reading finds the old checkpoint, and saving goes on."""
     run, _ = kept
-    true, left = getattr(checkpoints, victim), [after]
+    owner = checkpoints if victim == "save_file" else storage
+    true, left = getattr(owner, victim), [after]
 
     def dies(*given):
         if not left[0]:
@@ -108,13 +110,13 @@ def test_killed_between_files_the_last_one_stands(kept, made, monkeypatch, victi
         left[0] -= 1
         return true(*given)
 
-    monkeypatch.setattr(checkpoints, victim, dies)
+    monkeypatch.setattr(owner, victim, dies)
     try:
         save(run, made(number=2))
         died = False
     except KeyboardInterrupt:
         died = True
-    monkeypatch.setattr(checkpoints, victim, true)
+    monkeypatch.setattr(owner, victim, true)
     assert read(run).progress["updates"] == (1 if died else 2)
     save(run, made(number=3))
     assert read(run).progress["updates"] == 3
@@ -176,7 +178,7 @@ def test_a_changed_byte_is_noticed(kept):
     data = bytearray(path.read_bytes())
     data[-5] ^= 1
     path.write_bytes(data)
-    with pytest.raises(CorruptDataError, match="have changed"):
+    with pytest.raises(CorruptDataError, match="its bytes are not those"):
         read(run)
 
 
@@ -246,12 +248,12 @@ def test_a_config_larger_than_its_weights_takes_no_memory(kept):
     [
         ({"format": 1}, "format 1: this release reads 3"),
         ({"method": "ppo"}, "another agent's weights"),
-        ({"method": 3}, "expected a method"),
-        ({"config": []}, "expected a JSON object"),
+        ({"method": 3}, "expected method, config, files, progress"),
+        ({"config": []}, "expected method, config, files, progress"),
         ({"config": {"speed": 1}}, "no key 'speed'"),
         ({"config": {"ppo": {"num_steps": 0}}}, "ppo.num_steps is 0"),
-        ({"files": {}}, "weights.safetensors is missing"),
-        ({"progress": None}, "expected a method, files and progress"),
+        ({"files": {}}, "weights.safetensors: its bytes are not those"),
+        ({"progress": None}, "expected method, config, files, progress"),
     ],
 )
 def test_what_does_not_fit_is_told(kept, changes, words):

@@ -278,20 +278,15 @@ def test_the_datasets_experts_reach_their_goals_hand_backs_and_all(houses, confi
     assert torch.isfinite(agent.evaluate(batch).log_prob).all()
 
 
-def test_an_episode_without_expert_is_refused(houses, config, monkeypatch):
+def test_the_blind_experts_are_cloned_where_they_are_asked_for(houses, monkeypatch):
     from internav_data.camp.cloning import experts_of
     from internav_data.dataset import load_dataset
     from internav_data.envs.source import Source
-    from internav_data.records.errors import UsageError
 
     dataset = load_dataset(houses)
-    bare = dataclasses.replace(dataset[0], expert=None)
-    monkeypatch.setattr(Source, "episode", lambda *_: bare)
-    with pytest.raises(UsageError, match="has no expert to clone"):
-        experts_of(dataset)(bare.episode_id)
-    blind = dataclasses.replace(bare, blind_expert=dataset[0].expert)
+    blind = dataclasses.replace(dataset[0], expert=None, blind_expert=dataset[0].expert)
     monkeypatch.setattr(Source, "episode", lambda *_: blind)
-    assert experts_of(dataset, "blind_expert")(bare.episode_id) == blind.blind_expert.actions
+    assert experts_of(dataset, "blind_expert")(blind.episode_id) == blind.blind_expert.actions
 
 
 def test_episodes_without_an_expert_are_skipped_and_counted(houses, config, tmp_path):

@@ -7,8 +7,9 @@ import types
 import numpy as np
 import pytest
 
-from internav_data.camp.policy import AgentPolicy, candidate, reference_policies_beside, row_name
+from internav_data.camp.policy import AgentPolicy, candidate, reference_policies_beside
 from internav_data.evaluation.evaluator import EvaluationConfig, episode_generator, evaluate
+from internav_data.evaluation.tables import row_name
 from internav_data.records.errors import UsageError
 from internav_data.world.actions import ACTION_COUNT, Action
 

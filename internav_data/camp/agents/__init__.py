@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Final
 
 import torch
@@ -76,7 +76,11 @@ GROUP: Final = "internav.agents"
 
 def agent_names() -> list[str]:
     """Return the names of all methods; those of entry points come last."""
-    return [*AGENTS, *sorted(point.name for point in entry_points(group=GROUP))]
+    return [*AGENTS, *sorted(_own())]
+
+
+def _own() -> dict[str, EntryPoint]:
+    return {point.name: point for point in entry_points(group=GROUP)}
 
 
 def check_settings(name: str, config: CampConfig) -> None:
@@ -89,17 +93,17 @@ def check_settings(name: str, config: CampConfig) -> None:
     UsageError
         The method does not read a setting that was changed.
     """
-    default = AgentConfig()
-    if name in AGENTS and config.mine:
+    if name not in AGENTS:
+        return
+    if config.mine:
         raise UsageError(
             f"mine.{min(config.mine)}: method {name!r} has no settings of its own; leave it out, "
             f"or name your own method (entry points {GROUP})"
         )
-    for setting in sorted({each for method in AGENTS.values() for each in method.settings}):
+    read = {each for method in AGENTS.values() for each in method.settings}
+    for setting in sorted(read - {*AGENTS[name].settings}):
         value = getattr(config.agent, setting)
-        if name not in AGENTS or setting in AGENTS[name].settings:
-            continue
-        if value != getattr(default, setting):
+        if value != getattr(AgentConfig(), setting):
             others = ", ".join(key for key, method in AGENTS.items() if setting in method.settings)
             raise UsageError(
                 f"agent.{setting} is {value!r}: method {name!r} has no use for it; leave it out, "
@@ -115,13 +119,9 @@ def make_agent(name: str, config: CampConfig) -> Agent[Any]:
     UsageError
         There is no such method, or the config does not suit it.
     """
-    if name in AGENTS:
-        make = AGENTS[name].make
-    else:
-        own = {point.name: point for point in entry_points(group=GROUP)}
-        if name not in own:
-            raise UsageError(f"method {name!r}: expected one of {', '.join(agent_names())}")
-        make = own[name].load()
+    if name not in agent_names():
+        raise UsageError(f"method {name!r}: expected one of {', '.join(agent_names())}")
+    make = AGENTS[name].make if name in AGENTS else _own()[name].load()
     seed = generator(config.seed, Purpose.TRAINING, attempt=TrainingStream.PARAMETERS).integers(
         2**62
     )

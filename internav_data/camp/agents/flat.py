@@ -91,7 +91,7 @@ class PPOAgent(Agent[FlatRecord]):
         out, hidden = batch.segments.run(self.policy.gru, features, batch.state["hidden"])
         log_probs = torch.log_softmax(self.policy.actor(out), -1)
         return ForwardOutput(
-            log_probs=log_probs, value=self.policy.value(out),
+            log_probs=log_probs, value=self.policy.critic(out),
             state={**batch.state, "hidden": hidden}, critic_inputs=out,
             recorded={"action_probs": log_probs.detach().exp(), **recorded},
         )  # fmt: skip

@@ -338,7 +338,7 @@ class Hierarchy(Agent[HierarchyRecord]):
             recursive = variant == "recursive"
             self.intent = networks.IntentPolicy(self.global_policy, recursive=recursive)
         mask = torch.zeros(OPTIONS)
-        mask[[PUSH if name == "push" else PICK for name in agent.forbidden]] = -torch.inf
+        mask[[OPTION_NAMES.index(name) for name in agent.forbidden]] = -torch.inf
         self.register_buffer("mask", mask, persistent=False)
 
     @property
@@ -408,7 +408,7 @@ class Hierarchy(Agent[HierarchyRecord]):
         return HierarchyOutput(
             log_probs=acts, ends=functional.logsigmoid(torch.cat([logit, -logit], -1)),
             option_log_probs=torch.log_softmax(self.global_policy.actor(out) + self.mask, -1),
-            intended_option_probs=intended, intent=intent, value=self.global_policy.value(out),
+            intended_option_probs=intended, intent=intent, value=self.global_policy.critic(out),
             state={**batch.state, "hidden": torch.stack(hidden, 1)}, critic_inputs=out,
         )  # fmt: skip
 
@@ -491,9 +491,9 @@ class AuxiliaryAgent(Agent[OptionRecord]):
     ) -> None:
         super().__init__()
         self.hierarchy = hierarchy
-        number = {str(name): k for k, name in enumerate(OPTION_NAMES)}
-        self._option = torch.tensor([number[task] for task in tasks], device=hierarchy.device)
-        self._trained = sorted({number[task] for task in (trained or tasks)})
+        options, device = [OPTION_NAMES.index(task) for task in tasks], hierarchy.device
+        self._option = torch.tensor(options, device=device)
+        self._trained = sorted({OPTION_NAMES.index(task) for task in (trained or tasks)})
 
     def initial_state(self, count: int) -> State:
         """See `Agent`: one hidden state an environment."""
@@ -524,7 +524,7 @@ class AuxiliaryAgent(Agent[OptionRecord]):
             if task != NAVIGATE:
                 inputs = torch.cat([inputs, option_features[:, columns[task]]], -1)
             out, after = own.segments.run(policy.gru, inputs, own.state["hidden"])
-            parts.append((action_log_probs_of(task, policy.actor(out)), policy.value(out), after))
+            parts.append((action_log_probs_of(task, policy.actor(out)), policy.critic(out), after))
         order = torch.cat(columns).argsort()
         log_probs, value, hidden = zip(*parts, strict=True)
         return ForwardOutput(

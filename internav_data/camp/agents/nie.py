@@ -112,21 +112,19 @@ class NIEAgent(PPOAgent):
         ids = instances.reshape(steps * count, -1).long().clamp(min=0)  # 1 and up are objects
         points = _points(depth.reshape(steps * count, size, size), observations["horizon"])
         index = ids.unsqueeze(-1).expand_as(points)
-        nothing = points.new_full((len(ids), int(ids.max()) + 2, 3), _NOWHERE)
+        columns = 1 + max(int(ids.max()) + 1, self._objects)  # the first is of no object
+        nothing = points.new_full((len(ids), columns, 3), _NOWHERE)
         low = nothing.scatter_reduce(1, index, points, "amin")
         high = (-nothing).scatter_reduce(1, index, points, "amax")
         low, high = low[:, 1:], high[:, 1:]
         far = low.clamp(min=0.0)[..., 0] + low[..., 0].eq(_NOWHERE) * _NOWHERE
-        wanted = min(self._objects, far.shape[1])
-        near, places = far.topk(wanted, dim=1, largest=False)
+        near, places = far.topk(self._objects, dim=1, largest=False)
         there = near < _NOWHERE
         ends = [side.take_along_dim(places.unsqueeze(-1), 1) for side in (low, high)]
         box = torch.stack(ends, -2) * there[..., None, None]
         grid = torch.cartesian_prod(*[torch.arange(2, device=box.device)] * 3)
         corners = torch.stack([box[:, :, grid[:, axis], axis] for axis in range(3)], -1)
-        short = self._objects - wanted
-        objects = functional.pad(places.masked_fill(~there, -1), (0, short), value=-1)
-        corners = functional.pad(corners, (0, 0, 0, 0, 0, short))
+        objects = places.masked_fill(~there, -1)
         return objects.view(steps, count, -1), corners.view(steps, count, -1, _CORNERS, 3)
 
 

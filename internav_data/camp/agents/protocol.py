@@ -16,14 +16,8 @@ from typing import Any, Generic, Self, TypeVar
 import torch
 from torch import Tensor, nn
 
-from internav_data.camp.networks import (
-    ENCODERS,
-    EpisodeSegments,
-    SensorEncoder,
-    drawn,
-    entropy_of,
-    log_prob_of,
-)
+from internav_data.camp import networks
+from internav_data.camp.networks import ENCODERS, EpisodeSegments, SensorEncoder
 from internav_data.envs.sensors import DEFAULT_SENSORS, Sensor
 from internav_data.records.errors import UsageError
 
@@ -149,11 +143,11 @@ class ForwardOutput:
 
     def log_prob(self, record: Any) -> Tensor:  # noqa: ANN401 - of the agent's own class
         """Return the log-probabilities (T, n) of everything that was drawn."""
-        return log_prob_of(self.log_probs, record.choice)
+        return networks.log_prob_of(self.log_probs, record.choice)
 
     def entropy(self, record: Any) -> Tensor:  # noqa: ANN401, ARG002 - there is one distribution
         """Return the entropies (T, n) of the distributions that were drawn from."""
-        return entropy_of(self.log_probs)
+        return networks.entropy_of(self.log_probs)
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,7 +212,7 @@ class Agent(nn.Module, ABC, Generic[R]):
         state
             Memory (n, …) that depends on them.
         """
-        choice = drawn(ran.log_probs, uniforms[1])
+        choice = networks.drawn(ran.log_probs, uniforms[1])
         return choice, self.record_type(choice, **ran.recorded), {}
 
     def act(
