@@ -1,13 +1,16 @@
 """Mutants: one operator, constant, condition or call of a module changed; its tests must fail.
 
-A case is a target and the number of a mutant: "manifest 17"; "manifest none" is the module as it
-is, whose tests must pass. Mutants are drawn in an order of their own. Kernels run without numba:
-it would take compiled ones of before from its cache.
+A case is a target, the number of a mutant and a digest of the module: "manifest 17 of 8f14e45f";
+once the module differs, its numbers name other mutants, which are other cases. "manifest none" is
+the module as it is, whose tests must pass. Mutants are drawn in an order of their own. Kernels run
+without numba: it would take compiled ones of before from its cache.
 """
 
 from __future__ import annotations
 
+import ast
 import functools
+import hashlib
 import itertools
 import os
 import signal
@@ -20,11 +23,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from campaign import Row
-from mutant import NOT_LOADED, ROOT, TARGETS, mutated
+from mutant import NOT_LOADED, ROOT, TARGETS, mutated, source_of
 from strategies import rng
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
+
+    from mutant import Target
 
 LIMIT_S = 600
 """Longest time of a module's tests without a mutant."""
@@ -49,14 +54,23 @@ def drawn(name: str) -> list[int]:
 
 def cases() -> Iterator[str]:
     """Yield each module as it is, then its mutants; modules in turns."""
-    rows = [[f"{name} none", *(f"{name} {number}" for number in drawn(name))] for name in TARGETS]
+    rows = [
+        [f"{name} none", *(f"{name} {number} of {digest_of(target)}" for number in drawn(name))]
+        for name, target in TARGETS.items()
+    ]
     for some in itertools.zip_longest(*rows):
         yield from filter(None, some)
 
 
+def digest_of(target: Target) -> str:
+    """Return a digest of a target's module, by which the numbers of its mutants hold."""
+    text = ast.unparse(ast.parse(source_of(target).read_text()))
+    return hashlib.sha256(text.encode()).hexdigest()[:8]
+
+
 def run(key: str, folder: Path) -> Mapping[str, Any]:
     """Run the tests of a target with a mutant; tell whether they fail."""
-    name, number = key.split()
+    name, number = key.split()[:2]
     limit = max(MIN_LIMIT_S, SLOWER * unmutated_seconds(name))
     if number == "none":
         return {"runs": 0}

@@ -173,6 +173,23 @@ def test_mutants_do_not_count_where_tests_fail_without(tmp_path, monkeypatch):
         mutants.run("manifest 0", tmp_path)
 
 
+def test_mutants_of_a_module_that_has_changed_are_other_cases(tmp_path, monkeypatch):
+    folder = tmp_path / "made"
+    folder.mkdir()
+    target = mutant.Target("made.module", ())
+    monkeypatch.setattr(mutant, "ROOT", tmp_path)
+    monkeypatch.setattr(mutants, "TARGETS", {"it": target})
+    texts = ("x = a < 1", "x = a < 1  # a comment changes none", "x = a < 2")
+    keys = []
+    for text in texts:
+        (folder / "module.py").write_text(f"def f(a):\n    {text}\n")
+        mutants.drawn.cache_clear()
+        keys.append(list(mutants.cases()))
+    mutants.drawn.cache_clear()
+    assert keys[0] == keys[1]
+    assert set(keys[0]) & set(keys[2]) == {"it none"}
+
+
 def test_a_target_whose_mutants_survive_falls_short(tmp_path):
     kills = {"a": [1] * 85 + [0] * 15, "b": [1] * 84 + [0] * 16}
     lines = [
