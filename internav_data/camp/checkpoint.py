@@ -184,7 +184,6 @@ def read(path: Path, which: str = "last", *, training: bool = True) -> Checkpoin
             f"{folder / ABOUT}: format {about.get('format')!r}: this release reads {FORMAT}; "
             "read it with the release that wrote it"
         )
-    files.check_sha256(about, folder / ABOUT, _FILE, ())
     kinds = {"method": str, "config": dict, "files": dict, "progress": dict}
     if not all(isinstance(about.get(name), kind) for name, kind in kinds.items()):
         raise CorruptDataError(f"{folder / ABOUT}: expected {', '.join(kinds)}")
@@ -297,17 +296,15 @@ def _write_folder(folder: Path, checkpoint: Checkpoint) -> None:
 
 def _pointer(run: Path) -> dict[str, Any]:
     path = run / POINTER
-    if not path.is_file():
-        return {}
-    pointer = _json(path)
-    files.check_sha256(pointer, path, _FILE, ())
-    return pointer
+    return _json(path) if path.is_file() else {}
 
 
 def _json(path: Path) -> dict[str, Any]:
+    """Read an object with a digest of its own."""
     value = files.read_json(path, _FILE)
     if not isinstance(value, dict):
         raise CorruptDataError(f"{path}: expected a JSON object, got {type(value).__name__}")
+    files.check_sha256(value, path, _FILE, ())
     return value
 
 

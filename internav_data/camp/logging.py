@@ -60,10 +60,9 @@ class MetricsLogger:
         self._file = path.open("ab", buffering=0)
         self._file.truncate(position)
         self.position = position
-        self._board: _TensorBoard | None = None
-        if board and find_spec("tensorboard") is not None:
-            # A resumed run repeats its updates to the last bit, so no step is to be purged.
-            self._board = _TensorBoard(run / BOARD)
+        # A resumed run repeats its updates to the last bit, so no step is to be purged.
+        drawn = board and find_spec("tensorboard") is not None
+        self._board = _board_file(run / BOARD) if drawn else None
 
     def write(self, row: Row) -> None:
         """Append a row; TensorBoard draws it at its "step".
@@ -81,7 +80,8 @@ class MetricsLogger:
             raise
         self.position += len(line)
         if self._board is not None:
-            self._board.write(row["step"], _scalars(row))
+            values = [{"tag": name, "simple_value": value} for name, value in _scalars(row)]
+            write_all(self._board, _event(step=row["step"], summary={"value": values}))
 
     def __enter__(self) -> Self:
         return self
@@ -93,34 +93,26 @@ class MetricsLogger:
             self._board.close()
 
 
-class _TensorBoard:
-    """Writer of a TensorBoard file.
+def _board_file(folder: Path) -> io.FileIO:
+    """Begin a TensorBoard file.
 
     torch's SummaryWriter writes in a thread of its own, where a full disk ends in a traceback.
     """
+    folder.mkdir(parents=True, exist_ok=True)
+    name = f"events.out.tfevents.{time.time_ns()}.{socket.gethostname()}.{os.getpid()}"
+    file = (folder / name).open("xb", buffering=0)
+    write_all(file, _event(file_version="brain.Event:2"))
+    return file
 
-    def __init__(self, folder: Path) -> None:
-        folder.mkdir(parents=True, exist_ok=True)
-        name = f"events.out.tfevents.{time.time_ns()}.{socket.gethostname()}.{os.getpid()}"
-        self._file = (folder / name).open("xb", buffering=0)
-        self._write(file_version="brain.Event:2")
 
-    def write(self, step: int, scalars: Iterable[tuple[str, float]]) -> None:
-        from tensorboard.compat.proto.summary_pb2 import Summary  # noqa: PLC0415 - optional
+def _event(**fields: Any) -> bytes:  # noqa: ANN401 - those of an event
+    """Return a record of a TensorBoard file."""
+    from tensorboard.compat.proto.event_pb2 import Event  # noqa: PLC0415 - optional
+    from tensorboard.summary.writer.record_writer import RecordWriter  # noqa: PLC0415
 
-        values = [Summary.Value(tag=name, simple_value=value) for name, value in scalars]
-        self._write(step=step, summary=Summary(value=values))
-
-    def _write(self, **fields: Any) -> None:  # noqa: ANN401 - those of an event
-        from tensorboard.compat.proto.event_pb2 import Event  # noqa: PLC0415 - optional
-        from tensorboard.summary.writer.record_writer import RecordWriter  # noqa: PLC0415
-
-        record = io.BytesIO()
-        RecordWriter(record).write(Event(wall_time=time.time(), **fields).SerializeToString())
-        write_all(self._file, record.getvalue())
-
-    def close(self) -> None:
-        self._file.close()
+    record = io.BytesIO()
+    RecordWriter(record).write(Event(wall_time=time.time(), **fields).SerializeToString())
+    return record.getvalue()
 
 
 def write_all(file: io.FileIO, data: bytes) -> None:

@@ -35,17 +35,15 @@ def run_stacked(
     -------
     (T, k, n, h): outputs, which are the hidden states after each step
     """
-    projected: list[Tensor] = []
-    weights: list[Tensor] = []
-    biases: list[Tensor] = []
-    for gru, values in zip(grus, inputs, strict=True):
-        of_inputs, of_hidden, bias, hidden_bias = gru.all_weights[0]
-        projected.append(functional.linear(values, of_inputs, bias))  # (T, n, 3 h)
-        weights.append(of_hidden)  # (3 h, h)
-        biases.append(hidden_bias.unsqueeze(0))  # (1, 3 h)
+    of_inputs, weights, input_biases, biases = zip(*(g.all_weights[0] for g in grus), strict=True)
+    projected = map(functional.linear, inputs, of_inputs, input_biases)  # (T, n, 3 h) each
     kept = (~episode_starts).to(hidden.dtype).unsqueeze(-1)  # (T, n, 1)
     outputs: Tensor = _StackedGRU.apply(  # type: ignore[no-untyped-call]
-        torch.stack(projected, 1), torch.stack(weights), torch.stack(biases), hidden, kept
+        torch.stack([*projected], 1),
+        torch.stack(weights),  # (k, 3 h, h)
+        torch.stack(biases).unsqueeze(1),  # (k, 1, 3 h)
+        hidden,
+        kept,
     )
     return outputs
 

@@ -215,10 +215,9 @@ class Trainer:
 
     def open(self, stage: TrainingStage) -> StageRun:
         """Open a stage's environments, new or as they were in the checkpoint."""
-        sizes = self.config.cloning if stage.clones else self.config.ppo
-        local = self.ranks.share(
-            sizes.num_envs, "cloning.num_envs" if stage.clones else "ppo.num_envs"
-        )
+        section = "cloning" if stage.clones else "ppo"
+        count: int = getattr(self.config, section).num_envs
+        local = self.ranks.share(count, f"{section}.num_envs")
         env = self.data.environments(stage, self.config, local, self.agent.sensors)
         seed = order_seed(self.config.seed, stage.name) + local.start
         learner: Agent[Any] = self.agent
@@ -233,11 +232,9 @@ class Trainer:
                 env, learner, experts_of(self.data.demonstrated, self.config.cloning.expert)
             )
         if self._checkpoint is not None and self.state.done:
-            tensors, progress = self._checkpoint.training, self._checkpoint.progress
-            source.state, episode_starts = unpack(
-                tensors, optimiser, source.state, local, sizes.num_envs
-            )
-            source.restore(snapshots_of(progress, local), episode_starts.numpy())
+            saved = self._checkpoint
+            source.state, begun = unpack(saved.training, optimiser, source.state, local, count)
+            source.restore(snapshots_of(saved.progress, local), begun.numpy())
         else:
             if not stage.tasks:
                 self.agent.synchronise()
