@@ -23,6 +23,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TypeVar
 
+from internav_data.core.arithmetic import plain_sum
 from internav_data.core.hardware import hardware
 from internav_data.core.lru import LRUCache
 from internav_data.physics.scene import PhysicsScene, PushSolution, SettleSolution
@@ -90,8 +91,9 @@ class SolverCounts:
     @classmethod
     def total(cls, parts: Iterable[SolverCounts]) -> SolverCounts:
         """Return the sums of several counters."""
-        asked, solved = zip((0, 0), *((each.asked, each.solved) for each in parts), strict=True)
-        return cls(sum(asked), sum(solved))
+        counts = list(parts)
+        asked, solved = (each.asked for each in counts), (each.solved for each in counts)
+        return cls(plain_sum(asked), plain_sum(solved))
 
     def new_share(self, since: SolverCounts) -> float:
         """Return the share of the problems since earlier counters that were simulated; 0 of 0."""
