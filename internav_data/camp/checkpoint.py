@@ -311,9 +311,11 @@ def _json(path: Path) -> dict[str, Any]:
 def _tensors(path: Path, known: Mapping[str, Any]) -> dict[str, Tensor]:
     """Read tensors whose file has the size and digest that `known` has."""
     try:
-        if _size_and_digest(path) != known.get(path.name):
+        found, expected = _size_and_digest(path), known.get(path.name)
+        if found != expected:
             raise CorruptDataError(
-                f"{path}: its bytes are not those that {ABOUT} knows: copy the checkpoint again"
+                f"{path}: its bytes are not those that {ABOUT} knows: expected "
+                f"{str(expected)[:100]}, got {found}; copy the checkpoint again"
             )
         tensors = load_file(path)
     except OSError as error:

@@ -199,7 +199,7 @@ def _validate_once(
             physics = None
             whole.notes[UNTRUE] += sum(counts.episodes for counts in manifest.counts.values())
         _check_scenes(store, manifest, damaged, whole, sample, workers, progress_callback, physics)
-        if physics is not None and not physics.same_hardware:
+        if whole.counts["made elsewhere"]:
             known = manifest.hardware_scenes is not None
             names = [name for name in manifest.hardware if not known or name != hardware()]
             whole.judge_differences("; ".join(names) or "hardware that is not stated")

@@ -42,19 +42,24 @@ class Method:
         return "intent" in self.settings
 
 
-_OPENS: Final = "initial_interaction_probability"
 AGENTS: Final = {
     "camp": Method(
         Hierarchy,
         "a global policy opens Navigate, Push or Pick, conditioned on what the whole model is "
         "about to do (section 4)",
-        settings=("intent", "sync_every", "hand_back_step", "forbidden", _OPENS),
+        settings=(
+            "intent",
+            "sync_every",
+            "hand_back_step",
+            "forbidden",
+            "initial_interaction_probability",
+        ),
     ),
     "hrl": Method(
         partial(Hierarchy, temporally_extended=False),
         "the same policies and the same pretraining; global decides at every step, Push and Pick "
         "have no Done, no intent",
-        settings=("forbidden", _OPENS),
+        settings=("forbidden", "initial_interaction_probability"),
     ),
     "ppo": Method(PPOAgent, "one policy over all actions"),
     "ppo-intent": Method(
@@ -76,10 +81,10 @@ GROUP: Final = "internav.agents"
 
 def agent_names() -> list[str]:
     """Return the names of all methods; those of entry points come last."""
-    return [*AGENTS, *sorted(_own())]
+    return [*AGENTS, *sorted(_own_methods())]
 
 
-def _own() -> dict[str, EntryPoint]:
+def _own_methods() -> dict[str, EntryPoint]:
     return {point.name: point for point in entry_points(group=GROUP)}
 
 
@@ -121,7 +126,7 @@ def make_agent(name: str, config: CampConfig) -> Agent[Any]:
     """
     if name not in agent_names():
         raise UsageError(f"method {name!r}: expected one of {', '.join(agent_names())}")
-    make = AGENTS[name].make if name in AGENTS else _own()[name].load()
+    make = AGENTS[name].make if name in AGENTS else _own_methods()[name].load()
     seed = generator(config.seed, Purpose.TRAINING, attempt=TrainingStream.PARAMETERS).integers(
         2**62
     )

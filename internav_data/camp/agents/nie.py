@@ -10,6 +10,7 @@ metres from the eye; the object's type is no input.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Final
 
 import torch
@@ -53,9 +54,9 @@ class NIEAgent(PPOAgent):
         objects, corners = self.sight(batch)
         features = self.summarised(self.encoder(batch.observations), objects, corners)
         ran = self.decide(features, batch, objects=objects, corners=corners)
-        if batch.record is not None:
-            ran.loss = self.loss(batch, objects, corners)
-        return ran
+        if batch.record is None:
+            return ran
+        return replace(ran, loss=self.loss(batch, objects, corners))
 
     def sight(self, batch: Batch[Any]) -> tuple[Tensor, Tensor]:
         """Return objects (T, n, K) and corners (T, n, K, 8, 3), recorded or found anew."""

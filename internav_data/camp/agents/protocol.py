@@ -136,6 +136,7 @@ class ForwardOutput:
     state: State
     """(n, …): memory after the last step, but for what `Agent.draw` adds."""
     critic_inputs: Tensor | None = None
+    """See `Evaluated`."""
     loss: Tensor | None = None
     """See `Evaluated`."""
     recorded: dict[str, Tensor] = field(default_factory=dict)
