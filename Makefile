@@ -98,7 +98,7 @@ demo-train: $(STAMP) ## see an agent learn on 128 small houses: about five minut
 	@echo "          $(DEMO)/trained/report.html: tables, curves, where it went"
 	@echo "Watch     $(DEMO)/trained/videos: what it saw and meant, step by step"
 
-TESTS := -q -m 'not slow and not learning' -n 2 --dist loadfile
+TESTS := -q -m 'not slow and not learning' -n 2 --dist loadfile --max-worker-restart 1
 
 .PHONY: test
 test: $(STAMP) ## run the tests (not the slow campaigns); COVERAGE=1 prints what they cover a room
@@ -113,7 +113,7 @@ endif
 
 .PHONY: test-slow
 test-slow: $(STAMP) ## run the slow campaigns
-	$(BIN)/python -m pytest -q -m slow $(ARGS)
+	$(BIN)/python -m pytest -q -m slow -o faulthandler_timeout=7200 $(ARGS)
 
 .PHONY: test-learning
 test-learning: $(STAMP) ## see every learner learn, two at a time: about three minutes
@@ -178,7 +178,7 @@ test-lowest: ## run a part of every room's tests with the lowest versions that p
 
 .PHONY: wheels
 wheels: $(STAMP) ## ask the package index for wheels, each platform and Python; downloads 5 GB
-	$(BIN)/python -m pytest -q -m slow $(ARGS) tests/test_wheels.py
+	$(BIN)/python -m pytest -q -m slow -o faulthandler_timeout=7200 $(ARGS) tests/test_wheels.py
 
 .PHONY: docs
 docs: $(STAMP) ## build the documentation's site into build/docs; a warning is an error
