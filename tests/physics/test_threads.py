@@ -13,7 +13,6 @@ from threaded import run_in_threads
 from internav_data.physics import Body, PhysicsScene, cache_disabled, get_solver
 from internav_data.physics.cache import Solver, pack_push
 from internav_data.physics.result_cache import ResultCache
-from internav_data.physics.solving import solve_push
 from internav_data.records import PUSH_SPECS, Pose
 
 FORCE = PUSH_SPECS["force"]
@@ -79,7 +78,8 @@ FORKS = """
 import os
 import signal
 from threaded import run_in_threads
-from test_threads import FORCE, LONE, default_engine, solve_push, solved, uncached
+from test_threads import FORCE, LONE, default_engine, solved, uncached
+from internav_data.physics.solving import solve_push
 
 def work(number):
     if number:
