@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from internav_cli.main import launch
-from internav_cli.options import DATASET, JSON, dataset_to_read, positive, renamed_option
+from internav_cli.options import DATASET, JSON, dataset_to_read, positive
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -130,9 +130,6 @@ tables.md, tables.json, report.html.""",
     help="Folder to write.  [default: RUN/evaluation-SPLIT; ./evaluation-SPLIT without a run]",
 )
 @click.option("--force", is_flag=True, help="Write over an evaluation that is there.")
-@renamed_option("--where", "--filter")
-@renamed_option("--oracles", "--reference-policies", is_flag=True)
-@renamed_option("--no-oracles", "--no-reference-policies", is_flag=True)
 @JSON
 def evaluate_command(**given: Any) -> int:  # noqa: ANN401 - the options above
     """Let RUN play DATASET, and print the paper's tables."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from internav_cli.main import launch
-from internav_cli.options import DATASET, JSON, dataset_to_read, renamed_option
+from internav_cli.options import DATASET, JSON, dataset_to_read
 from internav_data.core.machine import keep_freed_memory
 
 if TYPE_CHECKING:
@@ -133,8 +133,6 @@ Exit codes: 0 good, 1 error, 2 usage, 5 corrupt data, 6 NaN or infinity,
 )
 @click.option("--dry-run", is_flag=True, help="Tell how long it would take; write nothing.")
 @click.option("--print-config", is_flag=True, help="Print all settings as TOML and stop.")
-@renamed_option("--init-from", "--pretrain bc")
-@renamed_option("--where", "--filter")
 @JSON
 def command(**given: Any) -> int:  # noqa: ANN401 - the options above
     """Train an agent on DATASET: CaMP, one of its baselines, or your own."""

@@ -196,21 +196,6 @@ def progress() -> GenerationProgress:
     return GenerationProgress(sys.stderr)
 
 
-def renamed_option(old: str, new: str, *, is_flag: bool = False) -> Callable[[F], F]:
-    """Refuse an option of an earlier version with a line that names the one of today."""
-
-    def refuse(context: click.Context, parameter: click.Parameter, _: object) -> None:
-        if context.get_parameter_source(parameter.name or "") is click.core.ParameterSource.DEFAULT:
-            return
-        raise click.UsageError(f"{old} is now called {new}")
-
-    name = "renamed" + old.replace("-", "_")
-    return click.option(
-        old, name, hidden=True, expose_value=False, callback=refuse, is_flag=is_flag,
-        multiple=not is_flag,
-    )  # fmt: skip
-
-
 def positive(_context: click.Context, parameter: click.Parameter, value: int | None) -> int | None:
     """Check that a count is 1 or more.
 

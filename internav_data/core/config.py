@@ -179,9 +179,7 @@ def from_mapping(
     Parameters
     ----------
     config
-        A frozen dataclass. Its class may have `RENAMED`, which maps names of earlier versions to
-        those of fields, or to dotted keys from the top where a field has gone to another config:
-        an old name is refused with a line that gives the new one.
+        A frozen dataclass.
     values
         Nested values by field name.
     where
@@ -194,19 +192,14 @@ def from_mapping(
     Raises
     ------
     UsageError
-        An unknown key, a key that the config's `RENAMED` lists, or a value of the wrong type.
+        An unknown key, or a value of the wrong type.
 
     """
     hints = typing.get_type_hints(type(config))
     fields = {field.name for field in dataclasses.fields(config)}
-    renamed: Mapping[str, str] = getattr(type(config), "RENAMED", {})
     changes: dict[str, Any] = {}
     for name, value in values.items():
         key = prefix + name
-        if name in renamed:
-            now = renamed[name]
-            now = now if "." in now else prefix + now
-            raise UsageError(f"{where}: '{key}' is called '{now}' now")
         if name not in fields:
             raise _unknown(key, where, known_keys(config, prefix), elsewhere)
         current = getattr(config, name)

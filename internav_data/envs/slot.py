@@ -45,12 +45,6 @@ class Arguments(TypedDict, total=False):
     privileged: Sequence[Privilege]
 
 
-_RENAMED: Final = {
-    "houses_kept": "house_cache_size",
-    "ids": "sensors, 'ids' among them",
-    "autoreset": "autoreset_mode, 'Disabled' for False",
-}
-"""Arguments of earlier versions, and their names today."""
 _MAX_ACTIONS: Final = 100_000
 """Number of actions of a snapshot that are read: more are no episode."""
 
@@ -365,8 +359,6 @@ def check_options(options: Mapping[str, Any] | None, known: tuple[str, ...]) -> 
 
 def _check_names(arguments: Mapping[str, Any]) -> None:
     unknown = sorted(set(arguments) - set(Arguments.__annotations__))
-    if unknown and unknown[0] in _RENAMED:
-        raise UsageError(f"InterNav: {unknown[0]} is now called {_RENAMED[unknown[0]]}")
     if unknown:
         raise UsageError(
             f"InterNav: no argument {unknown[0]!r}; there are {sorted(Arguments.__annotations__)}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping  # noqa: TC003 - read at run time by the settings
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from typing import Annotated, ClassVar, Literal, get_args
+from typing import Annotated, Literal, get_args
 
 from internav_data.core.config import Bounds, check_bounds
 from internav_data.records.errors import UsageError
@@ -18,15 +18,6 @@ ObstacleCount = Annotated[int, Bounds(1)]
 @dataclass(frozen=True, slots=True)
 class EpisodeConfig:
     """Settings of the episodes; the defaults are calibrated to Table 2 of the paper."""
-
-    RENAMED: ClassVar[dict[str, str]] = {
-        "engine": "physics.engine",
-        "push_model": "world.push_model",
-        "redraws": "max_redraws",
-        "sideways_m": "lateral_std_m",
-        "spots": "max_spawn_tries",
-    }
-    """Present names of keys of earlier versions, for the error that refuses an old one."""
 
     max_obstacles: tuple[ObstacleCount, ObstacleCount, ObstacleCount] = (4, 9, 18)
     """Maximum number of obstacles in houses of 1-2, 3-5 and 6-10 rooms; where they do not suffice,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 from internav_data.core.config import Bounds, check_bounds
 from internav_data.houses.room_types import ROOM_TYPES
@@ -26,12 +26,6 @@ class RoomsRequest:
 @dataclass(frozen=True, slots=True)
 class HouseConfig:
     """Settings of house generation."""
-
-    RENAMED: ClassVar[dict[str, str]] = {
-        "rooms_on_way_large": "rooms_on_path_large",
-        "rooms_on_way_medium": "rooms_on_path_medium",
-    }
-    """Present names of keys of earlier versions, for the error that refuses these."""
 
     preset: HousePreset = "paper"
     """`paper`: generous rooms of about 24 m², calibrated to the paper's Table 2; `realistic`:

@@ -256,8 +256,6 @@ def test_options_that_cannot_be_meant(small, options, message):
         ({"max_steps": 0}, "max_steps"),
         ({"image_size": 0}, "image_size"),
         ({"colour": 1}, "no argument 'colour'"),
-        ({"houses_kept": 9}, "is now called house_cache_size"),
-        ({"ids": True}, "is now called sensors"),
         ({"filters": [("room_count", ">", 99)]}, "no episodes"),
         ({"push_model": "shove"}, "push_model"),
         ({"episodes_per_house": 0}, "episodes_per_house"),
@@ -492,7 +490,7 @@ def test_same_step_autoreset_is_gymnasiums_own(small, same_step_vectors):
     assert ends > 3
     with pytest.raises(UsageError, match="autoreset_mode"):
         many(small, 2, autoreset_mode="never")
-    with pytest.raises(UsageError, match="autoreset is now called autoreset_mode"):
+    with pytest.raises(UsageError, match="no argument 'autoreset'"):
         many(small, 2, autoreset=False)
 
 

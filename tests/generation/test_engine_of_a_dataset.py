@@ -134,8 +134,6 @@ def test_a_missing_engine_costs_nothing_and_another_is_offered_for_new_data(tmp_
 
 def test_the_engine_is_part_of_the_config_whose_default_is_stated_once():
     assert GenerationConfig().physics == PhysicsConfig()
-    with pytest.raises(UsageError, match=r"'episodes.engine' is called 'physics.engine' now"):
-        load_config(overrides=["episodes.engine=bullet"])
     with pytest.raises(UsageError, match=r"physics.engine is 'havok': expected one of bullet"):
         load_config(overrides=["physics.engine=havok"])
     with pytest.raises(UsageError, match=r"physics.engine: expected one of .*, got 'havok'"):
