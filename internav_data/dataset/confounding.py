@@ -63,7 +63,7 @@ class ConfoundingRow:
     """I(success; asset, type, size) / H(success), cross-validated: 1 where the look tells all."""
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class PushCounts:
     """Counts over the push outcomes of some obstacles."""
 

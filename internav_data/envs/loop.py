@@ -54,7 +54,7 @@ class Environments(Protocol):
         """End the environments' processes."""
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class LoopStep:
     """Step of all n environments, before the next episode begins where one is over."""
 

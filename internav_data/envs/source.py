@@ -80,7 +80,7 @@ class ShortestPathField:
         return known
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class LoadedHouse:
     """House prepared for episodes: model, camera scene and distance fields."""
 

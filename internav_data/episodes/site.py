@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from internav_data.records import House, Vec2
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class SpawnSite:
     """A furnished house with its lattice, its paths and the nodes where an agent can stand."""
 

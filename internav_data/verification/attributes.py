@@ -119,7 +119,7 @@ class _Count:
         return DEVIATIONS * math.sqrt(self.variance) + FEW
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class _Shares:
     """Counts over all objects of one kind."""
 
@@ -130,7 +130,7 @@ class _Shares:
     """Objects of the first count by level of mass."""
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class AttributeCheck:
     """Check of the attributes of a dataset, object by object, and of their shares at the end."""
 

@@ -192,7 +192,7 @@ class VisibilityGraph:
         return visible
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class _AStar:
     """A* that expands several corners at a time; the start is point 0, the goal the last one."""
 

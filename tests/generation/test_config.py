@@ -70,7 +70,10 @@ def test_paths_in_a_file_are_relative_to_it(tmp_path):
     [
         ("house.scal=1.1", ["'house.scal'", "did you mean 'house.scale'"]),
         ("rooms=4", ["'rooms'", "'house.rooms'"]),
-        ("house.rooms_on_way_large=4", ["'house.rooms_on_way_large'", "'house.rooms_on_path_large'"]),
+        (
+            "house.rooms_on_way_large=4",
+            ["'house.rooms_on_way_large'", "'house.rooms_on_path_large'"],
+        ),
         ("episodes.lateral_stdm=1", ["'episodes.lateral_stdm'", "'episodes.lateral_std_m'"]),
         ("scenes=10", ["'scenes'", "command line"]),
         ("zzzzzz=1", ["'zzzzzz'", "seed"]),

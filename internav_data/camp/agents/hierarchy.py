@@ -242,7 +242,7 @@ def open_option(batch: Batch[Any]) -> tuple[Tensor, Tensor]:
     return batch.record.open, batch.record.used
 
 
-@dataclass(slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class HierarchyOutput(ForwardOutput):
     """Outputs of all networks over T steps; `log_probs` (T, n, 4, A) are those of each option."""
 

@@ -122,7 +122,7 @@ class Batch(Generic[R]):
         )
 
 
-@dataclass(slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ForwardOutput:
     """Outputs of an agent's networks over T steps, of which each draws one action.
 
