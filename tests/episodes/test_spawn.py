@@ -96,14 +96,14 @@ def test_without_a_gap_nothing_falls_into_something(monkeypatch):
 
 @pytest.mark.slow
 def test_none_of_3000_obstacles_is_in_anything(monkeypatch):
-    """1,000 episodes of the catalogue, whose experts and outcomes are not asked for here."""
+    """Over 1,000 episodes of the catalogue, whose experts and outcomes are not asked for here."""
     monkeypatch.setattr("internav_data.episodes.build.solve", lambda _: None)
     monkeypatch.setattr(
         "internav_data.episodes.build.outcomes_of",
         lambda world, *_: ((),) * len(world.obstacles),
     )
     shapes, count = Shapes(catalogue().assets), 0
-    for scene in range(100):
+    for scene in range(110):
         house = build_house(0, scene, HouseConfig(), catalogue())
         still = CheckedLayout(house, shapes).solids
         config = EpisodeConfig(keep_unsolvable=True)
