@@ -153,7 +153,7 @@ def started(run, dataset, *more):
 
 def said(stderr):
     """Lines but those of progress, of which a slow machine has some."""
-    return [line for line in beside_the_dataset(stderr) if " steps/s, " not in line]
+    return [line for line in beside_the_dataset(stderr) if " steps/s " not in line]
 
 
 @pytest.mark.parametrize(
