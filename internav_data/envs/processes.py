@@ -192,6 +192,7 @@ class InterNavProcesses(PlainSpec, VectorEnv[Any, Any, Any]):
             render_mode=render_mode,
         )  # fmt: skip
         self._copy, self._done = copy, np.zeros(num_envs, np.bool_)
+        self._ordered = np.zeros(num_envs, np.bool_)  # environments that have an order of episodes
         given = dict(
             arguments, dataset=with_absolute_path(dataset), image_size=image_size,
             autoreset_mode=self._mode, render_mode=render_mode,
@@ -201,6 +202,7 @@ class InterNavProcesses(PlainSpec, VectorEnv[Any, Any, Any]):
         self._rows = list(itertools.pairwise(bounds))
         self._counts = [high - low for low, high in self._rows]
         self._processes: list[Child] = []
+        self._asked = [False] * workers  # processes whose answer has not been read
         # Environments that nobody closes, or that cannot be made.
         self._end = weakref.finalize(self, _kill, self._processes)
         # No locks: each process writes rows of its own, and only before it answers.
@@ -233,7 +235,11 @@ class InterNavProcesses(PlainSpec, VectorEnv[Any, Any, Any]):
         """
         chosen = check_options(options, OPTIONS)
         seeds = split_seeds(seed, self.num_envs)
+        super().reset(seed=seeds[0])
         mask, ids, actions, starts = reset_choices(chosen, self.num_envs)
+        for k in np.flatnonzero(mask & ~self._ordered).tolist():
+            if seeds[k] is None:  # drawn here, as one process draws them for all
+                seeds[k] = int(self.np_random.integers(2**32))
         asked = []
         for k, (low, high) in enumerate(self._rows):
             if mask[low:high].any():
@@ -248,6 +254,7 @@ class InterNavProcesses(PlainSpec, VectorEnv[Any, Any, Any]):
         infos = [answers[k][0] if k in answers else {} for k in range(len(self._rows))]
         for k, (_, done) in answers.items():
             self._done[slice(*self._rows[k])] = done
+        self._ordered |= mask
         return self._observations(), concatenate_infos(infos, self._counts)
 
     def step(self, actions: NDArray[np.int64] | Sequence[int]) -> Stepped:
@@ -303,6 +310,7 @@ class InterNavProcesses(PlainSpec, VectorEnv[Any, Any, Any]):
             self._ask(k, "restore", list(states[low:high]))
         infos, done = zip(*self._answers(), strict=True)
         self._done = np.concatenate(done)
+        self._ordered[:] = True
         return self._observations(), concatenate_infos(infos, self._counts)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -313,8 +321,8 @@ class InterNavProcesses(PlainSpec, VectorEnv[Any, Any, Any]):
 
     def close_extras(self, **_: Any) -> None:  # noqa: ANN401 - Gymnasium's signature
         """Stop the processes."""
-        for k in range(len(self._processes)):
-            self._ask(k, "close")
+        for process in self._processes:
+            process.send(("close", ((), {})))
         for process in self._processes:
             process.end(GRACE_S)
         self._end()
@@ -326,7 +334,14 @@ class InterNavProcesses(PlainSpec, VectorEnv[Any, Any, Any]):
         return self._answers()
 
     def _ask(self, k: int, name: str, *given: Any, **named: Any) -> None:  # noqa: ANN401 - of any method
+        if self._asked[k]:
+            # Its answer to an earlier call is still to come, and would be taken for this one's.
+            raise InternavError(
+                f"environments: an earlier call was interrupted before process {k + 1} of "
+                f"{len(self._processes)} had answered; make the environment again"
+            )
         self._processes[k].send((name, (given, named)))
+        self._asked[k] = True
 
     def _answers(self, of: Sequence[int] | None = None) -> list[Any]:
         """Return the answers of some processes, or raise the first error.
@@ -340,6 +355,7 @@ class InterNavProcesses(PlainSpec, VectorEnv[Any, Any, Any]):
                 good, answer = self._processes[k].pipe.recv()
             except (EOFError, OSError):
                 good, answer = False, InternavError(self._death(k))
+            self._asked[k] = False
             (answers if good else errors).append(answer)
         if errors:
             raise errors[0]

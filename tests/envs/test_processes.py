@@ -12,6 +12,7 @@ import psutil
 import pytest
 from gymnasium.spaces import Box
 
+from internav_data.core.processes import GRACE_S
 from internav_data.envs import InterNavProcesses, InterNavVectorEnv, Sensor
 from internav_data.physics.registry import solver_counts
 from internav_data.records.errors import InternavError, UsageError
@@ -96,6 +97,42 @@ def test_a_process_that_is_killed_is_named(small):
     began = time.monotonic()
     env.close()
     assert time.monotonic() - began < LIMIT_S
+
+
+def test_no_answer_is_taken_for_that_of_a_later_call(small, monkeypatch):
+    env = InterNavProcesses(2, small, 2, 16)
+    env.reset(seed=1)
+    with monkeypatch.context() as patch:
+        patch.setattr(env, "_answers", interrupt)  # Ctrl-C in a notebook
+        with pytest.raises(KeyboardInterrupt):
+            env.step([0, 0])
+    for ask in (env.reset, env.state, lambda: env.step([0, 0])):
+        with pytest.raises(InternavError, match="interrupted before process 1 of 2 had answered"):
+            ask()
+    began = time.monotonic()
+    env.close()
+    assert time.monotonic() - began < GRACE_S, "each process ends when it is asked to"
+
+
+def interrupt(*_):
+    raise KeyboardInterrupt
+
+
+def test_seeds_that_are_not_given_are_those_of_one_process(small):
+    def begun(env):
+        with contextlib.closing(env):
+            first = env.reset(seed=[5, None, None, 7])[1]["episode_id"].tolist()
+            return [first, env.reset()[1]["episode_id"].tolist(), env.state()]
+
+    def begun_late(env):
+        """Reset a part that has no seed when it begins."""
+        with contextlib.closing(env):
+            env.reset(seed=5, options={"reset_mask": np.array([True, False, False, False])})
+            env.reset(options={"reset_mask": np.array([False, False, True, True])})
+            return env.reset()[1]["episode_id"].tolist()
+
+    for each in (begun, begun_late):
+        assert each(InterNavProcesses(4, small, 2, 16)) == each(InterNavVectorEnv(4, small, 16))
 
 
 def test_the_pushes_of_all_processes_are_counted(small):
