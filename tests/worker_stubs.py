@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
+import stat
+import struct
 import time
 from pathlib import Path
 
@@ -64,5 +67,21 @@ def slow(seconds):
     def work(task):
         time.sleep(seconds)
         return task
+
+    return work
+
+
+def cut_short(path):
+    """Work whose process is killed the first time, when part of a long result is on its way."""
+
+    def work(number):
+        if not Path(path).exists():
+            Path(path).touch()
+            for fd in range(3, 64):
+                with contextlib.suppress(OSError):  # it is open
+                    if stat.S_ISSOCK(os.fstat(fd).st_mode):
+                        os.write(fd, struct.pack("!i", 1000) + b"part")
+            os.kill(os.getpid(), signal.SIGKILL)
+        return number
 
     return work

@@ -57,7 +57,7 @@ class _Worker(Child):
         """Return the next message, `WorkerExited` when the process is gone."""
         try:
             message: Message = self.pipe.recv()
-        except (EOFError, ConnectionResetError):
+        except (EOFError, OSError):  # OSError: killed within a message
             return WorkerExited(f"its worker {self.exit_cause()}")
         return message
 

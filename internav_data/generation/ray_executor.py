@@ -139,7 +139,7 @@ def _driver(address: str) -> Iterator[tuple[Child, int]]:
 def _next(child: Child) -> Any:  # noqa: ANN401 - what the other side sends
     try:
         return child.pipe.recv()
-    except (EOFError, ConnectionResetError):
+    except (EOFError, OSError):  # OSError: it was killed within a message
         cause = child.exit_cause()
         return Fatal(
             "InternavError", f"the connection to the Ray cluster was lost ({cause}): {_LOST}"

@@ -92,3 +92,8 @@ def test_an_error_in_the_caller_ends_workers_at_once():
         for _ in pool.run([1], tick=lambda: (_ for _ in ()).throw(RuntimeError)):
             pass
     assert time.monotonic() - began < 45, "it does not wait for the task"
+
+
+def test_a_worker_killed_within_a_message_costs_a_retry_too(tmp_path):
+    results = outcomes(Recipe(worker_stubs.cut_short, str(tmp_path / "began")), [1], 1)
+    assert results == [Done(1, 1)]
