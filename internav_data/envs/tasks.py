@@ -281,7 +281,8 @@ class _MoveAside(InteractiveNavigation):
             self.statistics.auxiliary_reward += extra
             self.statistics.reward += extra
             reward += extra
-        return reward, ended
+        # Full hands refuse the main task's Done, at its goal alone: here it is paid, and ends.
+        return reward, ended or result.action.kind == "done"
 
     def metrics(self) -> dict[str, float | int | bool]:
         """Return the metrics of the episode; it has no path to the goal, so no SPL and no STS."""

@@ -107,6 +107,18 @@ def test_done_pays_where_the_obstacle_is_out_of_the_way_and_only_there(tasks):
     assert {(False, False), (True, True)} <= paid
 
 
+def test_done_with_full_hands_at_the_goal_is_paid_once(tasks):
+    task = tasks(("pick",), hands="real")
+    (play,) = runs(task)
+    task.step(np.array([PICKUP]))
+    assert play.world.carrying
+    play.world.i, play.world.j = play.world.goal
+    _, reward, ended, _, infos = task.step(np.array([DONE]))
+    assert infos["reason"][0] == "hands are full"
+    assert reward[0] == pytest.approx(STEP + SUCCESS)
+    assert ended[0], "else the next Done would be paid again"
+
+
 def test_each_task_has_a_success_of_its_own(tasks):
     *_, infos = tasks().step(np.full(len(NAMES), DONE))
     for name in ("navigate", "push", "pick"):
