@@ -91,7 +91,8 @@ class Trainer:
     Raises
     ------
     UsageError
-        Settings contradict each other, or the dataset has no such episodes.
+        A setting is out of its bounds, settings contradict each other, or the dataset has no such
+        episodes.
     """
 
     def __init__(
@@ -100,6 +101,7 @@ class Trainer:
         self.run, self.method, self.config = request.out, request.method, request.config
         self._request, self.state, self._checkpoint = request, state, checkpoint
         config = request.config
+        config.check()  # it may be made by hand, and no checkpoint of it could be read
         torch.set_num_threads(config.run.threads)
         self.data = TrainingData(
             request.dataset, config.data.filter, config.cloning.expert, request.task

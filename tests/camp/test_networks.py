@@ -80,6 +80,17 @@ def test_an_agent_without_pictures_has_no_convolutions(config, observations):
     assert encoder(observations).shape == (2, 3, config.network.goal_embedding + 1 + 4)
 
 
+def test_an_agent_need_not_take_the_goal(config, observations):
+    class Blind(PPOAgent):
+        sensors = ("held", "horizon")
+
+    agent = Blind(config)
+    shown = {name: observations[name][0] for name in agent.sensors}
+    state, begun = agent.initial_state(3), torch.ones(3, dtype=torch.bool)
+    assert agent.act(shown, state, begun, None).action.shape == (3,)
+    assert agent.value(shown, state).shape == (3,)
+
+
 def test_the_goal_is_far_from_a_place_a_step_beside_it(config):
     """In the embedding of a new encoder: the distance alone would tell them apart by a tenth."""
     encoder = networks.GoalEncoder(config.network)

@@ -333,6 +333,18 @@ def test_settings_come_from_preset_file_options_and_overrides(tmp_path):
         config_of("small", None, [], {"seed": -1})
 
 
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [({"gamma": 2.0}, r"ppo\.gamma is 2\.0"), ({"chunk_steps": 3}, r"ppo\.chunk_steps is 3")],
+)
+def test_a_config_made_by_hand_is_checked_before_anything_is_written(request_for, changes, words):
+    given = request_for("odd", "ppo")
+    config = replace(given.config, ppo=replace(given.config.ppo, **changes))
+    with pytest.raises(UsageError, match=words):
+        begin(replace(given, config=config))
+    assert not given.out.exists()
+
+
 def test_an_agent_whose_replay_differs_is_refused_at_its_first_rollout(request_for, monkeypatch):
     class Forgetful(PPOAgent):
         """It computes other probabilities than it drew from."""

@@ -303,4 +303,6 @@ class Agent(nn.Module, ABC, Generic[R]):
 def _new_step(observations: ObservationTensors, state: State) -> Batch[Any]:
     """Return a new step, (n, …) by sensor, that begins no episode, as a batch (1, n, …)."""
     seen = {name: values.unsqueeze(0) for name, values in observations.items()}
-    return Batch(seen, torch.zeros_like(seen["goal"][..., 0], dtype=torch.bool), state, None)
+    shown = next(iter(seen.values()))  # of any sensor: an agent need not take the goal
+    begun = torch.zeros(shown.shape[:2], dtype=torch.bool, device=shown.device)
+    return Batch(seen, begun, state, None)
