@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
 import socket
 import time
@@ -14,7 +15,7 @@ from pathlib import Path
 from typing import Any, Final, Self, TextIO
 
 from internav_data.core.progress import ProgressLine, clock
-from internav_data.records.errors import CorruptDataError
+from internav_data.records.errors import CorruptDataError, NotFiniteError
 
 Row = dict[str, Any]
 """Plain JSON: numbers by name, one level of groups."""
@@ -69,9 +70,14 @@ class MetricsLogger:
 
         Raises
         ------
+        NotFiniteError
+            A number of the row is NaN or infinite, as a task's own metric may be.
         OSError
             The disk is full: the log ends with the last row that is whole.
         """
+        odd = [name for name, value in _scalars(row) if not math.isfinite(value)]
+        if odd:
+            raise NotFiniteError(f"{self._file.name}: {', '.join(odd)}: no finite number to log")
         line = (json.dumps(row, allow_nan=False) + "\n").encode()
         try:
             write_all(self._file, line)

@@ -19,7 +19,7 @@ from internav_data.camp.run import begin, resume  # noqa: E402
 from internav_data.camp.train import Request  # noqa: E402
 from internav_data.envs.tasks import InteractiveNavigation  # noqa: E402
 from internav_data.envs.vector import InterNavVectorEnv  # noqa: E402
-from internav_data.records.errors import UsageError  # noqa: E402
+from internav_data.records.errors import NotFiniteError, UsageError  # noqa: E402
 from internav_data.world.actions import Action  # noqa: E402
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "own_reward.py"
@@ -88,3 +88,17 @@ def test_a_task_needs_a_name_of_its_own(scenes, tmp_path):
     with pytest.raises(UsageError, match="'interactive' is another task's"):
         begin(Request(scenes, tmp_path / "run", task=Nameless))
     assert not (tmp_path / "run" / "checkpoints.json").exists()
+
+
+def test_a_metric_of_ones_own_that_is_no_number_ends_the_run_in_one_line(scenes, tmp_path):
+    class Undefined(InteractiveNavigation):
+        name = "undefined"
+
+        def metrics(self):
+            return {**super().metrics(), "own": float("nan")}
+
+    config = config_of("small", None, [*TINY, "run.workers=0"])
+    request = Request(scenes, tmp_path / "run", "ppo", config, task=Undefined)
+    with pytest.raises(NotFiniteError, match=r"log\.jsonl: episode/own: no finite number"):
+        begin(request)
+    assert read(request.out).progress["updates"] == 0, "the last checkpoint stands"
