@@ -120,6 +120,8 @@ class FindingCollector:
         self.found: list[Finding] = []
         self.differences: list[Finding] = []
         """Results of another kind than on the hardware that made the data."""
+        self.differing: Counter[str] = Counter()
+        """Number of those of each predicate, those that are not kept too."""
         self.counts: Counter[str] = Counter()
         self.by_predicate: Counter[str] = Counter()
         self.notes: Counter[str] = Counter()
@@ -156,6 +158,7 @@ class FindingCollector:
     def differ(self, predicate: str, expected: object, got: object, episode: str) -> None:
         """Note a result of another kind than on the hardware that made the data."""
         self.counts["differing"] += 1
+        self.differing[predicate] += 1
         if len(self.differences) < MAX_FINDINGS:
             self.differences.append(
                 Finding(self.file, self.scene, episode, predicate, _text(expected), _text(got))
@@ -173,7 +176,7 @@ class FindingCollector:
         ] += self.counts["made elsewhere"]
         if differing > max(1.0, MAX_DIFFERING * compared):
             self.found = sorted(self.found + self.differences)[:MAX_FINDINGS]
-            self.by_predicate.update(found.predicate for found in self.differences)
+            self.by_predicate += self.differing
             return
         for found in sorted(self.differences)[:MAX_SHOWN]:
             self.notes[f"ends otherwise here: {found}"] += 1
@@ -182,6 +185,7 @@ class FindingCollector:
         """Add the findings and counts of another collector."""
         self.found = sorted(self.found + other.found)[:MAX_FINDINGS]
         self.differences = sorted(self.differences + other.differences)[:MAX_FINDINGS]
+        self.differing += other.differing
         self.counts += other.counts
         self.by_predicate += other.by_predicate
         self.notes += other.notes

@@ -335,3 +335,18 @@ def test_findings_are_counted_beyond_what_is_kept():
     assert findings.found == tuple(sorted(findings.found))
     assert not findings.ok
     assert "3000 findings" in findings.summary()
+
+
+def test_differences_that_are_findings_are_counted_beyond_what_is_kept():
+    reports = []
+    for number in range(3):
+        report = FindingCollector("file", f"scene-{number}")
+        for k in range(MAX_FINDINGS):
+            report.differ("some.predicate", 0, k, f"episode-{k}")
+        reports.append(report)
+    whole = join(reports)
+    whole.judge_differences("another processor")
+    findings = whole.findings("physics")
+    assert len(findings.found) == MAX_FINDINGS
+    assert findings.by_predicate == {"some.predicate": 3 * MAX_FINDINGS}
+    assert findings.total == 3 * MAX_FINDINGS
