@@ -102,7 +102,7 @@ def _print_counts(rows: list[dict[str, object]], spawnable: int) -> None:
     for row in rows:
         mark = "" if row["obstacle"] else "  furniture only"
         click.echo(f"{row['type']:<20}" + "".join(f"{row[name]:>10}" for name in columns) + mark)
-    click.echo(f"{spawnable} assets can be spawned on an agent's way")
+    click.echo(f"{spawnable} assets can be spawned on an agent's path")
 
 
 def _draw(path: Path, known: Catalogue, kind: str | None) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -134,6 +135,8 @@ Exit codes: 0 good, 1 error, 2 usage, 5 corrupt data, 6 NaN or infinity,
 @click.option("--dry-run", is_flag=True, help="Tell how long it would take; write nothing.")
 @click.option("--print-config", is_flag=True, help="Print all settings as TOML and stop.")
 @JSON
+@click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error.")
+@click.version_option(package_name="internav-data", prog_name="camp-train")
 def command(**given: Any) -> int:  # noqa: ANN401 - the options above
     """Train an agent on DATASET: CaMP, one of its baselines, or your own."""
     if given["print_config"]:
@@ -214,8 +217,8 @@ def _train(request: Request, given: dict[str, Any]) -> int:
     if not trainer.ranks.first:
         return 0
     click.echo(teller.summary(request.out), err=True)
-    named = "" if given["dataset"] is None else f" {request.dataset}"
-    click.echo(f"measure it: camp-eval {request.out}{named}", err=True)
+    named = [request.out] if given["dataset"] is None else [request.out, request.dataset]
+    click.echo(f"measure it: {shlex.join(['camp-eval', *map(str, named)])}", err=True)
     if given["as_json"]:
         click.echo(json.dumps(teller.plain(request.out)))
     return 0

@@ -32,7 +32,8 @@ def command(*, dataset: Path | None, split: str | None, as_json: bool) -> int:
 
         click.echo(json.dumps(stats, indent=2))
         return 0
-    click.echo(f"{stats['scenes']} scenes, {stats['episodes']} episodes")
+    parts = ", ".join(f"{name} {number}" for name, number in stats["splits"].items() if number)
+    click.echo(f"{stats['scenes']} scenes, {stats['episodes']} episodes: {parts}")
     for line in table2_lines(stats):
         click.echo(line)
     blocked, sealed = stats["modes"].get("blocked", 0), stats["sealed"]
@@ -89,7 +90,7 @@ def interaction_lines(stats: dict[str, Any]) -> list[str]:
         worked = sum(row["possible"] * row["success_share"] for row in rows)
         lines.append(
             f"{name}: {possible} possible, {worked / max(1, possible):.1%} succeed, "
-            f"{sum(row['opened'] for row in rows)} open a blocked way"
+            f"{sum(row['opened'] for row in rows)} open a blocked path"
         )
     lines[-1] += f"; {stats['openable_share_of_blocked']:.1%} of the blocked open by one of these"
     both = stats["agreement"]

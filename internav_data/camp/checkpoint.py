@@ -42,6 +42,8 @@ if TYPE_CHECKING:
 FORMAT: Final = 3
 FOLDER: Final = "checkpoints"
 POINTER: Final = "checkpoints.json"
+_NAMED: Final = ("last", "best")
+"""Checkpoints that a run's list names."""
 _SERIAL: Final = re.compile(r"\d{6,}")
 """Name of a checkpoint's folder in a run."""
 ABOUT, WEIGHTS, TRAINING = "checkpoint.json", "weights.safetensors", "training.safetensors"
@@ -147,6 +149,8 @@ def find(path: Path, which: str = "last") -> Path:
     """
     if (path / ABOUT).is_file():
         return path
+    if which not in _NAMED:
+        raise UsageError(f"which: expected one of {', '.join(_NAMED)}, got {which!r}")
     name = _pointer(path).get(which)
     if name is None:
         raise UsageError(

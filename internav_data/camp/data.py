@@ -78,11 +78,11 @@ class TrainingData:
         if not len(found):
             what = "scenes of a single room" if single_room else "training episodes"
             what += " for which --filter holds" if self._where else ""
-            advice = (
-                "generate some (--rooms 1-3), or train --stages all"
-                if single_room
-                else "`internav-gen stats` tells what it holds"
-            )
+            advice = "`internav-gen stats` tells what it holds"
+            if single_room:
+                advice = "generate some (--rooms 1-3), or train --stages all"
+            elif not self._where:
+                advice = "of every 120 scenes the first two are val and test, so make more --scenes"
             raise UsageError(f"{self.path}: there are no {what}; {advice}")
         return found
 

@@ -289,9 +289,8 @@ def _unknown(key: str, where: str, known: Sequence[str], elsewhere: Sequence[str
     near += [by_last[name] for name in get_close_matches(key.rsplit(".", 1)[-1], by_last, 2)]
     names = list(dict.fromkeys(near)) or list(known)
     listed = " or ".join(f"'{name}'" for name in names[:2]) if near else ", ".join(names)
-    return UsageError(
-        f"{where}: there is no key {key!r}; " + (f"did you mean {listed}?" if near else listed)
-    )
+    hint = f"did you mean {listed}?" if near else f"there are {listed}"
+    return UsageError(f"{where}: there is no key {key!r}; {hint}")
 
 
 def _hint_of(config: object, key: str) -> Any:  # noqa: ANN401 - a type hint

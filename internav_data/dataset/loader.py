@@ -331,7 +331,9 @@ class Dataset(Generic[E]):
         cache, rows = self._scenes
         if scene_id not in rows:
             place = f"{self.path}: split {self.split}" if self.split else self.path
-            raise UsageError(f"{place}: no scene {scene_id!r} (ids look like scene-000017)")
+            raise UsageError(
+                f"{place}: no scene {scene_id!r} among its {len(rows)} (ids look like scene-000017)"
+            )
         return self._houses.get(scene_id, lambda: cast("House", cache.row(rows[scene_id])))
 
     def to_table(self, columns: Sequence[str] | str | None = None) -> pa.Table:

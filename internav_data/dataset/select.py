@@ -119,7 +119,12 @@ def matching_rows(store: Store, files: Sequence[DataFile], filters: Filters) -> 
     try:
         kept = pa.table(columns).filter(pq.filters_to_expression(plain))["row number"]
     except (ValueError, TypeError, pa.ArrowInvalid, pa.ArrowNotImplementedError) as error:
-        raise UsageError(f"filters: {error}: expected as in [('room_count', '>=', 4)]") from error
+        plain_columns = [field for field in table.schema if not pa.types.is_nested(field.type)]
+        types = ", ".join(f"{field.name} is {field.type}" for field in plain_columns)
+        raise UsageError(
+            f"filters: {error}: expected as in [('room_count', '>=', 4)]"
+            + (f"; {types}" if types else "")
+        ) from error
     numbers: NDArray[np.int64] = kept.to_numpy()
     return numbers
 

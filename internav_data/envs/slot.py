@@ -45,6 +45,8 @@ class Arguments(TypedDict, total=False):
     privileged: Sequence[Privilege]
 
 
+_OWN_ARGUMENTS: Final = ("dataset", "image_size", "render_mode", "sensors")
+"""Arguments that environments take besides, each by itself."""
 _MAX_ACTIONS: Final = 100_000
 """Number of actions of a snapshot that are read: more are no episode."""
 
@@ -358,8 +360,9 @@ def check_options(options: Mapping[str, Any] | None, known: tuple[str, ...]) -> 
 
 
 def _check_names(arguments: Mapping[str, Any]) -> None:
-    unknown = sorted(set(arguments) - set(Arguments.__annotations__))
+    known = Arguments.__annotations__
+    unknown = sorted(set(arguments) - set(known))
     if unknown:
         raise UsageError(
-            f"InterNav: no argument {unknown[0]!r}; there are {sorted(Arguments.__annotations__)}"
+            f"InterNav: no argument {unknown[0]!r}; there are {sorted({*known, *_OWN_ARGUMENTS})}"
         )

@@ -94,6 +94,8 @@ def test_last_and_best_are_kept_and_no_other(tmp_path, made):
     assert read(tmp_path, "best").progress["updates"] == 2
     assert checkpoints.best_score(tmp_path) == 0.5
     assert len(list((tmp_path / checkpoints.FOLDER).iterdir())) == 2
+    with pytest.raises(UsageError, match="which: expected one of last, best, got 'first'"):
+        read(tmp_path, "first")
 
 
 @pytest.mark.parametrize("victim", ["save_file", "file_sha256", "write_atomically", "sync"])

@@ -266,7 +266,7 @@ def test_resume_refuses_another_dataset_and_damage(request_for, scenes, houses):
     given = request_for("moved", "ppo")
     with pytest.raises(InterruptedRunError):
         begin(replace(given, interrupted=after(6)))
-    with pytest.raises(UsageError, match="no training episodes"):
+    with pytest.raises(UsageError, match="no training episodes; of every 120 scenes the first two"):
         resume(Request(houses, given.out, "ppo", given.config), {})
     log = given.out / "log.jsonl"
     kept = log.read_bytes()

@@ -2,10 +2,12 @@
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
 import time
+from importlib.metadata import version
 from pathlib import Path
 
 import psutil
@@ -48,6 +50,34 @@ def test_help_is_fast_and_has_examples():
     )
     assert "Examples:" in done.stdout
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_a_bug_names_a_command_that_shows_where(call, dataset, monkeypatch, capsys):
+    """`camp-train` takes `--debug` as the other commands do, wherever it stands."""
+    import internav_data.camp.run
+
+    def broken(*_):
+        raise ZeroDivisionError("a bug")
+
+    monkeypatch.setattr(internav_data.camp.run, "begin", broken)
+    code, _, err = call(dataset, *TINY, "--out", "a run")
+    assert code == 1
+    shown = err.split("this is a bug: `")[1].split("`")[0]
+    program, *words = shlex.split(shown)
+    assert program == "camp-train"
+    for asked in (words, [*words[1:], words[0]]):
+        with pytest.raises(SystemExit, match="1"):
+            main(asked)
+        assert 'raise ZeroDivisionError("a bug")' in capsys.readouterr().err
+    assert call("--version")[:2] == (0, f"camp-train, version {version('internav-data')}\n")
+
+
+def test_the_command_that_measures_a_run_can_be_pasted(call, dataset):
+    code, _, err = call(dataset, *TINY, "--steps", 32, "--out", "my run")
+    assert code == 0, err
+    (named,) = [line for line in err.splitlines() if line.startswith("measure it: ")]
+    words = shlex.split(named.removeprefix("measure it: "))
+    assert words == ["camp-eval", "my run", str(dataset)]
 
 
 def test_a_run_is_trained_and_measured(call, dataset, tmp_path):

@@ -181,6 +181,7 @@ def test_a_mesh_without_volume_is_named(tmp_path):
 def test_commands_that_read_a_dataset(dataset, tmp_path):
     stats = run("stats", dataset)
     assert stats.returncode == 0
+    assert stats.stdout.startswith("3 scenes, 5 episodes: train 2, val 2, test 1\n")
     assert "Table 2 of the paper" in stats.stdout
     assert "expert: solves 5 (100.0%)" in stats.stdout
     assert "the expert refused" in stats.stdout

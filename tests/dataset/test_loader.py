@@ -132,6 +132,11 @@ def test_an_error_of_filters_states_the_expected_form(ds, filters):
         load_dataset(ds.path, filters=filters)
 
 
+def test_an_error_of_a_filters_value_tells_the_columns_type(ds):
+    with pytest.raises(UsageError, match="room_count is int16"):
+        load_dataset(ds.path, filters=[("room_count", ">", "four")])
+
+
 def test_an_empty_choice_of_columns_gives_none(ds):
     assert ds.to_table([]).column_names == []
     pytest.importorskip("torch")
@@ -302,7 +307,7 @@ def test_a_split_needs_no_file_of_another_one(damaged_folder, split):
     with pytest.raises(CorruptDataError, match="missing"):
         load_dataset(damaged_folder)
     other = "scene-000001" if split != "test" else "scene-000000"
-    with pytest.raises(UsageError, match=f"split {split}: no scene '{other}'"):
+    with pytest.raises(UsageError, match=f"split {split}: no scene '{other}' among its"):
         ds.scene(other)
 
 
