@@ -144,8 +144,10 @@ def concatenate_infos(parts: Sequence[dict[str, Any]], counts: Sequence[int]) ->
         if isinstance(first, dict):
             whole[key] = concatenate_infos([value or {} for value in given], counts)
             continue
-        fill = None if first.dtype == object else 0
-        column = np.full(int(ends[-1]), fill, dtype=first.dtype)
+        # Of numbers that one part has as whole ones, another may have fractions.
+        dtype = np.result_type(*(value.dtype for value in given if value is not None))
+        fill = None if dtype.kind == "O" else 0
+        column = np.full(int(ends[-1]), fill, dtype=dtype)
         for value, count, end in zip(given, counts, ends.tolist(), strict=True):
             if value is not None:
                 column[end - count : end] = value

@@ -331,6 +331,7 @@ class InterNavVectorEnv(Rebuilt, VectorEnv[Any, Any, Any]):
                 empty = None if kind is object else 0
                 column = np.array([info.get(name, empty) for _, info in parts], dtype=kind)
                 infos[name], infos[f"_{name}"] = column, mask.copy()
+        _unify_metrics([info for _, info in parts])
         for k, info in parts:
             rest: dict[str, Any] = {key: info[key] for key in _RARE if key in info}
             if rest:
@@ -339,6 +340,30 @@ class InterNavVectorEnv(Rebuilt, VectorEnv[Any, Any, Any]):
 
     def _observations(self) -> Observations:
         return self._buffer.copied() if self._copy else self._buffer.buffers
+
+
+def _unify_metrics(infos: Sequence[dict[str, Any]]) -> None:
+    """Give each metric of a step one type in all environments: a task may return 0 here, 0.5 there.
+
+    Gymnasium makes an array of the first one's type, and would cut 0.5 to 0.
+    """
+    found = [
+        info for one in infos for info in (one, one.get("final_info", {})) if "metrics" in info
+    ]
+    kinds: dict[str, set[type]] = {}
+    for info in found:
+        for name, value in info["metrics"].items():
+            kinds.setdefault(name, set()).add(type(value))
+    mixed = {
+        name: float if any(issubclass(kind, float) for kind in given) else int
+        for name, given in kinds.items()
+        if len(given) > 1 and all(issubclass(kind, int | float) for kind in given)
+    }
+    for info in found if mixed else ():
+        info["metrics"] = {
+            name: mixed[name](value) if name in mixed else value
+            for name, value in info["metrics"].items()
+        }
 
 
 def reset_choices(

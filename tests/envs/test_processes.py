@@ -14,8 +14,10 @@ from gymnasium.spaces import Box
 
 from internav_data.core.processes import GRACE_S
 from internav_data.envs import InterNavProcesses, InterNavVectorEnv, Sensor
+from internav_data.envs.tasks import InteractiveNavigation
 from internav_data.physics.registry import solver_counts
 from internav_data.records.errors import InternavError, UsageError
+from internav_data.world.actions import Action
 
 LIMIT_S = 120.0
 SCRIPT = """
@@ -133,6 +135,37 @@ def test_seeds_that_are_not_given_are_those_of_one_process(small):
 
     for each in (begun, begun_late):
         assert each(InterNavProcesses(4, small, 2, 16)) == each(InterNavVectorEnv(4, small, 16))
+
+
+@pytest.mark.parametrize("mode", ["Disabled", "SameStep"])
+def test_metrics_that_are_whole_in_some_environments_keep_the_fractions_of_others(small, mode):
+    given = {"image_size": 16, "task": Ratio, "autoreset_mode": mode}
+    alone, processes = InterNavVectorEnv(4, small, **given), InterNavProcesses(4, small, **given)
+    with contextlib.closing(alone), contextlib.closing(processes):
+        firsts = set()
+        for seed in range(8):
+            for env in (alone, processes):
+                env.reset(seed=seed)
+            ratios = [ratio(slot.run.world) for slot in alone.slots]
+            firsts.add(ratios[0])
+            for env in (alone, processes):
+                info = env.step(np.full(4, Action.DONE))[4]
+                info = info["final_info"] if mode == "SameStep" else info
+                np.testing.assert_array_equal(info["metrics"]["ratio"], ratios)
+        assert firsts == {0, 0.75}
+
+
+class Ratio(InteractiveNavigation):
+    """The main task, with a metric that is the whole number 0 in some episodes."""
+
+    name = "ratio"
+
+    def metrics(self):
+        return {**super().metrics(), "ratio": ratio(self.world)}
+
+
+def ratio(world):
+    return 0 if sum(world.goal) % 2 else 0.75
 
 
 def test_the_pushes_of_all_processes_are_counted(small):
