@@ -168,9 +168,14 @@ class Dataset(Generic[E]):
     @overload
     def __getitem__(self, item: slice) -> list[E]: ...
 
-    def __getitem__(self, item: int | slice) -> E | list[E]:
+    def __getitem__(self, item: int | slice | str) -> E | list[E]:
         if isinstance(item, slice):
             return self.__getitems__(range(*item.indices(len(self))))
+        if isinstance(item, str):
+            raise UsageError(
+                f"episode {item!r}: episodes are numbered; load the one with this id by "
+                f"filters=[('episode_id', '=', {item!r})]"
+            )
         number = int(item)
         if not -len(self) <= number < len(self):
             raise IndexError(f"episode {number} of {len(self)}")

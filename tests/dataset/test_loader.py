@@ -137,6 +137,13 @@ def test_an_error_of_a_filters_value_tells_the_columns_type(ds):
         load_dataset(ds.path, filters=[("room_count", ">", "four")])
 
 
+def test_an_episodes_id_is_no_number(ds, everything):
+    chosen = everything[1].episode_id
+    with pytest.raises(UsageError, match=r"filters=\[\('episode_id', '=', "):
+        ds[chosen]
+    assert load_dataset(ds.path, filters=[("episode_id", "=", chosen)])[0] == everything[1]
+
+
 def test_an_empty_choice_of_columns_gives_none(ds):
     assert ds.to_table([]).column_names == []
     pytest.importorskip("torch")
