@@ -34,6 +34,8 @@ _PIECE = 4 << 20
 _ENDING_S = 1.0
 """Seconds that the children of a killed process, which hold its lock too, may take to end."""
 _POLL_S = 0.02
+_EXHAUSTED = {errno.EMFILE, errno.ENFILE, errno.EAGAIN, errno.ENOMEM}
+"""Errors of a system that has no more open files, processes or memory to give."""
 TEMPORARY = ".tmp"
 """Suffix of unfinished files in a folder; a kill leaves one behind."""
 _TEMPORARY_NAME = re.compile(rf"((?:.*/)?)\.([^/]+)\.\d+{re.escape(TEMPORARY)}")
@@ -342,7 +344,8 @@ def disk_errors(
     Raises
     ------
     InternavError
-        The disk is full, read-only, or otherwise fails.
+        The disk is full, read-only, or otherwise fails; or the system has no more files, processes
+        or memory to give.
 
     """
     try:
@@ -350,6 +353,11 @@ def disk_errors(
     except OSError as error:
         where = error.filename or place
         reason = f"{error.strerror or error}{_free_bytes(error, place)}"
+        if error.errno in _EXHAUSTED:
+            raise InternavError(
+                f"{where}: {reason}: ask for fewer workers, or raise the limit of the system "
+                f"(ulimit -n: open files, -u: processes, -v: memory); then {then}"
+            ) from error
         raise InternavError(
             f"cannot write to {where}: {reason}; make it writable or free some space, then {then}"
         ) from error

@@ -144,11 +144,13 @@ class ResultCache:
         """Delete all values, of all processes, and warn."""
         with self._lock:
             self._new.clear()
+            begun = self._ask("BEGIN IMMEDIATE") is not None
+            self._read_index()  # others may have written since: no row number comes again
             self._index.clear()
             # The empty batch keeps row numbers growing, by which other processes read on.
             marker = (self._index.end, b"")
             done = (
-                self._ask("BEGIN IMMEDIATE") is not None
+                begun
                 and self._ask("DELETE FROM solutions") is not None
                 and self._ask("DELETE FROM batches") is not None
                 and self._ask("INSERT INTO batches VALUES (?, ?)", *marker) is not None

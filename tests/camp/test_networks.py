@@ -14,6 +14,7 @@ from torch import nn
 from internav_data.camp import agents, networks
 from internav_data.camp.agents import make_agent
 from internav_data.camp.agents.flat import PPOAgent
+from internav_data.camp.agents.hierarchy import Hierarchy
 from internav_data.camp.config import config_of, preset
 from internav_data.envs.house_map import MAP_SIZE
 from internav_data.envs.sensors import DEFAULT_SENSORS, sensor_names
@@ -89,6 +90,14 @@ def test_an_agent_need_not_take_the_goal(config, observations):
     state, begun = agent.initial_state(3), torch.ones(3, dtype=torch.bool)
     assert agent.act(shown, state, begun, None).action.shape == (3,)
     assert agent.value(shown, state).shape == (3,)
+
+
+@pytest.mark.parametrize("kind", [PPOAgent, Hierarchy])
+def test_the_sensors_of_an_agent_of_ones_own_are_taken(config, kind):
+    class Mine(kind):
+        sensors = (*DEFAULT_SENSORS, "ids")
+
+    assert Mine(config).sensors == Mine.sensors
 
 
 def test_the_goal_is_far_from_a_place_a_step_beside_it(config):

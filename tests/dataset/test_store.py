@@ -1,5 +1,6 @@
 """Datasets in any store; the folder as a store."""
 
+import errno
 import multiprocessing
 import os
 import pickle
@@ -20,6 +21,7 @@ from internav_data.core.storage import (
     OutsideError,
     Store,
     StoreError,
+    disk_errors,
     exists,
     store_of,
 )
@@ -34,7 +36,7 @@ from internav_data.dataset import (
     read_manifest,
     shards,
 )
-from internav_data.records.errors import CorruptDataError, UsageError
+from internav_data.records.errors import CorruptDataError, InternavError, UsageError
 
 
 class Bucket:
@@ -379,3 +381,12 @@ def test_a_full_disk_leaves_the_old_folder(tmp_path, monkeypatch):
     with pytest.raises(OSError, match="No space"):
         storage.write_folder_atomically(tmp_path / "x", lambda folder: (folder / "a").touch())
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("number", [errno.EMFILE, errno.ENFILE, errno.EAGAIN, errno.ENOMEM])
+def test_what_the_system_has_no_more_of_is_no_fault_of_the_disk(tmp_path, number):
+    refused = pytest.raises(InternavError, match="ask for fewer workers")
+    with refused as error, disk_errors(tmp_path, "try again"):
+        raise OSError(number, os.strerror(number))
+    assert str(error.value).startswith(f"{tmp_path}: {os.strerror(number)}: ")
+    assert "free some space" not in str(error.value)

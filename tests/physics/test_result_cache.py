@@ -244,6 +244,20 @@ def test_who_finds_the_tables_made_meanwhile_writes_and_lets_others_write(tmp_pa
     assert known(ResultCache(tmp_path), range(2)) == {0, 1}
 
 
+def test_a_process_that_drops_all_values_knows_of_those_that_others_wrote(tmp_path):
+    behind, other = ResultCache(tmp_path), ResultCache(tmp_path)
+    fill(other, range(5))
+    other.flush()
+    with pytest.warns(UserWarning, match="all solutions in it are deleted"):
+        behind.drop("a solution in this cache was wrong")
+    for cache, numbers in ((behind, range(10, 18)), (other, range(20, 28))):
+        fill(cache, numbers)
+        cache.flush()
+    assert behind.is_open
+    assert other.is_open
+    assert known(other, range(30)) == {*range(10, 18), *range(20, 28)}
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
 def test_a_forked_process_leaves_its_parents_file_alone(tmp_path):
     held = ResultCache(tmp_path)

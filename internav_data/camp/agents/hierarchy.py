@@ -314,7 +314,7 @@ class Hierarchy(Agent[HierarchyRecord]):
         self.hand_back_step = temporally_extended and agent.hand_back_step
         variant = agent.intent if temporally_extended else "none"
         self.uses_intent = variant != "none"
-        self.sensors = networks.observation_sensors(network)
+        self.sensors = networks.observation_sensors(network, self.sensors)
         count = 1 if network.shared_encoder else 3
         encoders = [
             networks.Encoder(network, self.sensors, self.sensor_encoders) for _ in range(count)
