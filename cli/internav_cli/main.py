@@ -106,8 +106,9 @@ def launch(command: click.Command, program: str, arguments: list[str] | None = N
     """Run a command line and exit with its code; every error becomes one line."""
     prepare_streams()
     given = sys.argv[1:] if arguments is None else arguments
-    # A group takes it before its command only.
-    debug = "--debug" in (given[:1] if isinstance(command, click.Group) else given)
+    debug = "--debug" in given
+    if debug:  # wherever it stands; click takes a group's before its command only
+        given = ["--debug", *(word for word in given if word != "--debug")]
     # A warning is a line for the user, not a place in the source.
     warnings.showwarning = lambda message, *_, **_k: click.echo(
         _line(program, f"warning: {message}"), err=True

@@ -18,6 +18,7 @@ from internav_data.camp.stages import PARTS
 from internav_data.camp.train import Request, Trainer
 from internav_data.core.config import config_toml, known_keys, nested, plain
 from internav_data.core.storage import disk_errors, lock_folder, write_atomically
+from internav_data.dataset import has_manifest
 from internav_data.records.errors import UsageError
 
 CONFIG: Final = "config.toml"
@@ -52,13 +53,15 @@ def begin(request: Request) -> Trainer:
     Raises
     ------
     UsageError
-        There is a run already, or a setting is out of its bounds.
+        There is a run already, or a dataset; or a setting is out of its bounds.
     LockedError
         Another process trains this run.
     InternavError
         The disk is full; the last checkpoint is whole.
     """
     out = request.out
+    if has_manifest(out):
+        raise UsageError(f"{out}: --out: a dataset is there; choose another folder for the run")
     with _writing(out):
         if has_checkpoint(out) or ((out / LOG).exists() and not (out / CONFIG).exists()):
             raise UsageError(

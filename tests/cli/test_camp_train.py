@@ -72,6 +72,14 @@ def test_a_bug_names_a_command_that_shows_where(call, dataset, monkeypatch, caps
     assert call("--version")[:2] == (0, f"camp-train, version {version('internav-data')}\n")
 
 
+def test_no_run_is_written_into_a_dataset(call, dataset):
+    before = sorted(path.name for path in dataset.iterdir())
+    code, _, err = call(dataset, *TINY, "--steps", 32, "--out", dataset)
+    assert code == 2
+    assert f"{dataset}: --out: a dataset is there" in err
+    assert sorted(path.name for path in dataset.iterdir()) == before
+
+
 def test_the_command_that_measures_a_run_can_be_pasted(call, dataset):
     code, _, err = call(dataset, *TINY, "--steps", 32, "--out", "my run")
     assert code == 0, err

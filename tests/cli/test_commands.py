@@ -53,6 +53,15 @@ def dataset(tmp_path_factory):
 SMALL = ("--scenes", 3, "--episodes-per-scene", 2, "--rooms", 1, "--workers", 1)
 
 
+@pytest.mark.parametrize(
+    "words", [("--debug", "stats", "nowhere"), ("stats", "nowhere", "--debug")]
+)
+def test_a_traceback_is_shown_wherever_it_is_asked_for(words):
+    done = subprocess.run([GEN, *words], capture_output=True, text=True, check=False, timeout=300)
+    assert "Traceback" in done.stderr
+    assert done.returncode == 5
+
+
 @pytest.mark.parametrize("words", [("--help",), ("generate", "--help"), ("validate", "--help")])
 def test_help_has_examples_and_is_fast(words):
     seconds = []
