@@ -173,6 +173,7 @@ def from_mapping(
     where: str,
     elsewhere: Sequence[str] = (),
     prefix: str = "",
+    known: Sequence[str] = (),
 ) -> C:
     """Return a config with some values replaced.
 
@@ -188,6 +189,8 @@ def from_mapping(
         Names that are options of the command line only.
     prefix
         Dotted key of the config itself, ending in a dot; empty at the top.
+    known
+        All dotted keys from the top, which an unknown one may have been meant for.
 
     Raises
     ------
@@ -197,16 +200,17 @@ def from_mapping(
     """
     hints = typing.get_type_hints(type(config))
     fields = {field.name for field in dataclasses.fields(config)}
+    known = known or known_keys(config)
     changes: dict[str, Any] = {}
     for name, value in values.items():
         key = prefix + name
         if name not in fields:
-            raise _unknown(key, where, known_keys(config, prefix), elsewhere)
+            raise _unknown(key, where, known, elsewhere)
         current = getattr(config, name)
         if dataclasses.is_dataclass(current) and not isinstance(current, type):
             if not isinstance(value, dict):
                 raise UsageError(f"{where}: {key} is a table of settings, got {value!r}")
-            changes[name] = from_mapping(current, value, where, elsewhere, f"{key}.")
+            changes[name] = from_mapping(current, value, where, elsewhere, f"{key}.", known)
         else:
             if isinstance(current, Mapping) and isinstance(value, dict):
                 value = {**current, **value}  # noqa: PLW2901 - names of other layers stay
@@ -284,9 +288,12 @@ def _unknown(key: str, where: str, known: Sequence[str], elsewhere: Sequence[str
         return UsageError(
             f"{where}: '{key}' is no part of a dataset's config; give it on the command line"
         )
+    last = key.rsplit(".", 1)[-1]
     by_last = {name.rsplit(".", 1)[-1]: name for name in known}
     near = get_close_matches(key, known, 2)
-    near += [by_last[name] for name in get_close_matches(key.rsplit(".", 1)[-1], by_last, 2)]
+    near += [by_last[name] for name in get_close_matches(last, by_last, 2)]
+    if last in by_last:  # a key of another section
+        near = [by_last[last]]
     names = list(dict.fromkeys(near)) or list(known)
     listed = " or ".join(f"'{name}'" for name in names[:2]) if near else ", ".join(names)
     hint = f"did you mean {listed}?" if near else f"there are {listed}"

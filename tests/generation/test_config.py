@@ -71,6 +71,7 @@ def test_paths_in_a_file_are_relative_to_it(tmp_path):
         ("house.scal=1.1", ["'house.scal'", "did you mean 'house.scale'"]),
         ("rooms=4", ["'rooms'", "'house.rooms'"]),
         ("weather=rain", ["no key 'weather'; there are seed, "]),
+        ("episodes.engine=mujoco", ["did you mean 'physics.engine'?"]),
         (
             "house.rooms_on_way_large=4",
             ["'house.rooms_on_way_large'", "'house.rooms_on_path_large'"],
