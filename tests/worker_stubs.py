@@ -10,7 +10,7 @@ import struct
 import time
 from pathlib import Path
 
-from internav_data.records.errors import QuarantineError, UsageError
+from internav_data.records.errors import NotFiniteError, QuarantineError, UsageError
 
 
 def square(payload):
@@ -41,8 +41,31 @@ def refusing(payload):
     raise UsageError(f"{payload} is no mesh")
 
 
+def raising(kind):
+    """Return work that raises an error of a class."""
+
+    def work(task):
+        raise kind(f"task {task}: nothing to do")
+
+    return work
+
+
+def refusing_as(kind):
+    raise kind("nothing to do")
+
+
+def not_finite(_payload):
+    return raising(NotFiniteError)
+
+
 def stillborn(_payload):
     os._exit(9)
+
+
+def deaf(pipe):
+    """Serve nothing: close the pipe and stay."""
+    pipe.close()
+    time.sleep(120)
 
 
 def full_disk(_payload):

@@ -107,6 +107,7 @@ class Child:
             finally:
                 signal.pthread_sigmask(signal.SIG_SETMASK, before)
         self.pipe: Connection[Any, Any] = Connection(ours.detach())
+        self._overdue_s: float | None = None  # grace after which it was killed
 
     def send(self, message: object) -> None:
         """Send a message; a child that has just died is noticed when its pipe is read."""
@@ -115,7 +116,10 @@ class Child:
 
     def exit_cause(self) -> str:
         """Return why a child ended whose pipe is closed: signal or code, last line on stderr."""
-        return _cause(self.end(GRACE_S), self._last_stderr_line())
+        code = self.end(GRACE_S)
+        if self._overdue_s is not None:
+            return f"did not end within {self._overdue_s:g} s and was killed"
+        return _cause(code, self._last_stderr_line())
 
     def end(self, grace_s: float) -> int:
         """Wait for the child, kill it after some seconds; return its exit code."""
@@ -123,7 +127,10 @@ class Child:
             return self.process.wait(max(0.0, grace_s))
         except subprocess.TimeoutExpired:
             self.process.kill()
-            return self.process.wait()
+            code = self.process.wait()
+        if code == -signal.SIGKILL:  # else it ended by itself just before
+            self._overdue_s = max(0.0, grace_s)
+        return code
 
     def close(self) -> None:
         """Close the files of a child that has ended."""

@@ -8,8 +8,10 @@ import time
 
 import psutil
 import pytest
+import worker_stubs
 
-from internav_data.core.processes import end_if_orphaned, parent_is_gone
+from internav_data.core import processes
+from internav_data.core.processes import Child, end_if_orphaned, parent_is_gone
 
 PARENT = """
 import os, subprocess, sys, threading
@@ -87,6 +89,30 @@ def test_a_child_whose_parent_died_before_it_was_set_up_ends_at_once():
         timeout=LIMIT_S,
     )
     assert (done.returncode, done.stdout) == (1, "")
+
+
+@pytest.mark.parametrize(
+    ("killed", "cause"),
+    [
+        (False, "did not end within 0.5 s and was killed"),
+        (True, "was killed by SIGKILL; the system may be short of memory"),
+    ],
+)
+def test_a_child_that_had_to_be_killed_is_told_from_one_that_the_system_killed(
+    monkeypatch, killed, cause
+):
+    monkeypatch.setattr(processes, "GRACE_S", 0.5)
+    child = Child(worker_stubs.deaf)
+    try:
+        with pytest.raises(EOFError):
+            child.pipe.recv()
+        if killed:
+            child.process.kill()
+            child.process.wait()
+        assert child.exit_cause() == cause
+    finally:
+        child.end(0.0)
+        child.close()
 
 
 def test_a_process_of_its_own_is_no_orphan():
