@@ -5,21 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from internav_data.records.errors import (
-    CorruptDataError,
-    InternavError,
-    QuarantineError,
-    UsageError,
-    ValidationError,
-)
-
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-_KINDS = {
-    kind.__name__: kind
-    for kind in (InternavError, UsageError, ValidationError, QuarantineError, CorruptDataError)
-}
+    from internav_data.records.errors import InternavError
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +57,8 @@ class Failed:
 class Fatal:
     """Error that ends the run: setup failed, or a file cannot be read or written."""
 
-    kind: str
-    """Class name of the error."""
+    kind: type[InternavError | OSError]
+    """Class of the error: it has the exit code of the command."""
     reason: str
     errno: int | None = None
     """Number of an OSError."""
@@ -78,9 +67,9 @@ class Fatal:
 
     def error(self) -> InternavError | OSError:
         """Return the error that the worker met."""
-        if self.kind == "OSError":
+        if issubclass(self.kind, OSError):
             return OSError(self.errno or 0, self.reason, self.filename)
-        return _KINDS.get(self.kind, InternavError)(self.reason)
+        return self.kind(self.reason)
 
 
 @dataclass(frozen=True, slots=True)

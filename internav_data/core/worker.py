@@ -36,9 +36,9 @@ def set_up(recipe: Recipe) -> Callable[[Any], Any] | Fatal:
     try:
         return recipe.setup(recipe.payload)
     except InternavError as error:
-        return Fatal(type(error).__name__, str(error))
+        return Fatal(type(error), str(error))
     except Exception as error:  # noqa: BLE001 - any error must reach the parent
-        return Fatal("InternavError", f"a worker could not be set up: {_described(error)}")
+        return Fatal(InternavError, f"a worker could not be set up: {_described(error)}")
 
 
 def run_task(work: Callable[[Any], Any], task: Any) -> Done | Failed | Fatal:  # noqa: ANN401
@@ -51,10 +51,10 @@ def run_task(work: Callable[[Any], Any], task: Any) -> Done | Failed | Fatal:  #
     except QuarantineError as error:
         return Failed(task, str(error), error.attempts)
     except InternavError as error:
-        return Fatal(type(error).__name__, str(error))
+        return Fatal(type(error), str(error))
     except OSError as error:
         named = None if error.filename is None else str(error.filename)
-        return Fatal("OSError", error.strerror or str(error), error.errno, named)
+        return Fatal(OSError, error.strerror or str(error), error.errno, named)
     except MemoryError:
         os._exit(1)  # a new process may have more luck: the parent tries again
     except Exception as error:  # noqa: BLE001 - any error must reach the parent

@@ -29,6 +29,7 @@ from internav_data.core.worker import run_task, set_up
 from internav_data.core.worker_pool import MAX_CRASHES, TICK_S
 from internav_data.generation.rules import source_digest
 from internav_data.physics.engines import MODULES
+from internav_data.records.errors import InternavError, UsageError
 from internav_data.records.version import __version__
 
 if TYPE_CHECKING:
@@ -72,14 +73,14 @@ def _connected(address: str) -> int | Fatal:
         ray.init(address, log_to_driver=False, configure_logging=False, logging_level="ERROR")
     except ConnectionError as error:
         if address != "auto":
-            return Fatal("UsageError", f"the Ray cluster at {address}: {_last_line(error)}")
+            return Fatal(UsageError, f"the Ray cluster at {address}: {_last_line(error)}")
         return Fatal(
-            "UsageError",
+            UsageError,
             "no Ray cluster runs on this machine: start one with `ray start --head`, or name one "
             "of which it is a node by --ray-address HOST:PORT",
         )
     except Exception as error:  # noqa: BLE001 - Ray has no base class for what it raises here
-        return Fatal("UsageError", f"the Ray cluster at {address}: {_last_line(error)}")
+        return Fatal(UsageError, f"the Ray cluster at {address}: {_last_line(error)}")
     finally:
         signal.signal(signal.SIGTERM, before)  # only the run answers signals
     return _cores()
@@ -101,7 +102,7 @@ def _results(order: RayOrder, pipe: Connection[Any, Any]) -> Iterator[Result]:
         cores = _cores()
         seen = time.monotonic() if cores else seen
         if time.monotonic() > seen + ALONE_S:
-            yield Fatal("InternavError", _ended("no node of the Ray cluster is left")), {}
+            yield Fatal(InternavError, _ended("no node of the Ray cluster is left")), {}
             return
         while todo and len(under_way) < (order.workers or AHEAD * cores):
             task = todo.popleft()
@@ -137,7 +138,7 @@ def _result(ref: ray.ObjectRef, task: object, fates: Counter[tuple[Any, str]]) -
             return _Again(task)
         return Failed(task, f"its {kind} died, {limit} times", limit, died=True), {}
     except ray.exceptions.RayError as error:
-        return Fatal("InternavError", _ended(f"Ray: {_last_line(error)}")), {}
+        return Fatal(InternavError, _ended(f"Ray: {_last_line(error)}")), {}
     return result
 
 
@@ -157,15 +158,15 @@ def _unfit_node(engines: Sequence[str]) -> Fatal | None:
         except (*_LOST, ray.exceptions.TaskUnschedulableError):
             continue  # it has left
         except ray.exceptions.GetTimeoutError:
-            return Fatal("UsageError", f"Ray's node {place}: no answer within {NODE_S:.0f} s")
+            return Fatal(UsageError, f"Ray's node {place}: no answer within {NODE_S:.0f} s")
         except ray.exceptions.RayError as error:
             return Fatal(
-                "UsageError",
+                UsageError,
                 f"Ray's node {place}: this package cannot be imported there "
                 f"({_last_line(error)}): install internav-data {__version__} on each node",
             )
         if found := _difference(ours, theirs):
-            return Fatal("UsageError", f"Ray's node {place}: {found}")
+            return Fatal(UsageError, f"Ray's node {place}: {found}")
     return None
 
 
@@ -221,7 +222,7 @@ def _prepared(ref: ray.ObjectRef) -> tuple[Callable[[Any], Any], dict[str, bytes
     os.environ.update(SINGLE_THREADED)
     recipe, wanted, engines = ray.get(ref)
     if found := _difference(wanted, _installed(engines)):  # a node that came later
-        return Fatal("UsageError", f"Ray's node {ray.util.get_node_ip_address()}: {found}")
+        return Fatal(UsageError, f"Ray's node {ray.util.get_node_ip_address()}: {found}")
     payload: ScenePayload = recipe.payload
     outbox: dict[str, bytes] = {}
     work = set_up(

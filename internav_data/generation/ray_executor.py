@@ -16,7 +16,7 @@ from internav_data.core.messages import Done, Failed, Fatal, Recipe
 from internav_data.core.processes import GRACE_S, Child
 from internav_data.core.worker_pool import FINISH_S, TICK_S
 from internav_data.dataset.staging import Staging, put_staged
-from internav_data.records.errors import UsageError
+from internav_data.records.errors import InternavError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Iterator
@@ -142,7 +142,7 @@ def _next(child: Child) -> Any:  # noqa: ANN401 - what the other side sends
     except (EOFError, OSError):  # OSError: it was killed within a message
         cause = child.exit_cause()
         return Fatal(
-            "InternavError", f"the connection to the Ray cluster was lost ({cause}): {_LOST}"
+            InternavError, f"the connection to the Ray cluster was lost ({cause}): {_LOST}"
         )
 
 

@@ -1,13 +1,24 @@
 import errno
+import inspect
 import os
+import pickle
 import time
 
 import pytest
 import worker_stubs
 
 from internav_data.core.messages import Done, Failed, Recipe
+from internav_data.core.storage import OutsideError
+from internav_data.core.worker import run_task, set_up
 from internav_data.core.worker_pool import CannotStartError, WorkerPool
-from internav_data.records.errors import UsageError
+from internav_data.records import errors
+from internav_data.records.errors import NotFiniteError, QuarantineError, UsageError
+
+ERRORS = [
+    kind
+    for _, kind in inspect.getmembers(errors, inspect.isclass)
+    if issubclass(kind, errors.InternavError)
+]
 
 
 def outcomes(recipe, tasks, size=2):
@@ -53,6 +64,22 @@ def test_a_crash_costs_a_retry_and_the_third_gives_the_task_up(tmp_path):
 def test_an_error_of_setup_is_raised_in_the_caller():
     with pytest.raises(UsageError, match=r"duck\.obj is no mesh"):
         outcomes(Recipe(worker_stubs.refusing, "duck.obj"), [1, 2, 3])
+
+
+@pytest.mark.parametrize("kind", [*ERRORS, OutsideError])
+def test_an_error_keeps_its_class_and_so_the_commands_exit_code(kind):
+    fatal = [set_up(Recipe(worker_stubs.refusing_as, kind))]
+    if kind is not QuarantineError:  # it ends its task alone
+        fatal.append(run_task(worker_stubs.raising(kind), 1))
+    for message in pickle.loads(pickle.dumps(fatal)):  # noqa: S301 - our own
+        error = message.error()
+        assert type(error) is kind
+        assert "nothing to do" in str(error)
+
+
+def test_an_error_of_a_task_is_raised_in_the_caller():
+    with pytest.raises(NotFiniteError, match="task 1: nothing to do"):
+        outcomes(Recipe(worker_stubs.not_finite, None), [1])
 
 
 def test_workers_that_cannot_start_end_the_run():

@@ -178,7 +178,7 @@ def test_nodes_with_other_versions_are_refused_before_the_first_scene(
     if name == "_version":
         monkeypatch.setattr(ray_driver, "_LIBRARIES", ())
     found = messages()
-    assert found.kind == "UsageError"
+    assert found.kind is UsageError
     assert re.match(
         rf"Ray's node 127\.0\.0\.1: {message}, so its scenes may differ: ", found.reason
     )
