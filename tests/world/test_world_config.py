@@ -30,7 +30,10 @@ KEPT = Path(__file__).parents[1] / "data" / "dataset-10"
         ("world.force_n=nan", "world.force_n: expected a finite number, got nan"),
         ("world.force_n=strong", "world.force_n: expected a number, got 'strong'"),
         ("world.hands=three", "world.hands is 'three': expected one of free, real"),
-        ("episodes.push_model=kick", "no key 'episodes.push_model'; did you mean 'world.push_model'?"),
+        (
+            "episodes.push_model=kick",
+            "no key 'episodes.push_model'; did you mean 'world.push_model'?",
+        ),
     ],
 )
 def test_bad_values_get_one_line(setting, message):
