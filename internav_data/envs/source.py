@@ -146,9 +146,11 @@ class Source:
         self.dataset = dataset
         self.auxiliary_starts = lru_cache(STARTS_KEPT)(self._auxiliary_starts)
         if len(dataset) == 0:
+            counts = dataset.manifest.counts.items()
+            there = ", ".join(f"{name} {count.episodes}" for name, count in counts)
             raise UsageError(
                 f"dataset {dataset.path}: no episodes for split={dataset.split!r}, "
-                f"filters={dataset.filters!r}; there are {dataset.manifest.counts}: choose others"
+                f"filters={dataset.filters!r}; episodes by split: {there}: choose others"
             )
 
     @cached_property

@@ -257,7 +257,7 @@ def test_options_that_cannot_be_meant(small, options, message):
         ({"image_size": 0}, "image_size"),
         ({"colour": 1}, "no argument 'colour'"),
         ({"imagesize": 32}, "no argument 'imagesize'; .*'image_size'.*'sensors'.*'task'"),
-        ({"filters": [("room_count", ">", 99)]}, "no episodes"),
+        ({"filters": [("room_count", ">", 99)]}, r"no episodes .* by split: train \d+, val \d+"),
         ({"push_model": "shove"}, "push_model"),
         ({"episodes_per_house": 0}, "episodes_per_house"),
     ],
