@@ -85,11 +85,13 @@ def serve(pipe: Connection[Any, Any]) -> None:
     """Serve requests from a pipe until it asks to close: the main function of a process.
 
     The first message holds the arguments. A request is (method, (arguments, keyword arguments));
-    an answer is (True, result) or (False, error).
+    an answer is (True, result, done) or (False, error, done), where `done`, (n,) bool, tells which
+    environments are done now: an error may come after some have begun anew. It is None where the
+    process ends for the error.
     """
     try:
         env = _environments(*loaded(*pipe.recv()))
-        pipe.send((True, None))
+        pipe.send((True, None, env.done))
         while True:
             name, given = pipe.recv()
             if name == "close":
@@ -97,15 +99,15 @@ def serve(pipe: Connection[Any, Any]) -> None:
             try:
                 answer = getattr(env, name)(*given[0], **given[1])
             except InternavError as error:
-                pipe.send((False, error))
+                pipe.send((False, error, env.done))
                 continue
             # Observations lie in the shared memory already: only the rest goes through the pipe.
             moved = name in {"reset", "step", "restore"}
-            pipe.send((True, (*answer[1:], env.done.copy()) if moved else answer))
+            pipe.send((True, answer[1:] if moved else answer, env.done))
     except (EOFError, BrokenPipeError, ConnectionResetError):
         raise
     except Exception as error:  # noqa: BLE001 - the parent raises it
-        pipe.send((False, error))
+        pipe.send((False, error, None))
 
 
 def _environments(
@@ -254,8 +256,6 @@ class InterNavProcesses(PlainSpec, VectorEnv[Any, Any, Any]):
                 asked.append(k)
         answers = dict(zip(asked, self._answers(asked), strict=True))
         infos = [answers[k][0] if k in answers else {} for k in range(len(self._rows))]
-        for k, (_, done) in answers.items():
-            self._done[slice(*self._rows[k])] = done
         self._ordered |= mask
         return self._observations(), concatenate_infos(infos, self._counts)
 
@@ -270,8 +270,7 @@ class InterNavProcesses(PlainSpec, VectorEnv[Any, Any, Any]):
         asked = checked_batch(actions, self._done, self._mode)
         for k, (low, high) in enumerate(self._rows):
             self._ask(k, "step", asked[low:high])
-        rewards, terminated, truncated, infos, done = zip(*self._answers(), strict=True)
-        self._done = np.concatenate(done)
+        rewards, terminated, truncated, infos = zip(*self._answers(), strict=True)
         return (
             self._observations(),
             np.concatenate(rewards),
@@ -310,8 +309,7 @@ class InterNavProcesses(PlainSpec, VectorEnv[Any, Any, Any]):
             raise UsageError(f"restore: expected {self.num_envs} states, got {len(states)}")
         for k, (low, high) in enumerate(self._rows):
             self._ask(k, "restore", list(states[low:high]))
-        infos, done = zip(*self._answers(), strict=True)
-        self._done = np.concatenate(done)
+        (infos,) = zip(*self._answers(), strict=True)
         self._ordered[:] = True
         return self._observations(), concatenate_infos(infos, self._counts)
 
@@ -336,6 +334,8 @@ class InterNavProcesses(PlainSpec, VectorEnv[Any, Any, Any]):
         return self._answers()
 
     def _ask(self, k: int, name: str, *given: Any, **named: Any) -> None:  # noqa: ANN401 - of any method
+        if self.closed:
+            raise UsageError("environments: they were closed; make them again to go on")
         if self._asked[k]:
             # Its answer to an earlier call is still to come, and would be taken for this one's.
             raise InternavError(
@@ -348,16 +348,19 @@ class InterNavProcesses(PlainSpec, VectorEnv[Any, Any, Any]):
     def _answers(self, of: Sequence[int] | None = None) -> list[Any]:
         """Return the answers of some processes, or raise the first error.
 
-        All answers are read before an error is raised: no pipe is left full.
+        All answers are read before an error is raised: no pipe is left full, and what the other
+        processes have done is known.
         """
         answers: list[Any] = []
         errors: list[Exception] = []
         for k in range(len(self._processes)) if of is None else of:
             try:
-                good, answer = self._processes[k].pipe.recv()
+                good, answer, done = self._processes[k].pipe.recv()
             except (EOFError, OSError):
-                good, answer = False, InternavError(self._death(k))
+                good, answer, done = False, InternavError(self._death(k)), None
             self._asked[k] = False
+            if done is not None:
+                self._done[slice(*self._rows[k])] = done
             (answers if good else errors).append(answer)
         if errors:
             raise errors[0]

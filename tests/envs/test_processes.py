@@ -101,6 +101,31 @@ def test_a_process_that_is_killed_is_named(small):
     assert time.monotonic() - began < LIMIT_S
 
 
+def test_closed_environments_say_so(small):
+    env = InterNavProcesses(2, small, 2, 16)
+    env.reset(seed=1)
+    env.close()
+    for ask in (env.reset, env.state, env.action_masks, lambda: env.step([0, 0])):
+        with pytest.raises(UsageError, match="they were closed"):
+            ask()
+
+
+@pytest.mark.parametrize("bad", [0, 1])
+def test_after_a_refused_reset_it_is_known_who_has_begun_anew(small, bad):
+    env = InterNavProcesses(2, small, 2, 16, autoreset_mode="Disabled")
+    with contextlib.closing(env):
+        env.reset(seed=1)
+        env.step([Action.DONE] * 2)
+        ids = [None, None]
+        ids[bad] = "nowhere"
+        with pytest.raises(UsageError, match="no episode 'nowhere'"):
+            env.reset(options={"episode_id": ids})
+        with pytest.raises(UsageError, match=f"environment {bad} is done"):
+            env.step([0, 0])
+        env.reset(options={"reset_mask": np.arange(2) == bad})
+        env.step([0, 0])
+
+
 def test_no_answer_is_taken_for_that_of_a_later_call(small, monkeypatch):
     env = InterNavProcesses(2, small, 2, 16)
     env.reset(seed=1)
