@@ -21,12 +21,20 @@ if TYPE_CHECKING:
     from internav_data.world import StepResult
 
 
-_WHOLE: Final = (int, np.integer)
+WHOLE: Final = (int, np.integer)
+"""Types of whole numbers."""
 _FIRST: Final = int(Action.WAIT)
 
 
-def check_actions(actions: Sequence[Any]) -> list[int]:
+def check_actions(actions: Sequence[Any], name: str = "step") -> list[int]:
     """Return actions as integers; none is taken before all are known to exist.
+
+    Parameters
+    ----------
+    actions
+        Actions, of any type.
+    name
+        Argument that holds them, for the error.
 
     Raises
     ------
@@ -34,9 +42,10 @@ def check_actions(actions: Sequence[Any]) -> list[int]:
         One is no whole number, or there is no such action.
     """
     for action in actions:
-        if not isinstance(action, _WHOLE) or not _FIRST <= action < ACTION_COUNT:
+        if not isinstance(action, WHOLE) or not _FIRST <= action < ACTION_COUNT:
             raise UsageError(
-                f"step: expected an action of 0 … {ACTION_COUNT - 1}, or -1 to wait; got {action!r}"
+                f"{name}: expected an action of 0 … {ACTION_COUNT - 1}, or -1 to wait; "
+                f"got {action!r}"
             )
     return [int(action) for action in actions]
 

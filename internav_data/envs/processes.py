@@ -239,8 +239,8 @@ class InterNavProcesses(PlainSpec, VectorEnv[Any, Any, Any]):
         """
         chosen = check_options(options, OPTIONS)
         seeds = split_seeds(seed, self.num_envs)
-        super().reset(seed=seeds[0])
         mask, ids, actions, starts = reset_choices(chosen, self.num_envs)
+        super().reset(seed=seeds[0])
         for k in np.flatnonzero(mask & ~self._ordered).tolist():
             if seeds[k] is None:  # drawn here, as one process draws them for all
                 seeds[k] = int(self.np_random.integers(2**32))

@@ -13,8 +13,10 @@ from internav_data.envs.slot import (
     Arguments,
     EnvSlot,
     EpisodeSnapshot,
+    check_choice,
     check_options,
     check_render_mode,
+    check_seed,
     step_info,
     take_sensors,
 )
@@ -103,13 +105,16 @@ class InterNavEnv(Rebuilt, gymnasium.Env[dict[str, Any], np.int64]):
         Raises
         ------
         UsageError
-            An option is unknown, or there is no such episode.
+            The seed or an option is wrong, or there is no such episode.
         """
         chosen = check_options(options, ("episode_id", "actions", "start"))
+        episode_id = chosen.get("episode_id")
+        actions, start = check_choice(episode_id, chosen.get("actions", ()), chosen.get("start"))
+        seed = check_seed(seed)
         super().reset(seed=seed)
         if seed is not None or not self._slot.ordered:
             self._slot.seed(self.np_random_seed)
-        self._slot.begin(chosen.get("episode_id"), chosen.get("actions", ()), chosen.get("start"))
+        self._slot.begin(episode_id, actions, start)
         return self._observation(), self._info()
 
     def step(

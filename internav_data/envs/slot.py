@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, TypedDict, cast
 
 from internav_data.envs.auxiliary import next_start
-from internav_data.envs.episode import EpisodeRun
+from internav_data.envs.episode import WHOLE, EpisodeRun, check_actions
 from internav_data.envs.sensors import observed
 from internav_data.envs.source import HOUSE_CACHE_SIZE, LOADED_HOUSES, Source, open_source
 from internav_data.envs.tasks import TASKS, Task, TaskConfig
@@ -222,7 +223,8 @@ class EnvSlot:
         actions
             Actions to take at once.
         start
-            Node i, j and quarter turn; None for the start that the task chooses.
+            Node i, j and quarter turn, for a named episode alone; None for the start that the task
+            chooses.
 
         Raises
         ------
@@ -350,13 +352,65 @@ def check_options(options: Mapping[str, Any] | None, known: tuple[str, ...]) -> 
         return {}
     if not isinstance(options, Mapping):
         raise UsageError(f"options: expected a dictionary, got {type(options).__name__}")
-    unknown = sorted(set(options) - set(known))
+    unknown = sorted(set(options) - set(known), key=str)
     if unknown:
         raise UsageError(f"options: no option {unknown[0]!r}; there are {list(known)}")
     for name in ("actions", "start"):
         if name in options and options.get("episode_id") is None:
             raise UsageError(f"options[{name!r}]: say of which episode, by options['episode_id']")
     return dict(options)
+
+
+def check_seed(seed: object) -> int | None:
+    """Return a seed as an integer; None stays.
+
+    Raises
+    ------
+    UsageError
+        It is no whole number of 0 or more.
+    """
+    if seed is None:
+        return None
+    if not isinstance(seed, WHOLE) or seed < 0:
+        raise UsageError(f"seed: expected a whole number of 0 or more, got {seed!r}")
+    return int(seed)
+
+
+def check_choice(
+    episode_id: str | None, actions: object, start: object
+) -> tuple[list[int], tuple[int, int, int] | None]:
+    """Return the actions to take at once and the start that `reset` is asked for in one slot.
+
+    Raises
+    ------
+    UsageError
+        The actions or the start are wrong, or the start comes without an episode's id.
+    """
+    name = "options['actions']"
+    taken = check_actions(as_list(actions, name, "a list of actions"), name)
+    if start is None:
+        return taken, None
+    name = "options['start']"
+    if episode_id is None:
+        raise UsageError(f"{name}: say of which episode, by options['episode_id']; got {start!r}")
+    node = as_list(start, name, "(i, j, quarter)")
+    if len(node) != 3 or not all(isinstance(number, WHOLE) for number in node):  # noqa: PLR2004
+        raise UsageError(f"{name}: expected (i, j, quarter), whole numbers; got {start!r}")
+    return taken, (int(node[0]), int(node[1]), int(node[2]))
+
+
+def as_list(values: object, name: str, expected: str) -> list[Any]:
+    """Return the elements of a list, tuple, array or other iterable; text is none.
+
+    Raises
+    ------
+    UsageError
+        It has no elements.
+    """
+    if not isinstance(values, str):
+        with contextlib.suppress(TypeError):
+            return list(cast("Iterable[Any]", values))
+    raise UsageError(f"{name}: expected {expected}, got {values!r}")
 
 
 def _check_names(arguments: Mapping[str, Any]) -> None:

@@ -9,13 +9,16 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from internav_data.envs.copies import Rebuilt, with_absolute_path
-from internav_data.envs.episode import check_actions
+from internav_data.envs.episode import WHOLE, check_actions
 from internav_data.envs.slot import (
     Arguments,
     EnvSlot,
     EpisodeSnapshot,
+    as_list,
+    check_choice,
     check_options,
     check_render_mode,
+    check_seed,
     step_info,
     take_sensors,
 )
@@ -105,15 +108,17 @@ def split_seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int
     Raises
     ------
     UsageError
-        The number of seeds is not `count`.
+        The number of seeds is not `count`, or one is no whole number of 0 or more.
     """
     if seed is None:
         return [None] * count
-    if isinstance(seed, int | np.integer):
+    if isinstance(seed, WHOLE):
+        check_seed(seed)
         return [int(seed) + k for k in range(count)]
-    if len(seed) != count:
-        raise UsageError(f"seed: expected {count} seeds, got {len(seed)}")
-    return list(seed)
+    seeds = as_list(seed, "seed", f"a whole number of 0 or more, or {count} of them")
+    if len(seeds) != count:
+        raise UsageError(f"seed: expected {count} seeds, got {len(seeds)}")
+    return [check_seed(each) for each in seeds]
 
 
 class InterNavVectorEnv(Rebuilt, VectorEnv[Any, Any, Any]):
@@ -200,12 +205,12 @@ class InterNavVectorEnv(Rebuilt, VectorEnv[Any, Any, Any]):
         Raises
         ------
         UsageError
-            An option is unknown or of another length, or there is no such episode.
+            The seed or an option is wrong or of another length, or there is no such episode.
         """
         chosen = check_options(options, OPTIONS)
         seeds = split_seeds(seed, self.num_envs)
-        super().reset(seed=seeds[0])
         mask, ids, actions, starts = reset_choices(chosen, self.num_envs)
+        super().reset(seed=seeds[0])
         infos: dict[str, Any] = {}
         for k in np.flatnonzero(mask).tolist():
             slot, own = self.slots[k], seeds[k]
@@ -376,19 +381,34 @@ def reset_choices(
     Raises
     ------
     UsageError
-        The mask is not (count,) bool or is empty, or an option has another length.
+        The mask is not (count,) bool or is empty, an option has another length, or the actions or
+        the start of a slot to reset are wrong.
     """
-    mask = np.asarray(chosen.get("reset_mask", np.ones(count, np.bool_)))
+    given_mask = chosen.get("reset_mask", np.ones(count, np.bool_))
+    try:
+        mask = np.asarray(given_mask)
+    except ValueError as error:  # lists of several lengths
+        raise UsageError(
+            f"options['reset_mask']: expected {count} booleans, got {given_mask!r}"
+        ) from error
     if mask.shape != (count,) or mask.dtype != np.bool_ or not mask.any():
         raise UsageError(
             f"options['reset_mask']: expected {count} booleans, one of them true at least; "
             f"got {mask.dtype} of shape {mask.shape}"
         )
     ids = chosen.get("episode_id")
-    ids = [ids] * count if ids is None or isinstance(ids, str) else list(ids)
-    actions = list(chosen.get("actions", [()] * count))
-    starts = list(chosen.get("start", [None] * count))
-    for name, given in (("episode_id", ids), ("actions", actions), ("start", starts)):
-        if len(given) != count:
-            raise UsageError(f"options[{name!r}]: expected {count} of them, got {len(given)}")
+    ids = [ids] * count if ids is None or isinstance(ids, str) else ids
+    options = {
+        "episode_id": ids,
+        "actions": chosen.get("actions", [()] * count),
+        "start": chosen.get("start", [None] * count),
+    }
+    for option, given in options.items():
+        name = f"options[{option!r}]"
+        options[option] = each = as_list(given, name, f"a list, one for each of {count}")
+        if len(each) != count:
+            raise UsageError(f"{name}: expected {count} of them, got {len(each)}")
+    ids, actions, starts = options.values()
+    for k in np.flatnonzero(mask).tolist():
+        actions[k], starts[k] = check_choice(ids[k], actions[k], starts[k])
     return mask, ids, actions, starts

@@ -1,5 +1,6 @@
 """The environment: spaces, order, states, and the ways of stepping many, all the same."""
 
+import contextlib
 import math
 import warnings
 
@@ -247,6 +248,66 @@ def test_five_hundred_steps(small):
 def test_options_that_cannot_be_meant(small, options, message):
     with pytest.raises(UsageError, match=message):
         make(small).unwrapped.reset(options=options)
+
+
+REFUSED_SEEDS = [(1.5, r"seed: .*got 1\.5"), (-3, "seed: .*got -3"), ("7", "seed: .*got '7'")]
+REFUSED_STARTS = ["abc", 5, (1.0, 2.0, 0.0), (1, 2)]
+REFUSED_ACTIONS = [5, "abc", ["x"], [0.5], [12]]
+
+
+def test_one_environment_refuses_seeds_starts_and_actions_before_anything_begins(small):
+    env = make(small).unwrapped
+    env.reset(seed=np.int64(3))
+    before, named = env.state(), {"episode_id": load_dataset(small)[0].episode_id}
+    for seed, message in REFUSED_SEEDS:
+        with pytest.raises(UsageError, match=message):
+            env.reset(seed=seed)
+    for start in REFUSED_STARTS:
+        with pytest.raises(UsageError, match=r"options\['start'\]: expected \(i, j, quarter\)"):
+            env.reset(seed=1, options={**named, "start": start})
+    for actions in REFUSED_ACTIONS:
+        with pytest.raises(UsageError, match=r"options\['actions'\]: expected a.* got"):
+            env.reset(seed=1, options={**named, "actions": actions})
+    assert env.state() == before
+
+
+def test_many_refuse_seeds_starts_and_actions_before_anything_begins(small):
+    episode_id = load_dataset(small)[0].episode_id
+    for way in ({}, {"workers": 2}):
+        env = many(small, 2, **way)
+        with contextlib.closing(env):
+            env.reset(seed=0)
+            before = env.state()
+            refused = [
+                *(({"seed": seed}, message) for seed, message in REFUSED_SEEDS),
+                *(({"seed": [1, seed]}, message) for seed, message in REFUSED_SEEDS),
+                *(
+                    ({"seed": 1, "options": {"episode_id": ids, name: given}}, message)
+                    for ids, name, given, message in refused_options(episode_id)
+                ),
+            ]
+            for given, message in refused:
+                with pytest.raises(UsageError, match=message):
+                    env.reset(**given)
+            assert env.state() == before
+            # What is asked of an environment that is not reset does not matter.
+            mask = np.array([True, False])
+            env.reset(options={"reset_mask": mask, "episode_id": episode_id, "actions": [[1], 5]})
+            assert env.state()[1] == before[1]
+
+
+def refused_options(episode_id):
+    """Return episode ids, an option's name and value for two environments, and the error."""
+    for start in REFUSED_STARTS:
+        yield episode_id, "start", [None, start], r"\['start'\]: expected \(i, j, quarter\)"
+    for actions in REFUSED_ACTIONS:
+        yield episode_id, "actions", [[], actions], r"\['actions'\]: expected a.* got"
+    yield [episode_id, None], "start", [None, (1, 1, 0)], r"\['start'\]: say of which episode"
+    for name in ("start", "actions"):
+        for given in ("abc", 5, None):
+            yield episode_id, name, given, rf"\['{name}'\]: expected a list, .*got {given!r}"
+    yield 5, "reset_mask", [True, True], r"\['episode_id'\]: expected a list"
+    yield episode_id, "reset_mask", [[True], [True, False]], r"\['reset_mask'\]: expected 2"
 
 
 @pytest.mark.parametrize(
