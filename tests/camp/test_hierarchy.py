@@ -25,7 +25,7 @@ from internav_data.camp.agents.protocol import Agent  # noqa: E402
 from internav_data.camp.rollout import Collector, uniforms_of  # noqa: E402
 from internav_data.envs.sensors import DEFAULT_SENSORS, SENSORS  # noqa: E402
 from internav_data.records.errors import UsageError  # noqa: E402
-from internav_data.world.actions import ACTION_COUNT  # noqa: E402
+from internav_data.world.actions import ACTION_COUNT, Action  # noqa: E402
 
 ALLOWED = torch.zeros(4, ACTION_COUNT, dtype=torch.bool)
 for _option, _actions in enumerate(ACTIONS_OF):
@@ -183,6 +183,19 @@ def test_the_intent_policy_is_a_copy_made_at_synchronisation_only(collected, met
     assert all(one != other for one, other in zip(now, copied, strict=True))
     agent.synchronise()
     assert as_bytes(mine for mine, _ in pairs()) == now
+
+
+@pytest.mark.parametrize(("shared", "count"), [(True, 1), (False, 3)])
+def test_policies_share_an_encoder_or_have_one_each(config, shared, count):
+    agent = make_agent("camp", config(network={"shared_encoder": shared}))
+    assert len(agent.encoders) == count
+
+
+def test_an_action_that_no_option_takes_cannot_be_cloned(config):
+    agent = make_agent("camp", config())
+    assert agent.labels([int(Action.MOVE_AHEAD), int(Action.DONE)])
+    with pytest.raises(UsageError, match="cannot be cloned: option 'navigate' cannot take it"):
+        agent.labels([int(Action.MOVE_AHEAD), int(Action.WAIT)])
 
 
 def test_who_is_optimised():

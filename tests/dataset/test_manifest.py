@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -226,6 +227,14 @@ def test_a_file_of_other_rows_than_stated_is_refused(damaged_folder):
         load_dataset(damaged_folder)[0]
 
 
+def test_a_file_longer_than_stated_is_refused(damaged_folder):
+    file = read_manifest(damaged_folder).files[0]
+    with (damaged_folder / file.path).open("ab") as longer:
+        longer.write(b"x")
+    with pytest.raises(CorruptDataError, match=rf"expected {file.bytes} bytes, got {file.bytes + 1}"):
+        load_dataset(damaged_folder)[0]
+
+
 @pytest.mark.parametrize("name", ["rows", "bytes"])
 @pytest.mark.parametrize("value", [-1, 1 << 60, "9", None, 1.5, True])
 def test_sizes_are_bounded(damaged_folder, name, value):
@@ -282,6 +291,15 @@ def test_wrong_shapes_are_refused(damaged_folder, change):
 def test_nothing_of_the_machine_is_in_it(dataset_folder):
     text = (dataset_folder / "manifest.json").read_text()
     assert str(dataset_folder.parent) not in text
+
+
+def test_a_manifest_that_the_disk_does_not_give_is_one_line():
+    class Broken(MemoryStore):
+        def read(self, name, start=0, stop=None):
+            raise OSError(errno.EIO, "Input/output error", name)
+
+    with pytest.raises(CorruptDataError, match=r"manifest\.json: cannot be read: Input/output error"):
+        read_manifest(Broken())
 
 
 def test_errors_of_unfinished_and_absent_datasets_differ(tmp_path):

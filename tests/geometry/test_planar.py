@@ -107,3 +107,12 @@ def test_a_triangle_is_the_smallest_polygon_that_holds_a_point():
     corners = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 3.0]])
     assert planar.inside(1.0, 1.0, corners, 0, 3)
     assert not planar.inside(1.0, 0.0, corners, 0, 2), "a segment holds none"
+
+
+def test_a_polygon_may_stand_in_any_rows_and_holds_its_boundary():
+    corners = np.array([[9.0, 9.0], [8.0, 8.0], [7.0, 9.0], [0.0, 0.0], [3.0, 0.0], [0.0, 3.0]])
+    for point in ((1.0, 1.0), (1.5, 0.0), (1.5, 1.5), (3.0, 0.0)):
+        assert planar.inside(*point, corners, 3, 6)
+    assert not planar.inside(1.0, -0.1, corners, 3, 6)
+    assert not planar.inside(1.5, 0.0, corners, 3, 5), "a segment holds none"
+    assert not planar.inside(1.0, 1.0, corners, 3, 4), "nor does a point"
