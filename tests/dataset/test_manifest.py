@@ -231,7 +231,9 @@ def test_a_file_longer_than_stated_is_refused(damaged_folder):
     file = read_manifest(damaged_folder).files[0]
     with (damaged_folder / file.path).open("ab") as longer:
         longer.write(b"x")
-    with pytest.raises(CorruptDataError, match=rf"expected {file.bytes} bytes, got {file.bytes + 1}"):
+    with pytest.raises(
+        CorruptDataError, match=rf"expected {file.bytes} bytes, got {file.bytes + 1}"
+    ):
         load_dataset(damaged_folder)[0]
 
 
@@ -298,7 +300,9 @@ def test_a_manifest_that_the_disk_does_not_give_is_one_line():
         def read(self, name, start=0, stop=None):
             raise OSError(errno.EIO, "Input/output error", name)
 
-    with pytest.raises(CorruptDataError, match=r"manifest\.json: cannot be read: Input/output error"):
+    with pytest.raises(
+        CorruptDataError, match=r"manifest\.json: cannot be read: Input/output error"
+    ):
         read_manifest(Broken())
 
 
