@@ -297,7 +297,7 @@ def test_nothing_of_the_machine_is_in_it(dataset_folder):
 
 def test_a_manifest_that_the_disk_does_not_give_is_one_line():
     class Broken(MemoryStore):
-        def read(self, name, start=0, stop=None):
+        def read(self, name, **_):
             raise OSError(errno.EIO, "Input/output error", name)
 
     with pytest.raises(
