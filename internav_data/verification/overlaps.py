@@ -25,6 +25,9 @@ DEPTH_M = 0.001
 GRID_M = 1e-9
 """Grid of overlays. Without one, GEOS 3.14 finds two copies of a polygon disjoint where their
 corners differ in the last digits."""
+MAX_INTRUSIONS = 200
+"""Pairs of bodies in each other that are told: more tell nothing new, and each takes milliseconds
+(a damaged file may hold hundreds of copies of an obstacle in one place)."""
 
 
 def plans_overlap(first: Geometry, second: Geometry, depth_m: float = DEPTH_M) -> bool:
@@ -140,10 +143,13 @@ def intrusions(first: Solids, second: Solids, depth_m: float = DEPTH_M) -> list[
     """Return pairs of bodies (of first, of second), ascending, over `depth_m` in each other.
 
     Slabs count in space, at all heights: also those that no footprint holds. Bodies of one and the
-    same set are compared once, the higher number first, and never with themselves.
+    same set are compared once, the higher number first, and never with themselves. After
+    `MAX_INTRUSIONS` pairs no more are looked for.
     """
     found: set[tuple[int, int]] = set()
     for a, b in first.near(second, (-depth_m,) * 6):
+        if len(found) == MAX_INTRUSIONS:
+            break
         pair = first.owners[a], second.owners[b]
         if pair in found or (first is second and pair[0] <= pair[1]):
             continue

@@ -6,16 +6,20 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
+import builders
 import pyarrow as pa
 import pytest
 from manifests import edit_manifest
-from scenery import small_scenes, write_dataset
+from scenery import ASSETS, small_scenes, write_dataset
 from strategies import rng
 
 from internav_data.dataset import TABLES, read_manifest, read_table
 from internav_data.dataset.parquet import write_table
+from internav_data.records import Pose
 from internav_data.records.errors import InternavError
 from internav_data.verification import validate
+from internav_data.verification.overlaps import MAX_INTRUSIONS, Solids, intrusions
+from internav_data.verification.shapes import Shapes
 
 FLOATS = (float("nan"), float("inf"), -float("inf"), 1e308, -1e308, 1e5, -1e5, 0.0, -0.0, 1e-300)
 INTEGERS = (-1, -(2**15), 2**15 - 1, 0)
@@ -116,6 +120,13 @@ def judge(valid, tmp_path, mutation, level):
         return None  # the manifest says that it does not fit
     finally:
         assert time.process_time() - start < MAX_S
+
+
+def test_hundreds_of_copies_in_one_place_are_not_all_compared():
+    asset_id, spot = next(iter(ASSETS)), Pose(1.0, 1.0, 0.0, builders.UPRIGHT)
+    slabs = Shapes(ASSETS).slabs(asset_id, spot)
+    copies = Solids.of((number, slabs) for number in range(500))
+    assert len(intrusions(copies, copies)) == MAX_INTRUSIONS
 
 
 def test_values_that_no_generator_writes_are_findings(valid, tmp_path):
